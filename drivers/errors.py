@@ -1,0 +1,43 @@
+"""Errors of the drivers, one small tree.
+
+    DriverError
+    |- DeviceError        the outside world; the supervisor closes the device, waits and tries again
+    |  |- NotPresent      nothing answers: cable out, wrong address, no such port
+    |  |- Timeout         it was there and has gone silent, or the bus is held low
+    |  '- BadReply        something answers, but not what this device would say
+    |     '- WrongDevice  another chip or instrument sits at this place
+    |- SettingsError      a setting the device does not have; trying again cannot help
+    '- DumpError          a recorded dump that cannot be read: file, line, what was expected
+"""
+
+
+class DriverError(Exception):
+    """Root of everything a driver raises on purpose."""
+
+
+class DeviceError(DriverError):
+    """A fault of the outside world. Worth another try later."""
+
+
+class NotPresent(DeviceError):
+    """Nothing answers there."""
+
+
+class Timeout(DeviceError):
+    """The device or its bus has gone silent."""
+
+
+class BadReply(DeviceError):
+    """The device answered something it never should."""
+
+
+class WrongDevice(BadReply):
+    """Another device answers at this place."""
+
+
+class SettingsError(DriverError):
+    """A setting that this device cannot have."""
+
+
+class DumpError(DriverError):
+    """A recorded dump that cannot be read."""

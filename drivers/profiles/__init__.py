@@ -1,0 +1,1 @@
+"""Wire profiles: data files that say what a serial frame means."""

@@ -1,0 +1,1 @@
+"""The recorded demonstration drive and the program that made it."""

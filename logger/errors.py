@@ -1,0 +1,28 @@
+"""Errors of the logger and the exit status each becomes.
+
+    RidelogError
+    |- BadInput        a file, a line or an argument that is not what was expected; exit 2
+    '- CheckFailed     the check a command was asked to make found something wrong; exit 1
+"""
+
+EXIT_DONE = 0
+EXIT_CHECK_FAILED = 1
+EXIT_BAD_INPUT = 2
+
+
+class RidelogError(Exception):
+    """Root of everything ridelog raises on purpose."""
+
+    exit_status = EXIT_BAD_INPUT
+
+
+class BadInput(RidelogError):
+    """Wrong use or bad input. The message names the file, the line and what was expected."""
+
+    exit_status = EXIT_BAD_INPUT
+
+
+class CheckFailed(RidelogError):
+    """The check found something wrong."""
+
+    exit_status = EXIT_CHECK_FAILED

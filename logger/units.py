@@ -1,0 +1,10 @@
+"""Exact constants and the unit conversions of the edges. Inside, everything is SI."""
+
+STANDARD_GRAVITY_MPS2 = 9.80665
+FOOT_M = 0.3048
+MILE_M = 1609.344
+KNOT_MPS = 1852.0 / 3600.0
+KMH_MPS = 1.0 / 3.6
+MPH_MPS = MILE_M / 3600.0
+WINDOW_M = 25 * FOOT_M
+US_PER_S = 1_000_000
