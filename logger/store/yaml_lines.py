@@ -1,0 +1,194 @@
+"""YAML files that people write, read so that every complaint can name its line.
+
+A plain YAML load forgets where a value stood, lets the later of two equal keys win, reads ``010`` as eight
+and ``1:30`` as ninety, and can be made to grow without bound by aliases. Here a file becomes a tree of nodes
+that know their line and hold their text as written; what the text means is decided by who asks for it
+(``number``, ``text``, ``boolean`` ...), and whatever is not as asked becomes ``BadInput("file:line: expected ...")``.
+Aliases, own tags and deep nesting are refused: no file of ours needs them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from logger.errors import BadInput
+
+MAX_BYTES = 256 * 1024
+MAX_DEPTH = 12
+
+_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
+_INTEGER = re.compile(r"[-+]?(?:0[xX][0-9a-fA-F]{1,16}|0|[1-9][0-9]{0,17})")
+_NULLS = ("", "~", "null", "Null", "NULL")
+_KNOWN_TAG = "tag:yaml.org,2002:"
+
+
+@dataclass(frozen=True)
+class Node:
+    """One value of a YAML file and the line where it stands (that of its key, inside a mapping).
+
+    content is the text of a scalar as written, a tuple of nodes, or a dict from key to node (in the file's
+    order). ``plain`` tells an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``).
+    Each asking method raises BadInput when the value is something else.
+    """
+
+    file: str
+    line: int
+    content: str | tuple[Node, ...] | Mapping[str, Node]
+    plain: bool = False
+
+    def wrong(self, expected: str) -> BadInput:
+        """The error to raise for this node: ``file:line: expected <expected>, found <what stands there>``."""
+        return BadInput(f"{self.file}:{self.line}: expected {expected}, found {self._shown()}")
+
+    def _shown(self) -> str:
+        if isinstance(self.content, str):
+            if self.plain and self.content in _NULLS:
+                return "nothing"
+            return repr(self.content if len(self.content) <= 40 else self.content[:40] + "...")
+        return "a list" if isinstance(self.content, tuple) else "a mapping"
+
+    def is_null(self) -> bool:
+        """Tell whether nothing stands here (``key:`` alone, ``~`` or ``null``)."""
+        return isinstance(self.content, str) and self.plain and self.content in _NULLS
+
+    def mapping(self, required: Iterable[str] = (), optional: Iterable[str] = ()) -> Mapping[str, Node]:
+        """Key to node, where every required key is there and no key beyond the two lists is.
+
+        With both lists empty any key is accepted.
+        """
+        if not isinstance(self.content, Mapping):
+            raise self.wrong("a mapping (key: value lines)")
+        required, known = tuple(required), (*required, *optional)
+        for key, node in self.content.items():
+            if known and key not in known:
+                raise BadInput(f"{self.file}:{node.line}: expected one of the keys {', '.join(known)}, found {key!r}")
+        for key in required:
+            if key not in self.content:
+                raise BadInput(f"{self.file}:{self.line}: expected the key {key!r} here, it is missing")
+        return self.content
+
+    def items(self) -> tuple[Node, ...]:
+        """The nodes of a list."""
+        if not isinstance(self.content, tuple):
+            raise self.wrong("a list")
+        return self.content
+
+    def text(self) -> str:
+        """A string that is not empty, quoted or not."""
+        if not isinstance(self.content, str) or not self.content:
+            raise self.wrong("a text")
+        return self.content
+
+    def choice(self, *allowed: str) -> str:
+        """One of the given words."""
+        if not isinstance(self.content, str) or self.content not in allowed:
+            raise self.wrong("one of " + ", ".join(allowed))
+        return self.content
+
+    def boolean(self) -> bool:
+        """``true`` or ``false``, unquoted."""
+        if not self.plain or self.content not in ("true", "false"):
+            raise self.wrong("true or false")
+        return self.content == "true"
+
+    def integer(self, low: int | None = None, high: int | None = None) -> int:
+        """A whole number, decimal or 0x hexadecimal, within [low, high]."""
+        expected = "a whole number" + _limits(low, high)
+        if not self.plain or not isinstance(self.content, str) or not _INTEGER.fullmatch(self.content):
+            raise self.wrong(expected)
+        value = int(self.content, 0)
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise self.wrong(expected)
+        return value
+
+    def number(self, low: float | None = None, high: float | None = None, *, above: float | None = None) -> float:
+        """A finite decimal number within [low, high], and greater than ``above`` where that is given."""
+        limits = _limits(low, high) if above is None else f" greater than {above:g}{_limits(None, high)}"
+        expected = "a number" + limits
+        if not self.plain or not isinstance(self.content, str) or not _NUMBER.fullmatch(self.content):
+            raise self.wrong(expected)
+        value = float(self.content)
+        too_low = (low is not None and value < low) or (above is not None and value <= above)
+        if too_low or abs(value) == float("inf") or (high is not None and value > high):
+            raise self.wrong(expected)
+        return value
+
+
+def _limits(low: float | None, high: float | None) -> str:
+    if low is None:
+        return "" if high is None else f" of at most {high:g}"
+    return f" of at least {low:g}" if high is None else f" from {low:g} to {high:g}"
+
+
+def load_mapping(path: Path | str) -> Node:
+    """Read a YAML file whose top is a mapping. Raises BadInput, which names file and line, for anything else."""
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
+    if len(data) > MAX_BYTES:
+        raise BadInput(f"{path}: expected at most {MAX_BYTES} bytes of YAML")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{path}:{data.count(10, 0, error.start) + 1}: expected UTF-8 text") from None
+    return parse_mapping(text, str(path))
+
+
+def parse_mapping(text: str, file: str) -> Node:
+    """The same for text at hand; ``file`` is the name that complaints carry."""
+    try:
+        _refuse_aliases_and_depth(text, file)
+        top = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise BadInput(f"{file}:{line}: expected text without control characters") from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"{file}:{mark.line + 1}" if mark else file
+        raise BadInput(f"{where}: expected YAML ({error.problem or error.context})") from None
+    except (ValueError, OverflowError) as error:  # PyYAML lets these out for impossible escapes and versions
+        raise BadInput(f"{file}: expected YAML ({error})") from None
+    if top is None:
+        raise BadInput(f"{file}:1: expected a mapping (key: value lines), found nothing")
+    node = _convert(top, file, 1)
+    node.mapping()
+    return node
+
+
+def _refuse_aliases_and_depth(text: str, file: str) -> None:
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        line = event.start_mark.line + 1 if event.start_mark else 1
+        if isinstance(event, yaml.AliasEvent):
+            raise BadInput(f"{file}:{line}: expected values written out, found the alias *{event.anchor}")
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > MAX_DEPTH:
+            raise BadInput(f"{file}:{line}: expected at most {MAX_DEPTH} levels of nesting")
+
+
+def _convert(node: yaml.Node, file: str, line: int) -> Node:
+    if not node.tag.startswith(_KNOWN_TAG) or "python/" in node.tag:
+        raise BadInput(f"{file}:{line}: expected a plain value, found the tag {node.tag}")
+    if isinstance(node, yaml.ScalarNode):
+        return Node(file, line, node.value, plain=node.style is None)
+    if isinstance(node, yaml.SequenceNode):
+        return Node(file, line, tuple(_convert(item, file, item.start_mark.line + 1) for item in node.value))
+    content: dict[str, Node] = {}
+    for key, value in node.value:
+        key_line = key.start_mark.line + 1
+        if not isinstance(key, yaml.ScalarNode):
+            raise BadInput(f"{file}:{key_line}: expected a word as key")
+        if key.value in content:
+            raise BadInput(f"{file}:{key_line}: expected each key once, {key.value!r} stands here again")
+        content[key.value] = _convert(value, file, key_line)
+    return Node(file, line, content)
