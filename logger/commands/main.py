@@ -1,0 +1,93 @@
+"""The ``ridelog`` command: one verb per file of this folder, imported only when it is asked for.
+
+A fault that is expected, whatever the verb, becomes one line on stderr and an exit status: 1 the check that was
+asked for failed, 2 wrong use or bad input, 130 and 141 as shells name an interrupt and a closed pipe.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from typing import NoReturn
+
+from drivers.errors import DriverError
+from logger.errors import EXIT_BAD_INPUT, RidelogError
+
+VERBS = {
+    "demo": "run a recorded drive through the service and show the result; needs no hardware",
+    "run": "the service that logs a drive (what systemd starts)",
+    "replay": "play a recorded dump through the same service",
+    "status": "what the running service is doing",
+    "verify": "check logs and dumps for damage and gaps",
+    "report": "make one web page of logs: map, plots, table",
+    "capture": "record the raw bytes of a serial port",
+}
+EXIT_INTERRUPTED = 130
+EXIT_PIPE_CLOSED = 141
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message} (try '{self.prog} --help')\n")
+
+
+def main(arguments: list[str]) -> int:
+    """Carry out one command line; give its exit status. Help and wrong use leave by SystemExit, as argparse does."""
+    if not arguments or arguments[0] not in VERBS:
+        return _without_verb(arguments)
+    verb = arguments[0]
+    module = importlib.import_module(f"logger.commands.{verb}")
+    parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__,
+                     formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+    module.add_arguments(parser)
+    status: int = module.run(parser.parse_args(arguments[1:]))
+    return status
+
+
+def run() -> NoReturn:
+    """The console script."""
+    try:
+        status = main(sys.argv[1:])
+        sys.stdout.flush()
+    except RidelogError as error:
+        status = _complain(str(error), error.exit_status)
+    except DriverError as error:
+        status = _complain(str(error), EXIT_BAD_INPUT)
+    except BrokenPipeError:
+        # Nobody reads on. Python would complain once more when it flushes at exit, so stdout goes nowhere now.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = EXIT_PIPE_CLOSED
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        status = _complain(f"{place}{error.strerror or error}", EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        status = EXIT_INTERRUPTED
+    sys.exit(status)
+
+
+def _complain(message: str, status: int) -> int:
+    print("ridelog: " + " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+def _without_verb(arguments: list[str]) -> int:
+    width = max(map(len, VERBS)) + 2
+    verbs = "\n".join(f"  {verb:{width}}{meaning}" for verb, meaning in VERBS.items())
+    parser = _Parser(
+        prog="ridelog", usage="ridelog COMMAND [OPTIONS]", formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="How rough is the road, and how does it feel to the people inside?", add_help=True,
+        epilog=f"commands:\n{verbs}\n\n'ridelog COMMAND --help' explains one of them.", allow_abbrev=False)
+    parser.add_argument("--version", action="store_true", help="print the version and leave")
+    parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.version:
+        from logger.shipped import version  # reads the installation's records, which takes a while
+
+        print(f"ridelog {version()}")
+        return 0
+    found = "" if options.command is None else f", found {options.command!r}"
+    return parser.error(f"expected a command out of {', '.join(VERBS)}{found}")

@@ -1,0 +1,108 @@
+"""What the running service is doing, and what to do next. Exit status 1 when it is not running, or hangs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
+from logger.service.config import find_config, load_config
+from logger.service.status import SensorStatus, ServiceStatus, process_exists, read_status, trouble
+
+_START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
+_JOURNAL = "See why: journalctl -u ridelog -n 50"
+_LITTLE_ROOM_BYTES = 200_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings of the service (default: those of 'run')")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def run(args: argparse.Namespace) -> int:
+    status = read_status(load_config(find_config(args.config)).status_file)
+    fault = trouble(status, time.monotonic_ns() // 1000, status is not None and process_exists(status.pid))
+    if args.json:
+        known = {} if status is None else asdict(status)
+        print(json.dumps({"running": fault is None, "trouble": fault, **known}))
+    else:
+        print("\n".join(screen(status, fault)))
+    return EXIT_DONE if fault is None else EXIT_CHECK_FAILED
+
+
+def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
+    """The lines a person sees. ``fault`` is what ``trouble`` said."""
+    if status is None or fault is not None:
+        return [fault or "", "", "What to do", *(f"  {line}" for line in (_START, _JOURNAL))]
+    words = {"starting": "is starting", "standing": "is ready; the car stands", "recording": "is recording",
+             "stopping": "is stopping"}
+    lines = [
+        f"ridelog {words[status.state]}, up {_span(status.uptime_s)}",
+        "",
+        _sensor_line("accelerometer", status.accelerometer, "samples"),
+        _sensor_line("GPS", status.gps, _fix_words(status)),
+        f"  log             {status.current_file or 'no file open'}; {status.rows_written} rows, "
+        f"{status.distance_m / 1000:.1f} km since the start",
+    ]
+    if status.last_window is not None:
+        lines.append(f"  last window     {_window_words(status)}")
+    lines += ["", "What to do", *(f"  {line}" for line in advice(status))]
+    return lines
+
+
+def advice(status: ServiceStatus) -> list[str]:
+    """What a person can do about what is wrong, most urgent first; one line that all is well when nothing is."""
+    steps = [*_sensor_advice("accelerometer", status.accelerometer), *_sensor_advice("GPS", status.gps)]
+    if status.gps.state == "ok" and not status.fix_valid:
+        steps.append("GPS: no fix. Give the antenna a free view of the sky; the first fix can take some minutes.")
+    if status.free_bytes is not None and status.free_bytes < _LITTLE_ROOM_BYTES:
+        steps.append(f"Disk: {status.free_bytes / 1e6:.0f} MB left in {status.log_directory}. Copy the finished logs "
+                     "away and delete them.")
+    return steps or ["Nothing: all is well."]
+
+
+def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
+    if sensor.state == "ok":
+        return []
+    error = f" It said: {sensor.last_error}." if sensor.last_error else ""
+    if sensor.driver == "bma220":
+        check = "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
+    elif sensor.state == "silent":
+        check = "check its power, that its TX goes to our RX, and the baud rate in the settings"
+    else:
+        check = "check the cable, and the port in the settings (ls /dev/serial/by-id)"
+    return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{error}"]
+
+
+def _sensor_line(name: str, sensor: SensorStatus, words: str) -> str:
+    return f"  {name:15} {sensor.state:9} {sensor.driver} at {sensor.place}, {sensor.readings} {words}"
+
+
+def _fix_words(status: ServiceStatus) -> str:
+    fix = "position known" if status.fix_valid else "no position"
+    satellites = "" if status.satellites is None else f" ({status.satellites} satellites)"
+    return f"fixes, {fix}{satellites}, {'time known' if status.utc_known else 'time not known yet'}"
+
+
+def _window_words(status: ServiceStatus) -> str:
+    window = status.last_window
+    if window is None:
+        return ""
+    values = [
+        "speed unknown" if window.speed_mps is None else f"{window.speed_mps * 3.6:.0f} km/h",
+        "IRI unknown" if window.iri_m_per_km is None else f"IRI {window.iri_m_per_km:.1f} m/km",
+        window.comfort.replace("_", " "),
+        " ".join(window.flags),
+    ]
+    return ", ".join(value for value in values if value)
+
+
+def _span(seconds: float) -> str:
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

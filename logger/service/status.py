@@ -1,0 +1,152 @@
+"""A snapshot of the running service, for people and programs beside it.
+
+Problem. Somebody at the car wants to know, in one look, whether it is recording and what to do if not; and a file
+that merely exists may be that of a service that died.
+
+Solution. The service fills a frozen ``ServiceStatus`` now and then and puts it, whole, into a small JSON file in
+memory (renamed into place, so a reader never sees half of one). It carries the process and the monotonic time of
+its making, by which ``trouble`` tells a living service from a dead, hung or never started one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from logger.errors import BadInput
+from logger.records import WindowRecord
+
+STALE_S = 10.0
+"""A living service renews its status every second; one this old comes from a service that hangs."""
+
+SensorState = Literal["ok", "absent", "retrying", "silent"]
+ServiceState = Literal["starting", "standing", "recording", "stopping"]
+
+
+@dataclass(frozen=True)
+class SensorStatus:
+    """One sensor as the service sees it.
+
+    driver, place   what it is and where: ``bma220`` at ``/dev/i2c-1``
+    state           ok: readings come; absent: it was never there; retrying: it was there, failed, and is tried
+                    again; silent: it is open and says nothing
+    since_s         how long it has been in that state [s]
+    last_error      text of the last fault, also after it recovered; None: there was none
+    readings        samples or fixes so far
+    counters        what its decoder counted: bad checksums, dropped bytes ...
+    """
+
+    driver: str
+    place: str
+    state: SensorState = "absent"
+    since_s: float = 0.0
+    last_error: str | None = None
+    readings: int = 0
+    counters: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ServiceStatus:
+    """All that ``ridelog status`` knows.
+
+    state           starting; standing: it samples, the car does not move or there is no speed yet; recording:
+                    windows come; stopping
+    updated_t_us    monotonic time of this snapshot [us]
+    fix_valid       the receiver vouches for its last fix; None: there was none yet
+    utc_known       rows carry true time
+    current_file    the open log file; None between drives
+    rows_written    rows since the start of the service, in all files
+    distance_m      travelled since the start of the service [m]
+    free_bytes      room left where the logs are; None: not known
+    last_window     the newest row; None before the first
+    counters        what the pipeline and the store counted: late samples, gaps, write errors ...
+    """
+
+    state: ServiceState
+    pid: int
+    version: str
+    uptime_s: float
+    updated_t_us: int
+    accelerometer: SensorStatus
+    gps: SensorStatus
+    fix_valid: bool | None = None
+    satellites: int | None = None
+    utc_known: bool = False
+    log_directory: str = ""
+    current_file: str | None = None
+    rows_written: int = 0
+    distance_m: float = 0.0
+    free_bytes: int | None = None
+    last_window: WindowRecord | None = None
+    counters: Mapping[str, int] = field(default_factory=dict)
+
+
+def write_status(path: Path, status: ServiceStatus) -> None:
+    """Put the snapshot into place in one step. Raises OSError where that cannot be done.
+
+    There is no fsync: the file lies in memory, and after a power cut nobody is there whom it could describe.
+    """
+    new = path.with_name(path.name + ".new")
+    new.write_text(json.dumps(asdict(status)) + "\n", encoding="utf-8")
+    new.replace(path)
+
+
+def read_status(path: Path) -> ServiceStatus | None:
+    """Read the last snapshot; None where there is none. Raises BadInput for a file that is not one."""
+    try:
+        fields = json.loads(path.read_text(encoding="utf-8"))
+        window = fields["last_window"]
+        if window is not None:
+            fields["last_window"] = WindowRecord(**{**window, "flags": tuple(window["flags"])})
+        fields["accelerometer"] = _sensor(fields["accelerometer"])
+        fields["gps"] = _sensor(fields["gps"])
+        status = ServiceStatus(**fields)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise BadInput(f"{path}: expected a status file that can be read ({error.strerror})") from None
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise BadInput(f"{path}: expected the status of a ridelog service of this version") from None
+    if status.state not in get_args(ServiceState) or not isinstance(status.pid, int):
+        raise BadInput(f"{path}: expected the status of a ridelog service of this version")
+    return status
+
+
+def _sensor(fields: Mapping[str, Any]) -> SensorStatus:
+    sensor = SensorStatus(**fields)
+    if sensor.state not in get_args(SensorState):
+        raise ValueError(f"no sensor state {sensor.state!r}")
+    return sensor
+
+
+def process_exists(pid: int) -> bool:
+    """Tell whether a process of this number runs, whoever owns it."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def trouble(status: ServiceStatus | None, now_t_us: int, pid_exists: bool) -> str | None:
+    """Say why the service that made this snapshot is not running as it should; None when it is.
+
+    now_t_us     monotonic time, of this machine since its last boot [us]
+    pid_exists   whether the process of the snapshot runs (``process_exists``)
+    """
+    if status is None:
+        return "ridelog is not running: it has left no status"
+    age_s = (now_t_us - status.updated_t_us) / 1e6
+    if age_s < 0:
+        return "ridelog is not running: its last status is from before this boot"
+    if not pid_exists:
+        return f"ridelog is not running: process {status.pid} has ended, its last status is {age_s:.0f} s old"
+    if age_s > STALE_S:
+        return f"ridelog hangs: process {status.pid} is there, but its last status is {age_s:.0f} s old"
+    return None
