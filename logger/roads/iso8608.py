@@ -1,0 +1,58 @@
+"""Random roads of ISO 8608: a displacement spectrum Gd(n) = Gd(n0) (n / n0)^-2, and elevations that have it.
+
+A sum of cosines at equal steps of wave number (Eq 4.1 and 4.2 of Blum 2015) repeats after one over the step, so a
+long road made of a fixed number of them is one short road over and over. Here the step is chosen for the road: its
+period is longer than the road by at least the longest wave, and the sum is taken by a Fourier transform.
+In Eq 4.1 the wave number is in cycles per metre, so its argument needs 2 pi; phases are uniform.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+REFERENCE_N0_CPM = 0.1
+LOWEST_CPM = 0.011
+HIGHEST_CPM = 2.83
+CM3_M3 = 1e-6
+
+# Geometric mean degree of roughness of each class [cm3] (ISO 8608; Table 2.2 of Blum 2015).
+CLASS_GD_N0_CM3 = {"A": 16.0, "B": 64.0, "C": 256.0, "D": 1024.0, "E": 4096.0, "F": 16384.0, "G": 65536.0, "H": 262144.0}
+
+IRI_PER_ROOT_GD = 0.5386
+
+
+def gd_n0_from_iri(iri_m_per_km: float) -> float:
+    """Degree of roughness Gd(n0) [cm3] of a random road with this IRI [m/km] (Eq 4.40)."""
+    return (iri_m_per_km / IRI_PER_ROOT_GD) ** 2
+
+
+def iri_from_gd_n0(gd_n0_cm3: float) -> float:
+    """IRI [m/km] of a random road with this degree of roughness [cm3] (Eq 4.39)."""
+    return IRI_PER_ROOT_GD * gd_n0_cm3**0.5
+
+
+def displacement_psd(wave_number_cpm: npt.ArrayLike, gd_n0_cm3: float) -> Array:
+    """Displacement spectrum Gd(n) [m3] at wave numbers in cycles per metre (Eq 2.1 with a waviness of 2)."""
+    return gd_n0_cm3 * CM3_M3 * (np.asarray(wave_number_cpm, dtype=float) / REFERENCE_N0_CPM) ** -2.0
+
+
+def generate(gd_n0_cm3: float, length_m: float, spacing_m: float, seed: int) -> Array:
+    """Elevations [m] of a random road at 0, spacing, 2 spacing ... up to its length; one seed is one road.
+
+    Eq 4.1 and 4.2 over 0.011 to 2.83 cycles per metre. Gd(n0) in cm3: one of ``CLASS_GD_N0_CM3``, or by
+    ``gd_n0_from_iri``. The samples are exact for any spacing: waves shorter than two samples are in them, aliased, as
+    in any profile that is read off a real road at points.
+    """
+    count = int(np.floor(length_m / spacing_m + 1e-9)) + 1
+    finer = int(np.ceil(2 * HIGHEST_CPM * spacing_m * 1.001))
+    period = int(np.ceil((count * spacing_m + 1 / LOWEST_CPM) / spacing_m)) * finer
+    step_cpm = finer / (period * spacing_m)
+    harmonic = np.arange(int(np.ceil(LOWEST_CPM / step_cpm)), int(HIGHEST_CPM / step_cpm) + 1)
+    amplitude = np.sqrt(2 * step_cpm * displacement_psd(harmonic * step_cpm, gd_n0_cm3))
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(harmonic))
+    spectrum = np.zeros(period // 2 + 1, dtype=complex)
+    spectrum[harmonic] = 0.5 * period * amplitude * np.exp(-1j * phase)
+    return np.fft.irfft(spectrum, period)[: count * finer: finer]
