@@ -1,0 +1,123 @@
+"""Play a recorded dump through the same service code that runs in the car.
+
+The rows that come out depend on the recording and the settings alone, whatever the rate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from drivers.dump import open_dump
+from logger.errors import BadInput
+from logger.service.config import Config, load_config
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog replay``."""
+    parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the segment logs")
+    parser.add_argument("--rate", metavar="N", type=float, default=0.0, help="1: real time; 0 (default): at full speed")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="settings; the recording's sensor goes before them")
+    parser.add_argument("--vehicle", metavar="NAME|FILE", help="instead of the vehicle that the recording names")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog replay``."""
+    if args.rate < 0:
+        raise BadInput(f"--rate {args.rate:g}: expected 0 or more")
+    config = load_config(args.config) if args.config else Config()
+    outcome = replay(args.dump, args.out, config, args.rate, args.vehicle, quiet=args.json)
+    if args.json:
+        print(json.dumps(outcome.as_json()))
+    else:
+        print(outcome.text())
+    return 0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a replay made: the folder, the files in it, the rows as a summary, and how fast it went."""
+
+    directory: Path
+    files: list[Path]
+    rows: int
+    duration_s: float
+    wall_s: float
+    torn_tail: bool
+    summary: Any
+
+    def as_json(self) -> dict[str, Any]:
+        """Named fields, SI units in the names."""
+        from logger.report.summary import summary_json
+
+        return {
+            "directory": str(self.directory),
+            "files": [path.name for path in self.files],
+            "rows": self.rows,
+            "played_s": self.duration_s,
+            "wall_s": self.wall_s,
+            "torn_tail": self.torn_tail,
+            "summary": summary_json(self.summary),
+        }
+
+    def text(self) -> str:
+        """For a person."""
+        from logger.report.terminal import screen
+
+        lines = [screen(self.summary, sys.stdout.encoding or "ascii")]
+        if self.torn_tail:
+            lines.append("The recording was cut short; everything before the cut was played.")
+        lines.append(f"Logs: {self.directory} ({len(self.files)} files, {self.rows} rows)")
+        return "\n".join(lines)
+
+
+def replay(dump: Path, out: Path, config: Config, rate: float, vehicle: str | None, quiet: bool) -> Outcome:
+    """Play ``dump`` into logs below ``out``. Progress goes to stderr unless ``quiet``."""
+    from logger.service import assemble
+    from logger.service.core import Core
+    from logger.service.replay import Player
+    from logger.store.rotation import SegmentLog, next_session, repair
+
+    with open_dump(dump) as reader:
+        config = assemble.config_for_dump(reader.header, config, vehicle)
+        config = replace(config, log=replace(config.log, directory=out))
+        out.mkdir(parents=True, exist_ok=True)
+        repair(out)
+        sensor = assemble.instrument(config.accelerometer)
+        relation, vehicle_facts = assemble.relation(config)
+        session = next_session(out)
+        facts = assemble.sidecar(config, sensor, vehicle_facts) | {"replayed_from": dump.name}
+        segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
+        core = Core(sensor.decoder, assemble.gps_decoder(config), assemble.pipeline(config, sensor, relation), segment_log)
+        started_s = time.monotonic()
+        player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
+        played = player.play(reader)
+        wall_s = time.monotonic() - started_s
+    if not quiet:
+        print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
+    return _outcome(out, session, core.rows, played.duration_s, wall_s, reader.torn_tail)
+
+
+def _outcome(out: Path, session: int, rows: int, duration_s: float, wall_s: float, torn: bool) -> Outcome:
+    from logger.report.summary import summarise
+    from logger.store.segment_log import read_log
+
+    files = sorted(out.glob(f"{session:05d}-*.csv"))
+    records = [record for path in files for record in read_log(path).records]
+    return Outcome(out, files, rows, duration_s, wall_s, torn, summarise(records))
+
+
+def _progress(quiet: bool) -> Callable[[float], None]:
+    def tell(played_s: float) -> None:
+        if not quiet:
+            print(f"\rplaying: {played_s / 60:.0f} min", end="", file=sys.stderr, flush=True)
+
+    return tell

@@ -1,0 +1,181 @@
+"""From jittered accelerometer samples to filtered samples on the time grid.
+
+One vertical axis is taken, put on a uniform grid, decimated where the sensor was read faster, freed of gravity
+by a high-pass, low-passed if the settings ask for it, and weighted for comfort. Holes are never hidden: samples
+that the sensor did not deliver are `present = False`. Over a short hole the filters run on along a straight
+line, so that one loose contact does not cost seconds of road; after a long one they start anew and their output
+is not `settled` until they have forgotten the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.readings import AccelerationBlock
+from logger.comfort.iso2631 import RunningRms
+from logger.dsp.resample import Decimator, GridResampler, GridRun
+from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
+from logger.dsp.weightings.weighting import Weighting
+from logger.dsp.windows import GridSamples
+from logger.units import US_PER_S
+
+GRID_RATE_HZ = 100
+GRID_STEP_US = US_PER_S // GRID_RATE_HZ
+GRAVITY_CORNER_HZ = 0.2
+SETTLING_S = 4.0
+LINE_OVER_HOLE_US = 500_000
+SILENCE_US = 1_000_000
+START_MEAN_SAMPLES = 50
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Which axis of the sensor points up: column 0, 1, 2 for X, Y, Z, and its sign."""
+
+    column: int
+    sign: float
+
+    @classmethod
+    def from_word(cls, word: str) -> Axis:
+        """``+z``, ``-x``, ..."""
+        return cls("xyz".index(word[-1]), -1.0 if word.startswith("-") else 1.0)
+
+
+class SignalChain:
+    """The filters between a sensor and the windows, as one stream.
+
+    weighting     frequency weighting with stored sections for 100 Hz
+    oversample    the sensor is read at this multiple of 100 Hz
+    low_pass_hz   corner of a second-order low-pass; None: not used
+    """
+
+    def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None) -> None:
+        self._axis = axis
+        self._resampler = GridResampler(GRID_RATE_HZ * oversample)
+        self._decimator = Decimator(oversample)
+        self._high_pass = BlockFilter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
+        self._low_pass = BlockFilter(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ)) if low_pass_hz else None
+        self._weighting = BlockFilter(np.asarray(weighting.sections[GRID_RATE_HZ]))
+        self._running = RunningRms(GRID_RATE_HZ)
+        self._next_us: int | None = None
+        self._last_mps2: float | None = None
+        self._since_start = 0
+
+    def push(self, block: AccelerationBlock) -> list[GridSamples]:
+        """More samples of the sensor; gives what is ready on the grid."""
+        if not len(block):
+            return []
+        vertical = self._axis.sign * block.accel_mps2[:, self._axis.column]
+        return self._filtered(self._resampler.push(block.t_us, vertical, block.clipped))
+
+    def advance(self, start_us: int, now_us: int) -> list[GridSamples]:
+        """Let time pass. A sensor that has been silent for a second is missing from the grid up to then;
+        ``start_us`` is when the drive began, for a sensor that has not spoken yet."""
+        begun_us = self._next_us if self._next_us is not None else start_us
+        missing_until_us = now_us - SILENCE_US
+        if begun_us >= missing_until_us:
+            return []
+        out = self.flush()
+        begun_us = self._next_us if self._next_us is not None else start_us
+        if begun_us < missing_until_us:
+            out.append(self._absent(begun_us, missing_until_us))
+            self._last_mps2 = None
+        return out
+
+    def flush(self) -> list[GridSamples]:
+        """What is still inside the resampler and the decimator."""
+        out = self._filtered(self._resampler.flush())
+        rest = self._decimator.flush()
+        return out + [self._samples(run) for run in rest]
+
+    def _filtered(self, runs: list[GridRun]) -> list[GridSamples]:
+        out = []
+        for fine in runs:
+            for run in self._decimator.push(fine):
+                if run.new_start:
+                    out += self._start_anew(run)
+                out.append(self._samples(run))
+        return out
+
+    def _start_anew(self, run: GridRun) -> list[GridSamples]:
+        """Before the first run and between two: what is missing, and the state of the filters."""
+        out = []
+        hole_us = run.t0_us - self._next_us if self._next_us is not None else 0
+        if self._next_us is not None and hole_us >= GRID_STEP_US // 2:
+            if self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:
+                return [self._line(self._next_us, run.t0_us, float(run.values[0]))]
+            out.append(self._absent(self._next_us, run.t0_us))
+        elif self._last_mps2 is not None:
+            return out
+        self._reset(float(np.mean(run.values[:START_MEAN_SAMPLES])))
+        return out
+
+    def _reset(self, level_mps2: float) -> None:
+        self._high_pass.reset(level_mps2)
+        self._weighting.reset(level_mps2)
+        if self._low_pass is not None:
+            self._low_pass.reset(level_mps2)
+        self._running.reset()
+        self._since_start = 0
+
+    def _line(self, begin_us: int, end_us: int, next_mps2: float) -> GridSamples:
+        t_us = np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
+        assert self._last_mps2 is not None
+        knots_us = [begin_us - GRID_STEP_US, end_us]
+        values = np.interp(t_us, knots_us, [self._last_mps2, next_mps2])
+        nowhere = np.zeros(len(t_us), dtype=np.bool_)
+        return self._filter(t_us, values, present=nowhere, interpolated=nowhere, clipped=nowhere)
+
+    def _absent(self, begin_us: int, end_us: int) -> GridSamples:
+        t_us = np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
+        self._next_us = int(t_us[-1]) + GRID_STEP_US if len(t_us) else begin_us
+        zero = np.zeros(len(t_us))
+        nowhere = np.zeros(len(t_us), dtype=np.bool_)
+        return GridSamples(t_us, zero, zero, zero, nowhere, nowhere, nowhere, nowhere)
+
+    def _samples(self, run: GridRun) -> GridSamples:
+        t_us = run.t0_us + GRID_STEP_US * np.arange(len(run.values), dtype=np.int64)
+        self._last_mps2 = float(run.values[-1])
+        everywhere = np.ones(len(t_us), dtype=np.bool_)
+        return self._filter(t_us, run.values, present=everywhere, interpolated=run.bridged, clipped=run.clipped)
+
+    def _filter(
+        self,
+        t_us: npt.NDArray[np.int64],
+        values: Floats,
+        present: npt.NDArray[np.bool_],
+        interpolated: npt.NDArray[np.bool_],
+        clipped: npt.NDArray[np.bool_],
+    ) -> GridSamples:
+        if self._low_pass is not None:
+            values = self._low_pass.process(values)
+        accel = self._high_pass.process(values)
+        weighted = self._weighting.process(values)
+        settled = self._since_start + np.arange(len(values)) >= SETTLING_S * GRID_RATE_HZ
+        self._since_start += len(values)
+        self._next_us = int(t_us[-1]) + GRID_STEP_US if len(t_us) else self._next_us
+        running = self._running.process(weighted)
+        return GridSamples(t_us, accel, weighted, running, present, interpolated, settled, clipped)
+
+
+def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:
+    """What the chain does to a body acceleration before its r.m.s. is taken: gain at frequencies (n,) [Hz]."""
+    filters = [butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ)]
+    if low_pass_hz:
+        filters.append(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ))
+
+    def gain(f_hz: Floats) -> Floats:
+        seen = f_hz < GRID_RATE_HZ / 2
+        below_hz = np.where(seen, f_hz, 0.0)
+        total = np.where(seen, 1.0, 0.0)
+        for sos in filters:
+            total = total * np.abs(frequency_response(sos, below_hz, GRID_RATE_HZ))
+        return total
+
+    return gain

@@ -1,0 +1,182 @@
+"""The live service: threads that listen, one loop that thinks.
+
+Each source has a thread of its own that does nothing but look at its device at the right moment and put what it
+got, with the time, into a queue. The main loop empties the queue ten times a second, brings the events into
+order of time, records them if asked to, feeds the core, and tells systemd and the status file how things stand.
+So a slow card or a slow window never delays a sample, and a pipeline that hangs stops feeding the watchdog.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+from drivers.dump import DumpWriter, Event
+from logger.service.core import Core
+from logger.service.supervisor import Supervisor
+from logger.store.rotation import SegmentLog
+from logger.units import US_PER_S
+
+LOOP_S = 0.1
+HOLD_BACK_US = 60_000
+GATHER_S = 0.03
+CLOSED_WAIT_S = 0.1
+THREAD_SWITCH_S = 0.0005
+log = logging.getLogger(__name__)
+
+
+def monotonic_us() -> int:
+    """The monotonic clock in whole microseconds, the resolution of a recorded dump."""
+    return time.monotonic_ns() // 1000
+
+
+class Deadlines:
+    """Instants at equal steps. One that is missed is counted and skipped, never made up for in a burst."""
+
+    def __init__(self, step_us: int) -> None:
+        self._step_us = step_us
+        self._next_us: int | None = None
+        self.missed = 0
+
+    def wait(self) -> None:
+        """Sleep until the next instant."""
+        now_us = monotonic_us()
+        if self._next_us is None:
+            self._next_us = now_us
+        self._next_us += self._step_us
+        late_us = now_us - self._next_us
+        if late_us > 0:
+            skipped = late_us // self._step_us + 1
+            self.missed += skipped
+            self._next_us += skipped * self._step_us
+        time.sleep(max(self._next_us - now_us, 0) / US_PER_S)
+
+
+class Listener(threading.Thread):
+    """Looks at one device for ever. ``pace`` waits between two looks."""
+
+    def __init__(self, supervisor: Supervisor, events: deque[Event], pace: Callable[[], None]) -> None:
+        super().__init__(name=supervisor.name, daemon=True)
+        self._supervisor = supervisor
+        self._events = events
+        self._pace = pace
+        self._stop_asked = threading.Event()
+        self.failure: BaseException | None = None
+
+    def run(self) -> None:
+        """Until stopped. A fault that is not the device's ends the thread; the main loop sees it."""
+        try:
+            while not self._stop_asked.is_set():
+                event = self._supervisor.step()
+                if event is not None:
+                    self._events.append(event)
+                if self._supervisor.retry_at_us is not None:
+                    self._stop_asked.wait(CLOSED_WAIT_S)
+                else:
+                    self._pace()
+        except BaseException as failure:  # noqa: BLE001 - handed to the main thread, which raises it
+            self.failure = failure
+        finally:
+            self._supervisor.close()
+
+    def stop(self) -> None:
+        """Ask it to end and wait for it."""
+        self._stop_asked.set()
+        self.join()
+
+
+def gather() -> None:
+    """Pause after a chunk of serial bytes, so that the next chunk is worth its wake-up."""
+    time.sleep(GATHER_S)
+
+
+class LiveService:
+    """The main loop.
+
+    ``beat`` is called every ``beat_s`` [s] or so, after the pipeline has moved: status file and watchdog hang on it.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        segment_log: SegmentLog,
+        recorder: DumpWriter | None,
+        listeners: list[Listener],
+        events: deque[Event],
+        sync_s: float,
+        beat_s: float,
+        beat: Callable[[int], None],
+    ) -> None:
+        self._core = core
+        self._log = segment_log
+        self._recorder = recorder
+        self._listeners = listeners
+        self._events = events
+        self._sync_us = round(sync_s * US_PER_S)
+        self._beat_us = round(beat_s * US_PER_S)
+        self._beat = beat
+        self._floor_us = 0
+
+    def run(self, stop: threading.Event) -> None:
+        """Until ``stop`` is set; then finish the current window and close the files."""
+        sys.setswitchinterval(THREAD_SWITCH_S)
+        for listener in self._listeners:
+            listener.start()
+        gc.collect()
+        gc.freeze()
+        synced_us = beat_us = monotonic_us()
+        while not stop.wait(LOOP_S):
+            now_us = monotonic_us()
+            self._move(now_us - HOLD_BACK_US)
+            if now_us - synced_us >= self._sync_us:
+                synced_us = now_us
+                self._sync()
+            if now_us - beat_us >= self._beat_us:
+                beat_us = now_us
+                self._beat(now_us)
+        self._end()
+
+    def _end(self) -> None:
+        for listener in self._listeners:
+            listener.stop()
+        self._move(monotonic_us(), step=False)
+        self._core.finish()
+        if self._recorder is not None:
+            self._recorder.close()
+
+    def _move(self, until_us: int, step: bool = True) -> None:
+        """Take the events up to ``until_us``; later ones wait, for another source may still bring earlier ones."""
+        for listener in self._listeners:
+            if listener.failure is not None:
+                raise listener.failure
+        taken = [self._events.popleft() for _ in range(len(self._events))]
+        taken.sort(key=_time_of)
+        ready = [event for event in taken if event.t_us <= until_us]
+        self._events.extendleft(reversed(taken[len(ready) :]))
+        for event in ready:
+            self._take(event)
+        if step:
+            self._core.advance(until_us)
+            self._floor_us = max(self._floor_us, until_us)
+
+    def _take(self, event: Event) -> None:
+        if event.t_us < self._floor_us:
+            event = event._replace(t_us=self._floor_us)
+        self._floor_us = event.t_us
+        if self._recorder is not None:
+            self._recorder.write(event)
+        self._core.feed(event)
+
+    def _sync(self) -> None:
+        self._log.sync()
+        if self._recorder is not None:
+            self._recorder.flush(sync=True)
+
+
+def _time_of(event: Event) -> int:
+    return event.t_us

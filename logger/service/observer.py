@@ -1,0 +1,143 @@
+"""What the running service tells about itself: a snapshot for the status file, a line for systemd."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+from collections import Counter
+
+from drivers.nmea import NmeaDecoder
+from logger.service.config import Config
+from logger.service.core import Core
+from logger.service.live import Deadlines, monotonic_us
+from logger.service.pipeline import Pipeline
+from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
+from logger.service.supervisor import Supervisor
+from logger.shipped import version
+from logger.store.rotation import SegmentLog
+from logger.units import US_PER_S
+
+HEALTH_LINE_US = 60 * US_PER_S
+RECENT_US = 15 * US_PER_S
+log = logging.getLogger(__name__)
+
+
+class Observer:
+    """Looks at the parts of the service and puts together what they say."""
+
+    def __init__(
+        self,
+        config: Config,
+        core: Core,
+        segment_log: SegmentLog,
+        pipeline: Pipeline,
+        accelerometer: Supervisor,
+        gps: Supervisor,
+        decoder: NmeaDecoder,
+        deadlines: Deadlines,
+    ) -> None:
+        self._config = config
+        self._core = core
+        self._log = segment_log
+        self._pipeline = pipeline
+        self._sensors = {"accelerometer": accelerometer, "gps": gps}
+        self._decoder = decoder
+        self._deadlines = deadlines
+        self._began_us = monotonic_us()
+        self._told_us = self._began_us
+        self._state_since: dict[str, tuple[str, int]] = {}
+        self._version = version()
+        self._rows = 0
+        self._row_us: int | None = None
+        self._failed = False
+
+    def write(self, now_us: int) -> None:
+        """Renew the status file; once a minute a line in the log."""
+        if self._core.rows != self._rows:
+            self._rows, self._row_us = self._core.rows, now_us
+        try:
+            write_status(self._config.status_file, self.snapshot(now_us))
+            self._failed = False
+        except OSError as error:
+            if not self._failed:
+                log.warning("status file %s: %s", self._config.status_file, error.strerror)
+            self._failed = True
+        if now_us - self._told_us >= HEALTH_LINE_US:
+            self._told_us = now_us
+            log.info("%s", self.line())
+
+    def remove(self) -> None:
+        """The service ends: its status goes with it."""
+        self._config.status_file.unlink(missing_ok=True)
+
+    def line(self) -> str:
+        """The state in one line."""
+        distance_km = self._pipeline.odometer.total_m / 1000.0
+        sensors = ", ".join(f"{name} {part.state()}" for name, part in self._sensors.items())
+        return f"{sensors}, {self._core.rows} rows, {distance_km:.1f} km"
+
+    def snapshot(self, now_us: int) -> ServiceStatus:
+        """Everything that ``ridelog status`` shows."""
+        fix = self._core.last_fix
+        return ServiceStatus(
+            state=self._state(now_us),
+            pid=os.getpid(),
+            version=self._version,
+            uptime_s=(now_us - self._began_us) / US_PER_S,
+            updated_t_us=now_us,
+            accelerometer=self._sensor("accelerometer", now_us, self._accelerometer_place(), self._core.samples),
+            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes, self._decoder.counters),
+            fix_valid=fix.valid if fix else None,
+            satellites=fix.satellites if fix else None,
+            utc_known=self._core.utc_known,
+            log_directory=str(self._config.log.directory),
+            current_file=self._log.current_file,
+            rows_written=self._core.rows,
+            distance_m=self._pipeline.odometer.total_m,
+            free_bytes=_free_bytes(str(self._config.log.directory)),
+            last_window=self._core.last_record,
+            counters={
+                "missed_samples": self._deadlines.missed,
+                "bad_events": self._core.bad_events,
+                "time_jumps": self._pipeline.timebase.time_jumps,
+                "rejected_fixes": self._pipeline.odometer.rejected_fixes,
+            },
+        )
+
+    def _state(self, now_us: int) -> ServiceState:
+        if not self._core.samples and not self._core.rows:
+            return "starting"
+        recent = self._row_us is not None and now_us - self._row_us < RECENT_US
+        return "recording" if recent else "standing"
+
+    def _sensor(
+        self, name: str, now_us: int, place: str, readings: int, counters: Counter[str] | None = None
+    ) -> SensorStatus:
+        part = self._sensors[name]
+        state = part.state()
+        if self._state_since.get(name, ("", 0))[0] != state:
+            self._state_since[name] = (state, now_us)
+        return SensorStatus(
+            driver=part.name,
+            place=place,
+            state=state,
+            since_s=(now_us - self._state_since[name][1]) / US_PER_S,
+            last_error=part.error or None,
+            readings=readings,
+            counters={"faults": part.faults, "restarts": part.restarts, **(counters or {})},
+        )
+
+    def _accelerometer_place(self) -> str:
+        sensor = self._config.accelerometer
+        if sensor.driver == "pasco":
+            return sensor.pasco.port
+        bus = sensor.bma220.i2c_bus
+        return f"/dev/i2c-{bus}" if isinstance(bus, int) else str(bus)
+
+
+def _free_bytes(directory: str) -> int | None:
+    try:
+        return shutil.disk_usage(directory).free
+    except OSError:
+        return None

@@ -1,0 +1,168 @@
+"""Speed, travelled distance and place of the car between GPS fixes.
+
+A fix says where the car was and how fast, once a second or so. Between two fixes the speed is a straight line,
+so the distance is its integral. A short loss of fix is bridged the same way and marked; a long one is not
+bridged: what lies in it has no distance. Below a threshold speed the car counts as standing, so that the noise
+of a receiver at rest does not make distance.
+
+The distance counts what was travelled with known speed; after a long loss it goes on from where it stopped, and
+`legs` tells such stretches apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, hypot, radians
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.service.timebase import TimedFix
+from logger.units import US_PER_S
+
+EARTH_RADIUS_M = 6_371_008.8
+NORMAL_INTERVAL_US = 1_500_000
+ACCELERATION_LIMIT_MPS2 = 15.0
+PLACE_JUMP_M = 80.0
+REJECTED_IN_A_ROW = 3
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Travel:
+    """The car's motion at some instants: all arrays (n,).
+
+    known           the speed is known (False: before the first fix, or in a loss too long to bridge)
+    bridged         known only by bridging a loss of fix
+    """
+
+    distance_m: Floats
+    speed_mps: Floats
+    known: npt.NDArray[np.bool_]
+    bridged: npt.NDArray[np.bool_]
+    leg: npt.NDArray[np.int64]
+
+
+class Odometer:
+    """Collects timed fixes as knots of a piecewise linear speed."""
+
+    def __init__(self, bridge_s: float, stationary_mps: float) -> None:
+        self._bridge_us = round(bridge_s * US_PER_S)
+        self._stationary_mps = stationary_mps
+        self._t_us: list[int] = []
+        self._speed_mps: list[float] = []
+        self._distance_m: list[float] = []
+        self._lat_deg: list[float] = []
+        self._lon_deg: list[float] = []
+        self._leg: list[int] = []
+        self._rejected = 0
+        self.rejected_fixes = 0
+
+    @property
+    def last_t_us(self) -> int | None:
+        """Time of the newest knot: up to here the motion is settled."""
+        return self._t_us[-1] if self._t_us else None
+
+    @property
+    def total_m(self) -> float:
+        """Distance travelled with known speed so far [m]."""
+        return self._distance_m[-1] if self._distance_m else 0.0
+
+    def add(self, timed: TimedFix) -> None:
+        """Take a fix. Invalid ones, ones without a speed and wild ones are passed over."""
+        fix = timed.fix
+        if not fix.valid or fix.speed_mps is None or fix.lat_deg is None or fix.lon_deg is None:
+            return
+        if self._t_us and timed.t_us <= self._t_us[-1]:
+            return
+        speed_mps = fix.speed_mps if fix.speed_mps >= self._stationary_mps else 0.0
+        if not self._plausible(timed.t_us, speed_mps, fix.lat_deg, fix.lon_deg):
+            self._rejected += 1
+            self.rejected_fixes += 1
+            return
+        self._rejected = 0
+        distance_m, leg = self._extend(timed.t_us, speed_mps)
+        self._t_us.append(timed.t_us)
+        self._speed_mps.append(speed_mps)
+        self._distance_m.append(distance_m)
+        self._lat_deg.append(fix.lat_deg)
+        self._lon_deg.append(fix.lon_deg)
+        self._leg.append(leg)
+
+    def travel(self, t_us: npt.NDArray[np.int64]) -> Travel:
+        """Motion at the instants ``t_us`` (n,), none of them after the newest knot."""
+        if not self._t_us:
+            return _unknown(len(t_us))
+        knots_us = np.array(self._t_us, dtype=np.int64)
+        leg = np.array(self._leg, dtype=np.int64)
+        i = np.searchsorted(knots_us, t_us, side="right") - 1
+        at_last = i == len(knots_us) - 1
+        low = np.clip(i, 0, len(knots_us) - 1)
+        high = np.minimum(low + 1, len(knots_us) - 1)
+        same_leg = leg[low] == leg[high]
+        known = (i >= 0) & same_leg & (~at_last | (t_us == knots_us[-1]))
+        speeds = np.array(self._speed_mps)
+        span_us = np.maximum(knots_us[high] - knots_us[low], 1)
+        into_s = np.where(known, t_us - knots_us[low], 0) / US_PER_S
+        slope_mps2 = (speeds[high] - speeds[low]) / (span_us / US_PER_S)
+        distance_m = np.array(self._distance_m)[low] + into_s * (speeds[low] + 0.5 * slope_mps2 * into_s)
+        speed_mps = np.where(known, speeds[low] + slope_mps2 * into_s, np.nan)
+        return Travel(distance_m, speed_mps, known, known & (span_us > NORMAL_INTERVAL_US), leg[low])
+
+    def place(self, distance_m: float, leg: int) -> tuple[float, float] | None:
+        """Latitude and longitude [deg] at a travelled distance of a leg; None when it is not between knots."""
+        first = next((k for k, knot_leg in enumerate(self._leg) if knot_leg == leg), None)
+        if first is None:
+            return None
+        last = len(self._leg) - 1 - self._leg[::-1].index(leg)
+        distances = self._distance_m[first : last + 1]
+        if not distances[0] - 1e-6 <= distance_m <= distances[-1] + 1e-6:
+            return None
+        lat_deg = float(np.interp(distance_m, distances, self._lat_deg[first : last + 1]))
+        lon_deg = float(np.interp(distance_m, distances, np.unwrap(self._lon_deg[first : last + 1], period=360.0)))
+        return lat_deg, (lon_deg + 180.0) % 360.0 - 180.0
+
+    def forget_before(self, t_us: int, distance_m: float) -> None:
+        """Drop knots that neither instants from ``t_us`` on nor places from ``distance_m`` on will need."""
+        keep = 0
+        while (
+            keep + 2 < len(self._t_us) and self._t_us[keep + 1] <= t_us and self._distance_m[keep + 1] <= distance_m
+        ):
+            keep += 1
+        if keep:
+            for knots in (self._t_us, self._speed_mps, self._distance_m, self._lat_deg, self._lon_deg, self._leg):
+                del knots[:keep]
+
+    def _extend(self, t_us: int, speed_mps: float) -> tuple[float, int]:
+        if not self._t_us:
+            return 0.0, 0
+        gap_us = t_us - self._t_us[-1]
+        if gap_us > self._bridge_us:
+            return self._distance_m[-1], self._leg[-1] + 1
+        mean_mps = 0.5 * (self._speed_mps[-1] + speed_mps)
+        return self._distance_m[-1] + mean_mps * gap_us / US_PER_S, self._leg[-1]
+
+    def _plausible(self, t_us: int, speed_mps: float, lat_deg: float, lon_deg: float) -> bool:
+        """False for a lone fix that no car can reach from the last one (a damaged line passes an 8-bit check
+        about once in 256); after some in a row the old knot is no longer believed."""
+        if not self._t_us or self._rejected >= REJECTED_IN_A_ROW:
+            return True
+        gap_s = (t_us - self._t_us[-1]) / US_PER_S
+        if gap_s * US_PER_S > self._bridge_us:
+            return True
+        if abs(speed_mps - self._speed_mps[-1]) > ACCELERATION_LIMIT_MPS2 * max(gap_s, 0.2):
+            return False
+        reach_m = PLACE_JUMP_M + 1.5 * max(speed_mps, self._speed_mps[-1]) * gap_s
+        return _chord_m(self._lat_deg[-1], self._lon_deg[-1], lat_deg, lon_deg) <= reach_m
+
+
+def _chord_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_deg: float) -> float:
+    """Distance of two near places [m] on a sphere laid flat."""
+    east_deg = (lon1_deg - lon0_deg + 180.0) % 360.0 - 180.0
+    return EARTH_RADIUS_M * hypot(radians(lat1_deg - lat0_deg), radians(east_deg) * cos(radians(lat0_deg)))
+
+
+def _unknown(count: int) -> Travel:
+    none = np.zeros(count, dtype=np.bool_)
+    return Travel(np.zeros(count), np.full(count, np.nan), none, none, np.zeros(count, dtype=np.int64))

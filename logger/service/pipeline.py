@@ -1,0 +1,205 @@
+"""Samples and fixes in, records of windows out.
+
+The pipeline moves in steps of event time, so that what it does depends on the data alone and never on how the
+data were delivered. Samples wait until the motion of the car at their instant is settled: between two fixes it
+is known, over a short loss bridged, and when no fix has come for longer than that the samples are released as
+`blind`. Nothing here reads a clock or a file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import isfinite
+
+import numpy as np
+
+from drivers.readings import AccelerationBlock, Fix
+from logger.comfort.iso2631 import comfort_word
+from logger.dsp.windows import GridSamples, Window, WindowCutter, runs_of_equal
+from logger.records import WindowRecord
+from logger.roads.from_acceleration import RmsRelation, iri_class
+from logger.service.chain import GRID_STEP_US, SignalChain
+from logger.service.odometer import Odometer
+from logger.service.timebase import Timebase
+from logger.units import US_PER_S
+
+FIX_DELAY_US = 3_000_000
+SHORT_WINDOW_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class PipelineSettings:
+    """Lengths and limits of the pipeline.
+
+    bridge_s        longest loss of fix that is bridged [s]
+    slow_mps        below this mean speed a window has no IRI [m/s]
+    stationary_mps  below this speed the car counts as standing [m/s]
+    drive_end_s     standing this long ends the drive [s]
+    noise_rms_mps2  r.m.s. noise of the accelerometer on the grid [m/s2]
+    """
+
+    window_m: float
+    blind_window_s: float
+    bridge_s: float
+    slow_mps: float
+    stationary_mps: float
+    drive_end_s: float
+    latency_s: float
+    noise_rms_mps2: float
+
+
+class Pipeline:
+    """The whole way from readings to records of one service run."""
+
+    def __init__(self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation) -> None:
+        self._settings = settings
+        self._chain = chain
+        self._relation = relation
+        self._cutter = WindowCutter(settings.window_m, settings.blind_window_s, GRID_STEP_US)
+        self._bridge_us = round(settings.bridge_s * US_PER_S)
+        self._drive_end_us = round(settings.drive_end_s * US_PER_S)
+        self._pending: list[GridSamples] = []
+        self._start_us: int | None = None
+        self._active_us: int | None = None
+        self._segment = 0
+        self.drive = 1
+        self.timebase = Timebase(settings.latency_s)
+        self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
+
+    def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
+        """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
+        if self._start_us is None:
+            self._start_us = now_us
+        for fix in fixes:
+            self.odometer.add(self.timebase.place(fix))
+        self._pending += self._chain.push(block)
+        self._pending += self._chain.advance(self._start_us, now_us)
+        records = self._recorded(self._release(self._settled_until_us(now_us)))
+        if self._active_us is not None and now_us - self._active_us >= self._drive_end_us:
+            records += self._recorded(self._cutter.break_off())
+            self._active_us = None
+            self.drive += 1
+        self._forget()
+        return records
+
+    def finish(self) -> list[WindowRecord]:
+        """The end of the stream: what waits is released, the window being filled is closed where it stands."""
+        self._pending += self._chain.flush()
+        return self._recorded(self._release(None) + self._cutter.break_off())
+
+    def _settled_until_us(self, now_us: int) -> int:
+        """Samples before this instant will not learn more about their motion."""
+        last_us = self.odometer.last_t_us
+        begun_us = self._start_us if self._start_us is not None else now_us
+        if now_us - (last_us if last_us is not None else begun_us) > self._bridge_us + FIX_DELAY_US:
+            return now_us - FIX_DELAY_US
+        return last_us if last_us is not None else begun_us
+
+    def _release(self, until_us: int | None) -> list[Window]:
+        if not self._pending:
+            return []
+        waiting = _joined(self._pending)
+        count = len(waiting) if until_us is None else int(np.searchsorted(waiting.t_us, until_us))
+        self._pending = [waiting.part(count, len(waiting))] if count < len(waiting) else []
+        if not count:
+            return []
+        return self._cut(waiting.part(0, count))
+
+    def _cut(self, samples: GridSamples) -> list[Window]:
+        travel = self.odometer.travel(samples.t_us)
+        windows: list[Window] = []
+        for low, high in runs_of_equal(np.where(travel.known, travel.leg, -1)):
+            part = samples.part(low, high)
+            if not travel.known[low]:
+                self._active_us = int(part.t_us[-1])
+                windows += self._cutter.push_blind(part)
+                continue
+            speed_mps = travel.speed_mps[low:high]
+            moving = np.flatnonzero(speed_mps > 0.0)
+            if len(moving):
+                self._active_us = int(part.t_us[moving[-1]])
+            windows += self._cutter.push_known(
+                part, travel.distance_m[low:high], speed_mps, travel.bridged[low:high], int(travel.leg[low])
+            )
+        return windows
+
+    def _forget(self) -> None:
+        """Let go of fixes that no waiting sample and no open window needs."""
+        last_us = self.odometer.last_t_us
+        if last_us is None:
+            return
+        oldest_us = int(self._pending[0].t_us[0]) if self._pending else last_us
+        opened = self._cutter.oldest_open()
+        self.odometer.forget_before(
+            min(oldest_us, opened[0]) if opened else oldest_us, opened[1] if opened else float("inf")
+        )
+
+    def _recorded(self, windows: list[Window]) -> list[WindowRecord]:
+        return [self._record(window) for window in windows]
+
+    def _record(self, window: Window) -> WindowRecord:
+        offset_us = self.timebase.utc_offset_us()
+        flags = set(window.flags)
+        if offset_us is None:
+            flags.add("time_unset")
+        iri, iri_std = self._roughness(window, flags)
+        place = self._place(window)
+        crest = window.peak_mps2 / window.a_w_mps2 if window.a_w_mps2 > 0.0 else float("nan")
+        self._segment += 1
+        return WindowRecord(
+            segment=self._segment,
+            drive=self.drive,
+            t_us=window.t_us,
+            utc_us=None if offset_us is None else window.t_us + offset_us,
+            duration_s=window.duration_s,
+            distance_start_m=window.start_m,
+            distance_end_m=window.end_m,
+            lat_deg=place[0] if place else None,
+            lon_deg=place[1] if place else None,
+            speed_mps=_known(window.speed_mps),
+            iri_m_per_km=iri,
+            iri_std_m_per_km=iri_std,
+            iri_rms_m_per_km=iri,
+            a_w_mps2=_known(window.a_w_mps2),
+            mtvv_mps2=_known(window.mtvv_mps2),
+            vdv_mps175=_known(window.vdv_mps175),
+            crest_factor=_known(crest),
+            comfort=comfort_word(window.a_w_mps2) if isfinite(window.a_w_mps2) else "",
+            iri_class=iri_class(iri) if iri is not None else "",
+            accel_rms_mps2=_known(window.accel_rms_mps2),
+            samples=window.samples,
+            clipped_samples=window.clipped,
+            flags=tuple(sorted(flags)),
+        )
+
+    def _roughness(self, window: Window, flags: set[str]) -> tuple[float | None, float | None]:
+        """IRI by the r.m.s. relation and its standard error [m/km]; flags say why there is none."""
+        if window.start_m is None or window.end_m is None or not isfinite(window.accel_rms_mps2):
+            return None, None
+        if window.speed_mps < self._settings.slow_mps:
+            flags.add("slow")
+            return None, None
+        length_m = window.end_m - window.start_m
+        if length_m < SHORT_WINDOW_SHARE * self._settings.window_m:
+            return None, None
+        iri = self._relation.iri(window.accel_rms_mps2, window.speed_mps)
+        if not isfinite(iri):
+            flags.add("fast")
+            return None, None
+        std = self._relation.iri_std(iri, window.speed_mps, length_m, self._settings.noise_rms_mps2)
+        return iri, std
+
+    def _place(self, window: Window) -> tuple[float, float] | None:
+        if window.start_m is None or window.end_m is None:
+            return None
+        return self.odometer.place(0.5 * (window.start_m + window.end_m), window.leg)
+
+
+def _joined(parts: list[GridSamples]) -> GridSamples:
+    if len(parts) == 1:
+        return parts[0]
+    return GridSamples(*(np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(GridSamples)))
+
+
+def _known(value: float) -> float | None:
+    return value if isfinite(value) else None

@@ -1,0 +1,98 @@
+"""A recorded drive through the service: the real drivers on recorded buses, under a clock of its own.
+
+The player is the only thing that differs from the live service. It sets the clock to the time of the next event,
+lays the event's bytes on the recorded bus or port, and lets the supervised source look at its device once.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from drivers.bma220 import Bma220Settings
+from drivers.dump import Event
+from drivers.replay import RecordedBus, RecordedPort
+from logger.service.core import Core
+from logger.service.sources import Bma220Source, SerialSource, Source
+from logger.service.supervisor import Supervisor
+from logger.units import US_PER_S
+
+PROGRESS_EVERY_US = 60 * US_PER_S
+
+
+@dataclass(frozen=True)
+class Played:
+    """How much was played: events, and the time from the first to the last [s]."""
+
+    events: int
+    duration_s: float
+
+
+class Player:
+    """Plays events into a core.
+
+    rate        multiple of real time; 0: as fast as it goes
+    progress    called about once a minute of drive with the time played [s]
+    """
+
+    def __init__(
+        self, core: Core, bma220: Bma220Settings, rate: float, progress: Callable[[float], None]
+    ) -> None:
+        self._core = core
+        self._rate = rate
+        self._progress = progress
+        self._clock_us = 0
+        bus = RecordedBus()
+        ports = {name: RecordedPort() for name in ("pasco", "nmea")}
+        sources: list[Source] = [Bma220Source(lambda: bus, bma220, self._now_us, _no_wait)]
+        sources += [
+            SerialSource(name, lambda port=port: port, self._now_us, wait_s=0.0)  # type: ignore[misc]
+            for name, port in ports.items()
+        ]
+        self._load = {"bma220": bus.load, **{name: port.load for name, port in ports.items()}}
+        self._step = {source.name: Supervisor(source, self._now_us).step for source in sources}
+
+    def play(self, events: Iterable[Event]) -> Played:
+        """All events, then the end of the drive."""
+        count = 0
+        first_us: int | None = None
+        told_us = 0
+        started_s = time.monotonic()
+        for event in events:
+            t_us = event.t_us
+            if first_us is None:
+                first_us = told_us = t_us
+            if self._rate:
+                _sleep_until(started_s + (t_us - first_us) / US_PER_S / self._rate)
+            self._one(event)
+            count += 1
+            if t_us - told_us >= PROGRESS_EVERY_US:
+                told_us = t_us
+                self._progress((t_us - first_us) / US_PER_S)
+        self._core.finish()
+        return Played(count, (self._clock_us - first_us) / US_PER_S if first_us is not None else 0.0)
+
+    def _one(self, event: Event) -> None:
+        self._clock_us = event.t_us
+        self._load[event.source](event.data)
+        step = self._step[event.source]
+        seen = step()
+        while seen is not None:
+            self._core.feed(seen)
+            if event.source == "bma220":
+                return
+            seen = step()
+
+    def _now_us(self) -> int:
+        return self._clock_us
+
+
+def _no_wait(_seconds: float) -> None:
+    """Nothing settles in a recording."""
+
+
+def _sleep_until(monotonic_s: float) -> None:
+    wait_s = monotonic_s - time.monotonic()
+    if wait_s > 0:
+        time.sleep(wait_s)

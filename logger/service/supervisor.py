@@ -1,0 +1,108 @@
+"""Keeping one device alive: open, poll, and after a fault close, wait and open again.
+
+The wait doubles from half a second to half a minute, so that a cable that is out costs nothing and one that is
+put back is found soon. Only faults of the device are retried; a wrong setting or a programming error is not.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from drivers.dump import Event
+from drivers.errors import DeviceError
+from logger.service.sources import Source
+from logger.service.status import SensorState
+from logger.units import US_PER_S
+
+FIRST_WAIT_US = US_PER_S // 2
+LONGEST_WAIT_US = 30 * US_PER_S
+SILENT_AFTER_US = 5 * US_PER_S
+FAULTS_IN_A_ROW = 5
+log = logging.getLogger(__name__)
+
+
+class Supervisor:
+    """One source and its state: ``absent`` (never seen), ``ok``, ``silent`` (open, says nothing) or ``retrying``.
+
+    A single failed read (a NACK, a time-out) costs one sample and the device is asked again at the next poll; after
+    some in a row it is closed and started anew.
+    """
+
+    def __init__(self, source: Source, now_us: Callable[[], int]) -> None:
+        self._source = source
+        self._now_us = now_us
+        self._is_open = False
+        self._seen = False
+        self._heard_us = 0
+        self._retry_us = 0
+        self._wait_us = FIRST_WAIT_US
+        self._faults = 0
+        self.name = source.name
+        self.error = ""
+        self.restarts = 0
+        self.faults = 0
+
+    @property
+    def retry_at_us(self) -> int | None:
+        """When the device will be opened next; None while it is open."""
+        return None if self._is_open else self._retry_us
+
+    def state(self) -> SensorState:
+        """``ok``, ``silent``, ``retrying`` or ``absent``."""
+        if not self._is_open:
+            return "retrying" if self._seen else "absent"
+        return "ok" if self._now_us() - self._heard_us < SILENT_AFTER_US else "silent"
+
+    def step(self) -> Event | None:
+        """One look at the device. None: nothing there, or not yet time to try again."""
+        if not self._is_open and not self._try_open():
+            return None
+        try:
+            event = self._source.poll()
+        except DeviceError as error:
+            self._fault(error)
+            return None
+        self._faults = 0
+        if event is not None:
+            self._heard_us = event.t_us
+            self._wait_us = FIRST_WAIT_US
+            self._seen = True
+            self.error = ""
+        return event
+
+    def close(self) -> None:
+        """Let go of the device for good."""
+        self._is_open = False
+        self._source.close()
+
+    def _try_open(self) -> bool:
+        now_us = self._now_us()
+        if now_us < self._retry_us:
+            return False
+        try:
+            self._source.open()
+        except DeviceError as error:
+            self._give_up(error, now_us)
+            return False
+        log.info("%s: open", self.name)
+        self._is_open = True
+        self._heard_us = self._now_us()
+        self._faults = 0
+        return True
+
+    def _fault(self, error: DeviceError) -> None:
+        self.faults += 1
+        self._faults += 1
+        if self._faults >= FAULTS_IN_A_ROW:
+            self.restarts += 1
+            self._give_up(error, self._now_us())
+
+    def _give_up(self, error: DeviceError, now_us: int) -> None:
+        if str(error) != self.error:
+            log.warning("%s: %s; trying again", self.name, error)
+        self.error = str(error)
+        self._is_open = False
+        self._source.close()
+        self._retry_us = now_us + self._wait_us
+        self._wait_us = min(2 * self._wait_us, LONGEST_WAIT_US)
