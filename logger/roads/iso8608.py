@@ -19,7 +19,7 @@ HIGHEST_CPM = 2.83
 CM3_M3 = 1e-6
 
 # Geometric mean degree of roughness of each class [cm3] (ISO 8608; Table 2.2 of Blum 2015).
-CLASS_GD_N0_CM3 = {"A": 16.0, "B": 64.0, "C": 256.0, "D": 1024.0, "E": 4096.0, "F": 16384.0, "G": 65536.0, "H": 262144.0}
+CLASS_GD_N0_CM3 = dict(zip("ABCDEFGH", (16.0 * 4.0**index for index in range(8)), strict=True))
 
 IRI_PER_ROOT_GD = 0.5386
 
