@@ -1,0 +1,43 @@
+"""Exact steps against scipy's, and blocks against one step at a time."""
+
+import numpy as np
+import pytest
+from scipy import linalg, signal
+
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle import half_car, quarter_car
+from logger.vehicle.state_space import held_step, matrix_exponential, recursion, straight_step
+
+A, B = half_car.structure(read_vehicle(vehicle_file("rav4-2009"))).state_space()
+
+
+@pytest.mark.parametrize("step_s", [1e-5, 1e-3, 0.02, 0.5])
+def test_matrix_exponential_agrees_with_scipy(step_s: float) -> None:
+    assert matrix_exponential(A * step_s) == pytest.approx(linalg.expm(A * step_s), rel=1e-9, abs=1e-10)
+    assert matrix_exponential(np.zeros((3, 3))) == pytest.approx(np.eye(3))
+
+
+def test_steps_agree_with_scipy() -> None:
+    none = np.zeros((1, 8)), np.zeros((1, 2))
+    f, g, *_ = signal.cont2discrete((A, B, *none), 0.01, method="zoh")
+    assert held_step(A, B, 0.01)[0] == pytest.approx(f, abs=1e-9)
+    assert held_step(A, B, 0.01)[1] == pytest.approx(g, abs=1e-9)
+    time = np.arange(300) * 0.01
+    road = np.cumsum(np.random.default_rng(5).standard_normal((300, 2)), axis=0) * 1e-3
+    _, _, expected = signal.lsim((A, B, np.eye(8), np.zeros((8, 2))), road, time, interp=True)
+    transition, at_start, at_end = straight_step(A, B, 0.01)
+    states = recursion(transition, road[:-1] @ at_start.T + road[1:] @ at_end.T, np.zeros(8))
+    assert states == pytest.approx(expected[1:], abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 31, 32, 33, 200])
+def test_blocks_equal_single_steps(count: int) -> None:
+    transition, _ = held_step(*quarter_car.structure(quarter_car.GOLDEN_CAR).state_space(), 0.01)
+    rng = np.random.default_rng(count)
+    drive, state = rng.standard_normal((count, 4)), rng.standard_normal(4)
+    states = recursion(transition, drive, state)
+    assert states.shape == (count, 4)
+    for row, force in zip(states, drive, strict=True):
+        state = transition @ state + force
+        assert row == pytest.approx(state, rel=1e-9, abs=1e-9)
