@@ -12,12 +12,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from drivers.errors import SettingsError
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file
 from logger.store.yaml_lines import Node, load_mapping
 from logger.units import WINDOW_M
+
+if TYPE_CHECKING:
+    from drivers.pasco import Calibration
 
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
@@ -26,9 +30,6 @@ _RANGES_G = ("2", "4", "8", "16")
 _BANDWIDTHS_HZ = ("32", "64", "125", "250", "500", "1000")
 _BAUDS = ("1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200", "230400", "460800", "921600")
 _DUMP = "dump:"
-
-Calibration = Mapping[str, tuple[float, float, float, float]]
-"""Axis (x, y, z) to two points of it: raw, g, raw, g."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,8 @@ def _or_none(word: str, read: Read) -> Read:
         nothing = node.is_null() if word == "null" else node.content == word
         if nothing:
             return None
+        if not isinstance(node.content, str):
+            return read(node)
         try:
             return read(node)
         except BadInput as error:
@@ -200,15 +203,22 @@ def _profile(node: Node) -> str:
 
 
 def _calibration(node: Node) -> Calibration:
+    from drivers.pasco import Calibration  # only loaded for this instrument
+
     axes = node.mapping(required=("x", "y", "z"))
-    return {axis: _two_points(entry) for axis, entry in axes.items()}
+    zeros_raw, ones_raw = zip(*(_counts_at_0_and_1_g(axes[axis]) for axis in "xyz"), strict=True)
+    return Calibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
 
 
-def _two_points(node: Node) -> tuple[float, float, float, float]:
+def _counts_at_0_and_1_g(node: Node) -> tuple[float, float]:
+    """Two points of an axis, extended to the counts at 0 and at 1 g."""
     values = [item.number() for item in node.items()]
     if len(values) != 4 or values[0] == values[2] or values[1] == values[3]:
         raise node.wrong("two different points [raw, g, raw, g]")
-    return values[0], values[1], values[2], values[3]
+    first_raw, first_g, second_raw, second_g = values
+    counts_per_g = (second_raw - first_raw) / (second_g - first_g)
+    zero_g_raw = first_raw - first_g * counts_per_g
+    return zero_g_raw, zero_g_raw + counts_per_g
 
 
 _read_pasco = _section(PascoConfig, {
@@ -277,14 +287,13 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
 
 def _refuse_silent_guess(pasco: PascoConfig, node: Node) -> None:
     """Refuse a profile that nobody has seen work on hardware, unless the file says that this is known."""
-    from drivers.errors import DriverError
-    from drivers.pasco import load_profile  # only needed, and only loaded, for this instrument
+    from drivers.pasco import load_profile  # only loaded for this instrument
 
     entry = node.mapping().get("profile", node)
     try:
         profile = load_profile(pasco.profile)
-    except DriverError as error:
-        raise BadInput(f"{entry.file}:{entry.line}: expected a profile that can be read: {error}") from None
+    except SettingsError as error:
+        raise BadInput(f"{entry.file}:{entry.line}: {error}") from None
     if not profile.verified and not pasco.accept_unverified:
         raise BadInput(f"{entry.file}:{entry.line}: expected a verified profile, and {profile.name!r} is not verified "
                        "on hardware; set accept_unverified: true beside it to use it all the same")
