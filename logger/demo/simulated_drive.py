@@ -48,7 +48,7 @@ class DrivePlan:
     stretches      roughness along the road; the last one goes on
     bumps          speed bumps
     reception      what the GPS receiver sees
-    sensor         "bma220" (register bytes) or "lines" (a serial sensor that sends ``x,y,z`` in m/s2 per line)
+    sensor         "bma220" (register bytes) or "lines" (a serial sensor that sends ``x,y,z`` in g per line)
     rate_hz        samples per second
     noise_mps2     r.m.s. noise of the sensor on each axis, before it quantises [m/s2]
     offset_mps2    zero offset of X, Y, Z [m/s2]
@@ -162,7 +162,7 @@ def _line_events(
     plan: DrivePlan, t_us: npt.NDArray[np.int64], values: Array, rng: np.random.Generator
 ) -> list[Event]:
     """Lines of text over a serial port, in the chunks they are read in."""
-    lines = [b"%.3f,%.3f,%.3f\n" % tuple(row) for row in values.tolist()]
+    lines = [b"%.4f,%.4f,%.4f\n" % tuple(row) for row in (values / STANDARD_GRAVITY_MPS2).tolist()]
     byte_us = 10 * US_PER_S / LINES_BAUD
     arrival = np.concatenate([
         t + byte_us * np.arange(1, len(line) + 1) for t, line in zip(t_us.tolist(), lines, strict=True)
