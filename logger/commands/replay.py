@@ -96,7 +96,8 @@ def replay(dump: Path, out: Path, config: Config, rate: float, vehicle: str | No
         session = next_session(out)
         facts = assemble.sidecar(config, sensor, vehicle_facts) | {"replayed_from": dump.name}
         segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-        core = Core(sensor.decoder, assemble.gps_decoder(config), assemble.pipeline(config, sensor, relation), segment_log)
+        pipeline = assemble.pipeline(config, sensor, relation)
+        core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
         started_s = time.monotonic()
         player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
         played = player.play(reader)

@@ -16,7 +16,7 @@ from logger.service.config import find_config, load_config
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog run``."""
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings; default: the machine's, else the shipped")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="settings (default: the machine's)")
     parser.add_argument("--verbose", action="store_true", help="log more to stderr")
 
 

@@ -92,7 +92,7 @@ class Observer:
             satellites=fix.satellites if fix else None,
             utc_known=self._core.utc_known,
             log_directory=str(self._config.log.directory),
-            current_file=self._log.current_file,
+            current_file=self._log.path.name,
             rows_written=self._core.rows,
             distance_m=self._pipeline.odometer.total_m,
             free_bytes=_free_bytes(str(self._config.log.directory)),

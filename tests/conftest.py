@@ -1,0 +1,42 @@
+"""Drives and the command, shared by the tests of the service and of the commands."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from logger.demo.motion import Bump, Stretch
+from logger.demo.receiver import Reception
+from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+
+SHORT_PLAN = DrivePlan(
+    speed_knots=((0, 0), (3, 0), (9, 10), (30, 12), (36, 0), (41, 0), (47, 14), (70, 14)),
+    stretches=(Stretch(200, 60), Stretch(200, 250)),
+    bumps=(Bump(330, 0.05, 1.5),),
+    reception=Reception(first_fix_s=6, lost=((20, 24),), corrupted_s=15),
+    seed=5,
+)
+
+
+@pytest.fixture(scope="session")
+def ridelog() -> Path:
+    """The installed command."""
+    return Path(sys.executable).with_name("ridelog")
+
+
+@pytest.fixture(scope="session")
+def short_drive() -> Drive:
+    """70 s: standing, a short loss of fix, a halt, a bump."""
+    return simulate_drive(SHORT_PLAN, read_vehicle(vehicle_file("rav4-2009")))
+
+
+@pytest.fixture(scope="session")
+def short_dump(short_drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same drive as a recorded dump."""
+    path = tmp_path_factory.mktemp("drive") / "short.dump.gz"
+    record(short_drive, path)
+    return path

@@ -1,0 +1,99 @@
+"""The rows depend on the events alone: not on how bytes were cut, how often the loop woke, how fast it ran."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from replaying import core_for, rows_of
+
+from drivers.dump import Event
+from logger.demo.simulated_drive import Drive
+from logger.errors import BadInput
+
+
+@pytest.fixture(scope="module")
+def expected(short_drive: Drive) -> list[str]:
+    return rows_of(short_drive.header, short_drive.events).rows
+
+
+def test_the_drive_makes_rows(expected: list[str]) -> None:
+    assert len(expected) > 60
+    assert expected[-1] == "close"
+
+
+@settings(deadline=None, max_examples=8)
+@given(seed=st.integers(0, 1000))
+def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
+    rng = random.Random(seed)
+    events = []
+    for event in short_drive.events:
+        data = event.data
+        while event.source == "nmea" and len(data) > 1 and rng.random() < 0.7:
+            cut = rng.randrange(1, len(data))
+            events.append(Event(event.t_us, event.source, data[:cut]))
+            data = data[cut:]
+        events.append(Event(event.t_us, event.source, data))
+    assert rows_of(short_drive.header, events).rows == expected
+
+
+@settings(deadline=None, max_examples=8)
+@given(seed=st.integers(0, 1000))
+def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
+    rng = random.Random(seed)
+    core, rows = core_for(short_drive.header)
+    last_us = short_drive.events[0].t_us
+    for event in short_drive.events:
+        if rng.random() < 0.05:
+            core.advance(rng.randint(last_us, event.t_us))
+        core.feed(event)
+        last_us = event.t_us
+    core.finish()
+    assert rows.rows == expected
+
+
+@settings(deadline=None, max_examples=4)
+@given(seed=st.integers(0, 1000))
+def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(
+    short_drive: Drive, expected: list[str], seed: int
+) -> None:
+    """Chunks that are read late and together move the times of fixes a little, but make or lose nothing."""
+    rng = random.Random(seed)
+    events: list[Event] = []
+    held = b""
+    for event in short_drive.events:
+        if event.source != "nmea":
+            events.append(event)
+            continue
+        held += event.data
+        if rng.random() < 0.6:
+            events.append(event._replace(data=held))
+            held = b""
+    rows = rows_of(short_drive.header, events).rows
+    assert abs(len(rows) - len(expected)) <= 8
+
+
+def test_random_bytes_on_the_gps_line_make_no_place(short_drive: Drive) -> None:
+    rng = random.Random(9)
+    events = [e if e.source != "nmea" else e._replace(data=rng.randbytes(len(e.data))) for e in short_drive.events]
+    rows = rows_of(short_drive.header, events)
+    assert rows.records
+    assert all(record.lat_deg is None and record.distance_start_m is None for record in rows.records)
+    assert all({"blind", "gps_lost", "time_unset"} <= set(record.flags) for record in rows.records)
+
+
+def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) -> None:
+    rows = rows_of(short_drive.header, [event for event in short_drive.events if event.source == "nmea"])
+    placed = [record for record in rows.records if record.lat_deg is not None]
+    assert len(placed) > 60
+    assert all(record.a_w_mps2 is None and record.iri_m_per_km is None for record in placed)
+    assert all("gap" in record.flags for record in placed)
+
+
+def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
+    with pytest.raises(BadInput, match="not known here"):
+        core_for(replace(short_drive.header, vehicle="hovercraft"))

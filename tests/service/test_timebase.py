@@ -1,0 +1,89 @@
+"""Monotonic time to UTC: the floor of the delays, dates that must agree, jumps that are outvoted."""
+
+from __future__ import annotations
+
+import random
+from datetime import UTC, datetime
+
+from drivers.readings import Fix
+from logger.service.timebase import DAY_US, Timebase
+
+NOON_US = int(datetime(2026, 7, 4, 12, 0, 0, tzinfo=UTC).timestamp()) * 1_000_000
+BOOT_US = 500_000_000
+
+
+def fix_at(second: float, late_us: int, dated: bool = True, shift_us: int = 0) -> Fix:
+    """A fix of the instant BOOT + second that arrived ``late_us`` later."""
+    utc_us = NOON_US + round(second * 1e6) + shift_us
+    return Fix(
+        t_us=BOOT_US + round(second * 1e6) + late_us,
+        valid=True,
+        utc_us=utc_us if dated else None,
+        time_of_day_us=utc_us % DAY_US,
+        lat_deg=39.0,
+        lon_deg=-76.9,
+        speed_mps=10.0,
+        course_deg=None,
+        altitude_m=None,
+        satellites=None,
+        hdop=None,
+    )
+
+
+def test_wobbling_latency_is_taken_out() -> None:
+    rng = random.Random(1)
+    timebase = Timebase(latency_s=0.15)
+    errors_us = []
+    for second in range(200):
+        placed = timebase.place(fix_at(second, 150_000 + int(rng.expovariate(1 / 40_000))))
+        errors_us.append(abs(placed.t_us - (BOOT_US + second * 1_000_000)))
+    assert max(errors_us[20:]) < 10_000
+    offset_us = timebase.utc_offset_us()
+    assert offset_us is not None
+    assert abs(offset_us - (NOON_US - BOOT_US)) < 10_000
+
+
+def test_utc_waits_for_three_fixes_that_agree() -> None:
+    timebase = Timebase(0.1)
+    for second in range(2):
+        timebase.place(fix_at(second, 100_000))
+        assert timebase.utc_offset_us() is None
+    timebase.place(fix_at(2, 100_000))
+    assert timebase.utc_offset_us() is not None
+
+
+def test_undated_fixes_are_placed_but_give_no_utc() -> None:
+    timebase = Timebase(0.1)
+    for second in range(10):
+        placed = timebase.place(fix_at(second, 100_000, dated=False))
+        assert placed.t_us == BOOT_US + second * 1_000_000
+    assert timebase.utc_offset_us() is None
+
+
+def test_midnight_makes_no_jump() -> None:
+    timebase = Timebase(0.1)
+    for second in range(12 * 3600 - 5, 12 * 3600 + 5):
+        assert timebase.place(fix_at(second, 100_000)).t_us == BOOT_US + second * 1_000_000
+    assert timebase.time_jumps == 0
+    assert timebase.utc_offset_us() == NOON_US - BOOT_US
+
+
+def test_one_wild_date_is_outvoted_and_a_lasting_one_is_taken_over() -> None:
+    timebase = Timebase(0.1)
+    for second in range(10):
+        timebase.place(fix_at(second, 100_000))
+    timebase.place(fix_at(10, 100_000, shift_us=7 * DAY_US))
+    assert timebase.utc_offset_us() == NOON_US - BOOT_US
+    for second in range(11, 20):
+        timebase.place(fix_at(second, 100_000, shift_us=7 * DAY_US))
+    assert timebase.utc_offset_us() == NOON_US - BOOT_US + 7 * DAY_US
+    assert timebase.time_jumps == 1
+
+
+def test_one_stray_time_is_placed_by_its_arrival() -> None:
+    timebase = Timebase(0.1)
+    for second in range(10):
+        timebase.place(fix_at(second, 100_000))
+    stray = timebase.place(fix_at(10, 100_000, shift_us=5_000_000))
+    assert stray.t_us == BOOT_US + 10_000_000
+    assert timebase.utc_offset_us() == NOON_US - BOOT_US
