@@ -1,0 +1,308 @@
+"""Driver of the Bosch BMA220, a three-axis accelerometer with six bits per axis, on I2C.
+
+Problem: the chip is easy to stop by accident (reading register 0x30 suspends it, reading 0x32 holds it in reset), it
+can hold the bus low for ever, and after a dip of its supply it goes on delivering plausible numbers at the wrong scale
+and without an anti-alias filter. Solution: ``start`` brings it from whatever state it is in to a known one, with its
+bus watchdog on, and reads every setting back; ``check_settings`` tells later whether it still is in that state;
+``read_raw`` is one burst and nothing else; decoding is done by the block, away from the bus.
+
+When anything raises a DeviceError, wait and call ``start`` again: it assumes nothing about the chip.
+
+Register addresses are those on I2C, twice the numbers that the data sheet gives for SPI. Facts from the Linux kernel's
+driver (drivers/iio/accel/bma220), Bosch's API of 2014 and the UPM library, which agree.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+from array import array
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
+from drivers.ports import I2cBus
+from drivers.readings import AccelerationBlock
+from drivers.registers import Field, Register, ToggleRegister
+
+STANDARD_GRAVITY_MPS2 = 9.80665
+BASE_RATE_HZ = 100
+LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some more in the kernel
+
+CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
+REVISION = Register("revision", 0x02)
+DATA_ADDRESS = 0x04  # X, Y, Z: three registers in one burst, which steps from register to register by itself
+SAMPLE_BYTES = 3
+AXES = Register("power and axes", 0x1E, reset_value=0x07)
+FILTER = Register("filter", 0x20)
+RANGE = Register("range", 0x22)
+WATCHDOG = Register("bus watchdog", 0x2E)
+SUSPEND = ToggleRegister("suspend", 0x30)
+SOFT_RESET = ToggleRegister("soft reset", 0x32)
+
+SLEEP_ENABLE = Field("sleep_en", 6, 6)
+ENABLED_AXES = Field("en_x, en_y, en_z", 2, 0)
+SERIAL_HIGH_BANDWIDTH = Field("serial_high_bw", 7, 7)
+FILTER_CODE = Field("filter code", 3, 0)
+SELF_TEST = Field("sbist", 3, 2)
+RANGE_CODE = Field("range code", 1, 0)
+WATCHDOG_CODE = Field("watchdog code", 2, 1)
+
+RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
+FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
+SETTLING_S = {1000: 0.002, 500: 0.002, 250: 0.003, 125: 0.005, 64: 0.009, 32: 0.017}
+WATCHDOG_CODES = {0: 0, 1: 2, 10: 3}  # [ms]; 0 is off
+TOGGLE_WAIT_S = 0.002
+NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Bma220Settings:
+    """What may be chosen. SettingsError on a value the chip does not have.
+
+    range_g        full scale: 2, 4, 8 or 16 [g]
+    bandwidth_hz   the chip's filter: 32, 64, 125, 250, 500 [Hz], not above the sampling rate (beyond that everything
+                   in the pass band would alias); None takes the largest not above 0.64 of half the sampling rate
+    oversample     the sampling rate is 100 Hz times this, 1 to 8
+    addresses      I2C addresses to look at, in this order
+    watchdog_ms    the chip lets go of a stuck bus after this time: 1 or 10 [ms], 0 never
+    """
+
+    range_g: int = 2
+    bandwidth_hz: int | None = None
+    oversample: int = 1
+    addresses: tuple[int, ...] = (0x0A, 0x0B)
+    watchdog_ms: int = 10
+
+    def __post_init__(self) -> None:
+        _choose("range_g", self.range_g, RANGE_CODES)
+        _choose("watchdog_ms", self.watchdog_ms, WATCHDOG_CODES)
+        _choose("oversample", self.oversample, range(1, LARGEST_OVERSAMPLE + 1))
+        if self.bandwidth_hz is not None:
+            _choose("bandwidth_hz", self.bandwidth_hz, FILTER_CODES)
+            if self.bandwidth_hz > self.rate_hz:
+                raise SettingsError(
+                    f"bandwidth_hz {self.bandwidth_hz} is above the sampling rate of {self.rate_hz} Hz: "
+                    "the signal would be mostly aliases; choose a smaller one or leave it out"
+                )
+        if not self.addresses or not all(0x08 <= address <= 0x77 for address in self.addresses):
+            raise SettingsError(f"addresses are 7-bit I2C addresses from 0x08 to 0x77, not {self.addresses}")
+
+    @property
+    def rate_hz(self) -> int:
+        return BASE_RATE_HZ * self.oversample
+
+    @property
+    def filter_hz(self) -> int:
+        """The bandwidth the chip is set to [Hz]: 32 at 100 Hz, 250 at 800 Hz, unless chosen by hand."""
+        if self.bandwidth_hz is not None:
+            return self.bandwidth_hz
+        return max(hz for hz in FILTER_CODES if hz <= 8 * self.rate_hz // 25)
+
+
+@dataclass(frozen=True)
+class Bma220Identity:
+    """Where the chip answered, the revision it names and the filter it was given."""
+
+    address: int
+    revision: int
+    bandwidth_hz: int
+
+
+class Bma220:
+    """One chip on a bus. ``sleep`` takes seconds. Every method but ``stop`` raises the DeviceError family:
+
+    NotPresent   nothing acknowledges, or a kernel driver owns the address
+    Timeout      the bus is held low
+    WrongDevice  another chip is at the address
+    BadReply     the chip does not do what it was told, or has lost its settings
+    """
+
+    def __init__(self, bus: I2cBus, settings: Bma220Settings, sleep: Callable[[float], None]) -> None:
+        self._bus = bus
+        self._read_block = bus.read_i2c_block_data
+        self._settings = settings
+        self._sleep = sleep
+        self._chip: int | None = None
+        self._wanted: tuple[tuple[Register, Mapping[Field, int]], ...] = (
+            (WATCHDOG, {WATCHDOG_CODE: WATCHDOG_CODES[settings.watchdog_ms]}),
+            (RANGE, {RANGE_CODE: RANGE_CODES[settings.range_g], SELF_TEST: 0}),
+            (FILTER, {FILTER_CODE: FILTER_CODES[settings.filter_hz], SERIAL_HIGH_BANDWIDTH: 0}),
+            (AXES, {ENABLED_AXES: 0b111, SLEEP_ENABLE: 0}),
+        )
+
+    def start(self) -> Bma220Identity:
+        """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
+        self._chip = None
+        chip = self._probe()
+        try:
+            revision = REVISION.read(self._bus, chip)
+            self._make_run(SUSPEND, chip)
+            self._make_run(SOFT_RESET, chip)
+            for register, values in self._wanted:
+                register.update(self._bus, chip, values)
+        except OSError as error:
+            raise _fault(error, chip) from error
+        self._sleep(SETTLING_S[self._settings.filter_hz])
+        self._chip = chip
+        log.info("BMA220 revision %d runs at 0x%02X, filter %d Hz", revision, chip, self._settings.filter_hz)
+        return Bma220Identity(chip, revision, self._settings.filter_hz)
+
+    def read_raw(self) -> bytes:
+        """The three data bytes X, Y, Z, read in one burst so that they belong together."""
+        chip = self._started()
+        try:
+            data = bytes(self._read_block(chip, DATA_ADDRESS, SAMPLE_BYTES))
+        except OSError as error:
+            raise _fault(error, chip) from error
+        if len(data) != SAMPLE_BYTES:
+            raise BadReply(f"BMA220 at 0x{chip:02X}: a burst of {SAMPLE_BYTES} bytes gave {len(data)}")
+        return data
+
+    def check_settings(self) -> None:
+        """BadReply when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
+        chip = self._started()
+        try:
+            for register, values in self._wanted:
+                register.check(self._bus, chip, values)
+        except OSError as error:
+            raise _fault(error, chip) from error
+        except BadReply as error:
+            raise BadReply(f"BMA220 lost its settings (did its supply dip?): {error}") from error
+
+    def stop(self) -> None:
+        """Suspend the chip if it was running. Never raises: a chip that cannot be told is left as it is."""
+        chip, self._chip = self._chip, None
+        if chip is not None:
+            with suppress(OSError, DeviceError):
+                if SUSPEND.flip(self._bus, chip):
+                    SUSPEND.flip(self._bus, chip)
+
+    def _started(self) -> int:
+        if self._chip is None:
+            raise NotPresent("the BMA220 has not been started")
+        return self._chip
+
+    def _probe(self) -> int:
+        """The first address with the right chip id. Otherwise the error that tells most: a held bus at once, then
+        a wrong chip or an occupied address, and only then that nobody is there."""
+        faults: list[DeviceError] = []
+        for chip in self._settings.addresses:
+            try:
+                found = CHIP_ID.read(self._bus, chip)
+            except OSError as error:
+                fault = _fault(error, chip)
+                if isinstance(fault, Timeout):
+                    raise fault from error
+                if error.errno not in NOT_ACKNOWLEDGED:
+                    faults.append(fault)
+                continue
+            if found == CHIP_ID.reset_value:
+                return chip
+            faults.append(WrongDevice(
+                f"the chip at I2C address 0x{chip:02X} has id 0x{found:02X}, a BMA220 has 0x{CHIP_ID.reset_value:02X}"
+            ))
+        if faults:
+            raise faults[0]
+        places = " or ".join(f"0x{chip:02X}" for chip in self._settings.addresses)
+        raise NotPresent(f"nothing answers at I2C address {places}: check the sensor's power, ground, SDA and SCL")
+
+    def _make_run(self, toggle: ToggleRegister, chip: int) -> None:
+        """Flip the state until the chip says that it runs, two reads at most."""
+        for _ in range(2):
+            runs = toggle.flip(self._bus, chip)
+            self._sleep(TOGGLE_WAIT_S)
+            if runs:
+                return
+        raise BadReply(f"BMA220 at 0x{chip:02X} does not come out of {toggle.name}: two reads answered 0x00")
+
+
+def mps2_per_count(range_g: int) -> float:
+    """The nominal size of one count [m/s2]: 1/16 g at +-2 g, up to 1/2 g at +-16 g. SettingsError for another range."""
+    _choose("range_g", range_g, RANGE_CODES)
+    return STANDARD_GRAVITY_MPS2 * range_g / 32
+
+
+class Bma220Decoder:
+    """Raw samples in, acceleration out, a block at a time.
+
+    Each data byte is a six-bit two's complement number, left-justified: counts -32 to +31, nominally 32 / range_g
+    counts per g. The two low bits should be zero.
+
+    mps2_per_count   scale [m/s2]
+    anomalies        samples taken so far with a low bit set; the bits are dropped
+    repeats          samples taken so far that equal the one before: many mean that the chip renews its data more
+                     slowly than it is read, or nothing moves
+    """
+
+    def __init__(self, range_g: int) -> None:
+        self.mps2_per_count = mps2_per_count(range_g)
+        self.anomalies = 0
+        self.repeats = 0
+        self._t_us = array("q")
+        self._data = bytearray()
+        self._last = b""
+
+    def feed(self, t_us: int, data: bytes) -> None:
+        """Take one sample of three bytes read at ``t_us``. BadReply (and nothing taken) on any other length."""
+        if len(data) != SAMPLE_BYTES:
+            raise BadReply(f"a BMA220 sample is {SAMPLE_BYTES} bytes (X, Y, Z), not {len(data)}")
+        self._t_us.append(t_us)
+        self._data += data
+
+    def take(self) -> AccelerationBlock:
+        """Decode everything fed since the last call; an empty block when that was nothing."""
+        t_us = np.array(self._t_us, dtype=np.int64)
+        raw = np.frombuffer(self._last + bytes(self._data), dtype=np.int8).reshape(-1, SAMPLE_BYTES)
+        self.repeats += int(np.count_nonzero((raw[1:] == raw[:-1]).all(axis=1)))
+        self._t_us = array("q")
+        self._data = bytearray()
+        raw = raw[len(raw) - len(t_us):]
+        self.anomalies += int(np.count_nonzero((raw & 3).any(axis=1)))
+        self._last = raw[-1:].tobytes() or self._last
+        counts = raw >> 2
+        clipped = ((counts == -32) | (counts == 31)).any(axis=1)
+        return AccelerationBlock(t_us, counts.astype(np.float64) * self.mps2_per_count, clipped)
+
+
+def gravity_warning(block: AccelerationBlock, range_g: int) -> str | None:
+    """A line for the status when the mean acceleration of a second or more is not about 1 g long, else None.
+
+    The length of the mean vector is compared, so that vibration averages out; cornering and braking add a few
+    hundredths. Allowed: 0.2 g (zero offset of +-95 mg on two axes and such manoeuvres) and one count of the range.
+    A warning, not an error: the car may be moving, and the sensor may be a little off.
+    """
+    if len(block) == 0:
+        return None
+    length_g = float(np.linalg.norm(block.accel_mps2.mean(axis=0))) / STANDARD_GRAVITY_MPS2
+    allowed_g = 0.2 + range_g / 32
+    if abs(length_g - 1) <= allowed_g:
+        return None
+    return f"mean acceleration is {length_g:.2f} g, expected 1 within {allowed_g:.2f}: check range, wiring and supply"
+
+
+def _fault(error: OSError, chip: int) -> DeviceError:
+    """What a failed transfer means, in one line."""
+    if error.errno in NOT_ACKNOWLEDGED:
+        return NotPresent(f"nothing answers at I2C address 0x{chip:02X}: check the sensor's power, ground, SDA and SCL")
+    if error.errno == errno.ETIMEDOUT:
+        return Timeout(
+            f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, "
+            "and take the sensor's power away for a moment if it stays"
+        )
+    if error.errno == errno.EBUSY:
+        return NotPresent(
+            f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod for bma220) or remove its overlay"
+        )
+    return BadReply(f"I2C transfer with 0x{chip:02X} failed: {error}")
+
+
+def _choose(name: str, value: int, known: Iterable[int]) -> None:
+    """SettingsError unless ``value``, of whatever type a file gave, is one of ``known``."""
+    if value not in tuple(known):
+        raise SettingsError(f"{name} is one of {', '.join(map(str, sorted(known)))}, not {value}")

@@ -1,0 +1,98 @@
+"""Real wires: the only file that imports smbus2 and pyserial.
+
+Problem: both libraries report a missing device, missing rights and a pulled plug in ways of their own, and pyserial's
+``read`` waits for a full buffer. Solution: two functions that open a wire behind the protocols of ``drivers.ports``.
+What cannot be opened is NotPresent with the next step to take; what breaks later is an ``OSError`` with an errno.
+"""
+
+from __future__ import annotations
+
+import errno
+import select
+from typing import TYPE_CHECKING
+
+from drivers.errors import NotPresent, SettingsError
+from drivers.ports import BytePort, I2cBus
+
+if TYPE_CHECKING:
+    from serial import Serial
+
+WRITE_TIMEOUT_S = 1.0
+
+
+def open_i2c(number: int) -> I2cBus:
+    """Bus ``/dev/i2c-<number>``. NotPresent when it is not there or may not be opened."""
+    from smbus2 import SMBus
+
+    bus = SMBus()
+    try:
+        bus.open(number)
+    except OSError as error:
+        bus.close()
+        raise NotPresent(f"/dev/i2c-{number}: {_i2c_hint(error)}") from error
+    return bus
+
+
+def open_serial(path: str, baud: int) -> BytePort:
+    """Serial port ``path`` at ``baud`` 8N1, locked against other programs, without input from before.
+
+    NotPresent when it is not there or may not be opened; SettingsError on a baud rate it cannot have.
+    """
+    from serial import Serial, SerialException
+
+    if baud <= 0:
+        raise SettingsError(f"{path}: a baud rate is a positive number, not {baud}")
+    try:
+        port = Serial(path, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+    except SerialException as error:
+        raise NotPresent(f"{path}: {_serial_hint(error)}") from error
+    except ValueError as error:
+        raise SettingsError(f"{path}: {error}") from error
+    return _SerialPort(path, port)
+
+
+class _SerialPort:
+    """A pyserial port that never waits, behind a ``select`` that does: setting pyserial's own timeout anew for each
+    read would configure the port anew each time."""
+
+    def __init__(self, path: str, port: Serial) -> None:
+        self._path = path
+        self._port = port
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        try:
+            ready, _, _ = select.select([self._port], [], [], timeout_s)
+            return self._port.read(size) if ready else b""
+        except OSError as error:
+            raise self._gone(error) from error
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self._port.write(data) or 0
+        except OSError as error:
+            raise self._gone(error) from error
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _gone(self, error: OSError) -> OSError:
+        """pyserial's errors mostly carry no errno; whatever it was, the port has to be opened again."""
+        return OSError(error.errno or errno.EIO, f"{self._path} has gone: {error}")
+
+
+def _i2c_hint(error: OSError) -> str:
+    if error.errno == errno.ENOENT:
+        return "no such bus; enable I2C (dtparam=i2c_arm=on in /boot/firmware/config.txt) and restart"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return "not allowed; let the user join the group i2c (sudo usermod -aG i2c USER) and log in again"
+    return f"cannot be opened as an I2C bus: {error.strerror}"
+
+
+def _serial_hint(error: OSError) -> str:
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return "no such port; is the device plugged in, and the name right (see /dev/serial/by-id)?"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return "not allowed; let the user join the group dialout (sudo usermod -aG dialout USER) and log in again"
+    if error.errno in (errno.EAGAIN, errno.EBUSY):
+        return "another program has it open (gpsd, a serial console, a second ridelog?)"
+    return f"cannot be opened as a serial port: {error}"

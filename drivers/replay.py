@@ -1,0 +1,344 @@
+"""Recorded wires: an I2C bus and a serial port that play a recording and misbehave on cue.
+
+Problem: the whole service must run at a desk, on what was recorded in a car, through the very drivers it uses in the
+car; and what goes wrong on real wires must be tried on purpose. Solution: ``RecordedBus`` and ``RecordedPort`` offer
+the methods of the real ones and raise the same ``OSError``. Each works in one of two ways:
+
+- loaded: the player calls ``load`` with the bytes of an event, and the driver reads them;
+- playing: the recording runs against a clock that is handed in, and a read gives what is there by now.
+
+A ``Cue`` says what goes wrong and when. After ``close`` the wire may be used again: that is opening it anew.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Self
+
+from drivers.bma220 import DATA_ADDRESS, SAMPLE_BYTES
+from drivers.dump import Event
+from drivers.errors import DumpError
+from drivers.simulator import Bma220Chip
+
+US_PER_S = 1_000_000
+
+
+class Fault(Enum):
+    """What can happen to a wire.
+
+    NACK         bus: the next ``count`` transfers are not acknowledged
+    TIMEOUT      bus: the next ``count`` transfers time out; port: the next ``count`` reads find nothing
+    SHORT_READ   port: the next ``count`` reads give one byte at most
+    BUSY         bus: the next ``count`` transfers find that a kernel driver owns the address
+    STUCK_LOW    bus: the chip holds SDA low and transfers time out, until its own watchdog lets go (after one
+                 transfer, if it was switched on) or its power goes
+    BROWN_OUT    bus: the chip's supply dips; it runs on with its default settings
+    UNPLUG       nothing answers, and what is sent meanwhile is lost
+    REPLUG       the plug is back: a chip has its defaults; a port must be closed and opened again
+    """
+
+    NACK = auto()
+    TIMEOUT = auto()
+    SHORT_READ = auto()
+    BUSY = auto()
+    STUCK_LOW = auto()
+    BROWN_OUT = auto()
+    UNPLUG = auto()
+    REPLUG = auto()
+
+
+BUS_FAULTS = frozenset(Fault) - {Fault.SHORT_READ}
+PORT_FAULTS = frozenset({Fault.TIMEOUT, Fault.SHORT_READ, Fault.UNPLUG, Fault.REPLUG})
+TRANSFER_ERRNO = {Fault.NACK: errno.EREMOTEIO, Fault.TIMEOUT: errno.ETIMEDOUT, Fault.BUSY: errno.EBUSY}
+
+
+@dataclass(frozen=True)
+class Cue:
+    """``fault`` happens at a moment: at the recording's time ``at_us`` [us], or just before the data read number
+    ``at_read``, counted from 0 (a burst on a bus, a ``read`` on a port)."""
+
+    fault: Fault
+    at_us: int | None = None
+    at_read: int | None = None
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        if (self.at_us is None) == (self.at_read is None):
+            raise ValueError("a cue has either at_us or at_read")
+        if self.count < 1:
+            raise ValueError(f"a cue happens at least once, not {self.count} times")
+
+
+class _Cues:
+    """The cues still to come on one wire."""
+
+    def __init__(self, cues: Iterable[Cue], possible: frozenset[Fault], now_us: Callable[[], int] | None) -> None:
+        self._waiting = list(cues)
+        self._now_us = now_us
+        for cue in self._waiting:
+            if cue.fault not in possible:
+                raise ValueError(f"{cue.fault.name} cannot happen on this kind of wire")
+            if cue.at_us is not None and now_us is None:
+                raise ValueError("a cue with at_us needs a clock")
+
+    def due(self, reads: int) -> list[Cue]:
+        """Take out what happens by now; ``reads`` data reads have begun."""
+        if not self._waiting:
+            return []
+        now_us = self._now_us() if self._now_us is not None else 0
+        due = [
+            cue for cue in self._waiting
+            if (cue.at_us is not None and cue.at_us <= now_us) or (cue.at_read is not None and cue.at_read < reads)
+        ]
+        self._waiting = [cue for cue in self._waiting if cue not in due]
+        return due
+
+
+class _Recording:
+    """Events in order of time against a clock that starts now, at the recording's time ``first_us`` (its first
+    event when None). Holds one event at a time."""
+
+    def __init__(self, events: Iterable[Event], clock_us: Callable[[], int], first_us: int | None) -> None:
+        self._events = iter(events)
+        self._next = next(self._events, None)
+        if first_us is None:
+            first_us = self._next.t_us if self._next is not None else 0
+        self._clock_us = clock_us
+        self._offset_us = first_us - clock_us()
+
+    def now_us(self) -> int:
+        """The time on the recording's own scale."""
+        return self._clock_us() + self._offset_us
+
+    def next_us(self) -> int | None:
+        """When the next event comes; None after the last."""
+        return self._next.t_us if self._next is not None else None
+
+    def until_now(self) -> Iterator[bytes]:
+        """Take the events that have come by now."""
+        now_us = self.now_us()
+        while self._next is not None and self._next.t_us <= now_us:
+            data = self._next.data
+            self._next = next(self._events, None)
+            yield data
+
+
+class RecordedBus:
+    """An I2C bus with one BMA220 (``chip``) on it, whose data registers give recorded samples.
+
+    Loaded: ``load`` puts a sample into the data registers, over one that nobody has read; a burst takes it out.
+    Playing: a burst gives the latest sample at or before the present. With nothing to give, a burst is not
+    acknowledged: a sample is never invented. ``now_us`` is only needed for cues with ``at_us``.
+    """
+
+    def __init__(self, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None, address: int = 0x0A) -> None:
+        self.chip = Bma220Chip(self._take_loaded)
+        self._address = address
+        self._cues = _Cues(cues, BUS_FAULTS, now_us)
+        self._loaded: bytes | None = None
+        self._recording: _Recording | None = None
+        self._failing: list[int] = []
+        self._unplugged = False
+        self._stuck_low = False
+        self._reads = 0
+
+    @classmethod
+    def playing(
+        cls,
+        events: Iterable[Event],
+        now_us: Callable[[], int],
+        cues: Iterable[Cue] = (),
+        address: int = 0x0A,
+        first_us: int | None = None,
+    ) -> Self:
+        """A bus on which ``events`` (of this sensor only) happen from now on, the first at once unless ``first_us``
+        names another start on the recording's scale. A sample of the wrong length is a DumpError when it is its
+        turn."""
+        recording = _Recording(events, now_us, first_us)
+        bus = cls(cues, recording.now_us, address)
+        bus._recording = recording
+        bus.chip.sample = bus._take_latest
+        return bus
+
+    def load(self, data: bytes) -> None:
+        """Put one sample of three bytes into the data registers. DumpError on any other length."""
+        self._loaded = _whole_sample(data)
+
+    def read_byte_data(self, i2c_addr: int, register: int) -> int:
+        self._transfer(i2c_addr, register)
+        return self.chip.read(register)[0]
+
+    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
+        self._transfer(i2c_addr, None)
+        self.chip.write(register, value)
+
+    def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
+        self._transfer(i2c_addr, register)
+        return list(self.chip.read(register, length))
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def _transfer(self, i2c_addr: int, read_register: int | None) -> None:
+        """What comes before the bytes: address, acknowledgement, and whatever goes wrong. A burst that fails here
+        loses its sample, as on a real wire."""
+        if read_register == DATA_ADDRESS:
+            self._reads += 1
+        for cue in self._cues.due(self._reads):
+            self._happen(cue)
+        failure = self._failure(i2c_addr)
+        if failure:
+            if read_register == DATA_ADDRESS:
+                self._loaded = None
+            raise _os_error(failure)
+
+    def _failure(self, i2c_addr: int) -> int:
+        """The errno of this transfer, 0 when it goes well."""
+        if self._unplugged:
+            return errno.EREMOTEIO
+        if self._stuck_low:
+            self._stuck_low = not self.chip.watchdog_on
+            return errno.ETIMEDOUT
+        if self._failing:
+            return self._failing.pop(0)
+        return 0 if i2c_addr == self._address else errno.EREMOTEIO
+
+    def _happen(self, cue: Cue) -> None:
+        if cue.fault in TRANSFER_ERRNO:
+            self._failing += [TRANSFER_ERRNO[cue.fault]] * cue.count
+        elif cue.fault is Fault.STUCK_LOW:
+            self._stuck_low = True
+        else:
+            self._unplugged = cue.fault is Fault.UNPLUG
+            self._stuck_low = False
+            self.chip.lose_power()
+
+    def _take_loaded(self) -> bytes:
+        data, self._loaded = self._loaded, None
+        if data is None:
+            raise _os_error(errno.EREMOTEIO)
+        return data
+
+    def _take_latest(self) -> bytes:
+        if self._recording is not None:
+            for data in self._recording.until_now():
+                self._loaded = _whole_sample(data)
+        if self._loaded is None:
+            raise _os_error(errno.EREMOTEIO)
+        return self._loaded
+
+
+class RecordedPort:
+    """A serial port on which recorded bytes arrive. What a driver writes is kept in ``written``.
+
+    Loaded: ``load`` adds bytes to those that wait; a read takes at most ``size`` of them and never waits.
+    Playing: bytes arrive when they did in the recording; a read waits for the first as a real port does.
+    """
+
+    def __init__(self, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None) -> None:
+        self.written = bytearray()
+        self._cues = _Cues(cues, PORT_FAULTS, now_us)
+        self._waiting = bytearray()
+        self._recording: _Recording | None = None
+        self._sleep: Callable[[float], None] | None = None
+        self._unplugged = False
+        self._gone = False
+        self._silent_reads = 0
+        self._short_reads = 0
+        self._reads = 0
+
+    @classmethod
+    def playing(
+        cls,
+        events: Iterable[Event],
+        now_us: Callable[[], int],
+        sleep: Callable[[float], None],
+        cues: Iterable[Cue] = (),
+        first_us: int | None = None,
+    ) -> Self:
+        """A port on which ``events`` (of this port only) happen from now on, the first at once unless ``first_us``
+        names another start on the recording's scale. ``sleep`` takes seconds."""
+        recording = _Recording(events, now_us, first_us)
+        port = cls(cues, recording.now_us)
+        port._recording = recording
+        port._sleep = sleep
+        return port
+
+    def load(self, data: bytes) -> None:
+        """Bytes arrive, and are lost when the port is unplugged."""
+        if not self._gone:
+            self._waiting += data
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        self._reads += 1
+        self._cue()
+        if self._silent_reads:
+            self._silent_reads -= 1
+            self._pause(timeout_s)
+            return b""
+        self._arrive()
+        if not self._waiting:
+            self._pause(self._until_next_s(timeout_s))
+            self._cue()
+            self._arrive()
+        if self._short_reads:
+            self._short_reads -= 1
+            size = min(size, 1)
+        data = bytes(self._waiting[:size])
+        del self._waiting[:size]
+        return data
+
+    def write(self, data: bytes) -> int:
+        self._cue()
+        self.written += data
+        return len(data)
+
+    def close(self) -> None:
+        """Let go. The next use is a port just opened: without old input, and well again if the plug is back."""
+        self._gone = self._unplugged
+        self._waiting.clear()
+
+    def _cue(self) -> None:
+        """Let happen what is due; OSError EIO while the port has gone."""
+        for cue in self._cues.due(self._reads):
+            if cue.fault is Fault.TIMEOUT:
+                self._silent_reads += cue.count
+            elif cue.fault is Fault.SHORT_READ:
+                self._short_reads += cue.count
+            elif cue.fault is Fault.REPLUG:
+                self._unplugged = False
+            else:
+                self._unplugged = self._gone = True
+                self._waiting.clear()
+        if self._gone:
+            self._arrive()
+            raise _os_error(errno.EIO)
+
+    def _arrive(self) -> None:
+        if self._recording is not None:
+            for data in self._recording.until_now():
+                self.load(data)
+
+    def _until_next_s(self, timeout_s: float) -> float:
+        next_us = self._recording.next_us() if self._recording is not None else None
+        if self._recording is None or next_us is None:
+            return timeout_s
+        return min(timeout_s, (next_us - self._recording.now_us()) / US_PER_S)
+
+    def _pause(self, wait_s: float) -> None:
+        if self._sleep is not None and wait_s > 0:
+            self._sleep(wait_s)
+
+
+def _whole_sample(data: bytes) -> bytes:
+    if len(data) != SAMPLE_BYTES:
+        raise DumpError(f"a recorded read of the BMA220 has {len(data)} bytes, expected {SAMPLE_BYTES} (X, Y, Z)")
+    return data
+
+
+def _os_error(number: int) -> OSError:
+    return OSError(number, os.strerror(number))
