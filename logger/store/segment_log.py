@@ -1,0 +1,225 @@
+"""Rows of a segment log: text <-> record, each row with its own check value.
+
+Problem. A row is written in a car, where power fails in the middle of a write and cards lose or change bytes.
+What was written whole must be read back whole, and what was not must show, row by row.
+
+Solution. A row is one line of comma-separated text that ends in the CRC-32 of itself. ``COLUMNS`` says once, for
+both directions, how each value is written: times as whole microseconds, floats with a fixed number of decimals,
+unknown as nothing at all. ``scan`` reads a log that may be damaged anywhere and gives every row that is intact,
+also those beside a lost newline.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from math import isfinite
+from typing import Any, BinaryIO, NamedTuple
+
+from logger.errors import BadInput
+from logger.records import WindowRecord
+from logger.units import US_PER_S
+
+LINE_BYTES = 4096
+"""More than any row; a longer line is taken for several damaged ones."""
+
+_EPOCH = datetime(1970, 1, 1)
+_MICROSECOND = timedelta(microseconds=1)
+_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
+_SECONDS = re.compile(r"(-?)(\d+)\.(\d{6})")
+_ROW_END = re.compile(rb",[0-9a-f]{8}")
+
+
+class BadRow(BadInput):
+    """A line that is not an intact row. The message says what was expected."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: its name in the file, the record's attribute, and how a value is written and read."""
+
+    name: str
+    attribute: str
+    write: Callable[[Any], str]
+    read: Callable[[str], Any]
+
+
+def _write_utc(utc_us: int | None) -> str:
+    if utc_us is None:
+        return ""
+    return (_EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds") + "Z"
+
+
+def _read_utc(text: str) -> int | None:
+    if not text:
+        return None
+    if not _UTC.fullmatch(text):
+        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text!r}")
+    return (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
+
+
+def _write_seconds(t_us: int) -> str:
+    whole, fraction = divmod(abs(t_us), US_PER_S)
+    return f"{'-' if t_us < 0 else ''}{whole}.{fraction:06d}"
+
+
+def _read_seconds(text: str) -> int:
+    match = _SECONDS.fullmatch(text)
+    if not match:
+        raise BadRow(f"expected seconds with six decimals, found {text!r}")
+    t_us = int(match[2]) * US_PER_S + int(match[3])
+    return -t_us if match[1] else t_us
+
+
+def _read_float(text: str) -> float:
+    value = float(text)
+    if not isfinite(value):
+        raise BadRow(f"expected a finite number, found {text!r}")
+    return value
+
+
+def _seconds_of_us(name: str, attribute: str) -> Column:
+    return Column(name, attribute, _write_seconds, _read_seconds)
+
+
+def _number(name: str, decimals: int) -> Column:
+    """A float that may be unknown: None, NaN and infinity are written as nothing."""
+    pattern = f"%.{decimals}f"
+
+    def write(value: float | None) -> str:
+        return "" if value is None or not isfinite(value) else pattern % value
+
+    def read(text: str) -> float | None:
+        return _read_float(text) if text else None
+
+    return Column(name, name, write, read)
+
+
+def _known_number(name: str, decimals: int) -> Column:
+    """A float that is always known. Writing NaN or infinity raises ``ValueError``."""
+    pattern = f"%.{decimals}f"
+
+    def write(value: float) -> str:
+        if not isfinite(value):
+            raise ValueError(f"{name} is {value}, expected a finite number")
+        return pattern % value
+
+    return Column(name, name, write, _read_float)
+
+
+def _count(name: str) -> Column:
+    return Column(name, name, lambda value: f"{value:d}", int)
+
+
+def _word(name: str) -> Column:
+    return Column(name, name, str, str)
+
+
+COLUMNS = (
+    _count("segment"),
+    Column("t_utc", "utc_us", _write_utc, _read_utc),
+    _seconds_of_us("t_s", "t_us"),
+    _number("distance_start_m", 3),
+    _number("distance_end_m", 3),
+    _number("lat_deg", 7),
+    _number("lon_deg", 7),
+    _number("speed_mps", 3),
+    _number("iri_m_per_km", 3),
+    _number("iri_std_m_per_km", 3),
+    _number("iri_rms_m_per_km", 3),
+    _number("a_w_mps2", 4),
+    _number("mtvv_mps2", 4),
+    _number("vdv_mps175", 4),
+    _number("crest_factor", 3),
+    _word("comfort"),
+    _word("iri_class"),
+    Column("flags", "flags", "|".join, lambda text: tuple(text.split("|")) if text else ()),
+    _count("drive"),
+    _known_number("duration_s", 6),
+    _number("accel_rms_mps2", 4),
+    _count("samples"),
+    _count("clipped_samples"),
+)
+HEADER = ",".join([*(column.name for column in COLUMNS), "crc32"])
+_HEADER_BYTES = HEADER.encode()
+
+
+def format_row(record: WindowRecord) -> str:
+    """The row of a record, without a newline.
+
+    Raises ``ValueError`` for a duration that is not finite and ``OverflowError`` for a UTC outside the years 1 to 9999.
+    """
+    text = ",".join([column.write(getattr(record, column.attribute)) for column in COLUMNS])
+    return f"{text},{zlib.crc32(text.encode()):08x}"
+
+
+def parse_row(text: str) -> WindowRecord:
+    """The record of a row. UTC comes back in whole milliseconds, floats with the decimals of their column.
+
+    Raises ``BadRow`` when the check value or any field is not as it should be.
+    """
+    body, _, check = text.rpartition(",")
+    if f"{zlib.crc32(body.encode('utf-8', 'replace')):08x}" != check:
+        raise BadRow("expected a row that fits its crc32")
+    fields = body.split(",")
+    if len(fields) != len(COLUMNS):
+        raise BadRow(f"expected {len(COLUMNS) + 1} columns, found {len(fields) + 1}")
+    try:
+        return WindowRecord(**{column.attribute: column.read(field)
+                               for column, field in zip(COLUMNS, fields, strict=True)})
+    except ValueError as error:
+        raise BadRow(str(error)) from None
+
+
+class Row(NamedTuple):
+    """What one line of a log holds. A damaged line gives a ``Row`` without a record, after any intact rows in it.
+
+    number     line number, from 1
+    text       the row as it stands, when it is intact
+    record     its record; None: the line is damaged
+    problem    what was expected, when the line is damaged
+    torn       the file ends in this line, without a newline
+    """
+
+    number: int
+    text: str
+    record: WindowRecord | None
+    problem: str
+    torn: bool
+
+
+def scan(file: BinaryIO) -> Iterator[Row]:
+    """Read the rows of an open log, damaged or not, in constant memory. The header, when intact, gives nothing."""
+    number = 0
+    while line := file.readline(LINE_BYTES):
+        number += 1
+        text = line.removesuffix(b"\n")
+        torn = len(text) == len(line) < LINE_BYTES
+        if number == 1:
+            if text != _HEADER_BYTES:
+                rest = text[len(_HEADER_BYTES) + 1:] if text.startswith(_HEADER_BYTES) else text
+                yield from _salvaged(1, rest, torn)
+                yield Row(1, "", None, "expected the header line of a segment log", torn)
+            continue
+        try:
+            row = text.decode("ascii")
+            yield Row(number, row, parse_row(row), "", torn)
+        except (BadRow, UnicodeDecodeError) as error:
+            yield from _salvaged(number, text, torn)
+            yield Row(number, "", None, str(error) if isinstance(error, BadRow) else "expected ASCII text", torn)
+
+
+def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
+    """The intact rows inside a damaged line: those whose newline was lost."""
+    start = 0
+    for end in _ROW_END.finditer(line):
+        row = line[start:end.end()].decode("ascii", "replace")
+        try:
+            record = parse_row(row)
+        except BadRow:
+            continue
+        yield Row(number, row, record, "", torn)
+        start = end.end() + 1

@@ -1,0 +1,227 @@
+"""Is what lies on the disk what was written? Checks of segment logs and recorded dumps.
+
+Problem. A card or a copy may have damaged a file anywhere, or cut it; a file may be open while it is looked at.
+Solution. Every record is read the way every other reader reads it. A row that does not fit its check value is
+corrupt, a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one
+through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
+had, so that a file cut neatly between two rows shows too. A part that ends in a torn row is simply open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+from drivers.dump import ACCELEROMETERS, open_dump
+from drivers.errors import DumpError
+from logger.errors import BadInput
+from logger.records import WindowRecord
+from logger.store.rotation import LogName, read_sidecar
+from logger.store.segment_log import Row, scan
+from logger.units import US_PER_S
+
+DUMP_ENDINGS = (".dump", ".dump.gz")
+SILENCE_US = US_PER_S
+"""An accelerometer that says nothing for longer has left a gap in a dump."""
+
+SHOWN_PROBLEMS = 20
+"""Most problems that are kept in words for one file; all are counted."""
+
+_DUMP_START = b"# ridelog-dump "
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """What was found in one file.
+
+    kind               ``log`` or ``dump``
+    state              ``finished``, ``open`` (a part: the service may be writing to it), or ``dump``
+    records_good       rows or events that are as they were written
+    records_torn       1 when the file ends in the middle of one
+    records_corrupt    lines that are damaged; a dump is read up to the first
+    gaps               places where records are missing or time goes back
+    problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
+    ok                 nothing is wrong
+    """
+
+    path: Path
+    kind: str
+    state: str
+    records_good: int
+    records_torn: int
+    records_corrupt: int
+    gaps: int
+    problems: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """True when nothing is wrong."""
+        return not self.problems
+
+
+@dataclass
+class _Findings:
+    """What is being found in one file, the records at its ends, and the damaged lines beyond them."""
+
+    good: int = 0
+    torn: int = 0
+    corrupt: int = 0
+    gaps: int = 0
+    problems: list[str] = field(default_factory=list)
+    first: WindowRecord | None = None
+    last: WindowRecord | None = None
+    damaged_before_first: int = 0
+    damaged_since_last: int = 0
+
+    def wrong(self, problem: str) -> None:
+        if len(self.problems) < SHOWN_PROBLEMS:
+            self.problems.append(problem)
+
+    def check(self, path: Path, kind: str, state: str) -> FileCheck:
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems))
+
+
+def verify(paths: Iterable[Path]) -> list[FileCheck]:
+    """Check files, and the logs and dumps inside folders (at any depth), in order of their names.
+
+    Raises ``BadInput`` for a path that is not there, a file that is neither log nor dump, or a folder without any.
+    """
+    found = dict.fromkeys(file for path in paths for file in _files_of(path))
+    logs: dict[Path, _Findings] = {}
+    checks: dict[Path, FileCheck] = {}
+    for path in found:
+        try:
+            if _is_dump(path):
+                checks[path] = _check_dump(path)
+            else:
+                logs[path] = _check_log(path)
+        except OSError as error:
+            raise BadInput(f"{path}: expected a readable file, but: {error.strerror}") from error
+    _compare_neighbours(logs)
+    checks |= {path: logs[path].check(path, "log", "open" if _is_part(path) else "finished") for path in logs}
+    return [checks[path] for path in found]
+
+
+def _files_of(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
+    files = sorted(file for file in path.rglob("*")
+                   if file.is_file() and (LogName.of(file) or file.name.endswith(DUMP_ENDINGS)))
+    if not files:
+        raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
+    return files
+
+
+def _is_part(path: Path) -> bool:
+    return path.suffix == ".part"
+
+
+def _is_dump(path: Path) -> bool:
+    if path.name.endswith(DUMP_ENDINGS):
+        return True
+    with path.open("rb") as file:
+        return file.read(len(_DUMP_START)) == _DUMP_START
+
+
+def _check_log(path: Path) -> _Findings:
+    findings = _Findings()
+    lines = 0
+    with path.open("rb") as file:
+        for row in scan(file):
+            lines += 1
+            _take_row(findings, row, _is_part(path))
+    empty = not path.stat().st_size
+    if not findings.good and not LogName.of(path) and (lines or empty):
+        raise BadInput(f"{path}:1: expected a segment log or a recorded dump, found no row of one")
+    if not _is_part(path):
+        if empty:
+            findings.wrong("line 1: torn: expected the header line of a segment log")
+        _compare_with_sidecar(path, findings)
+    return findings
+
+
+def _take_row(findings: _Findings, row: Row, is_open: bool) -> None:
+    """Count one row; in an open file a torn one is as it should be."""
+    if row.record is None:
+        findings.damaged_since_last += 1
+        if row.torn:
+            findings.torn += 1
+        else:
+            findings.corrupt += 1
+        if not (row.torn and is_open):
+            findings.wrong(f"line {row.number}: {'torn' if row.torn else 'corrupt'}: {row.problem}")
+        return
+    if row.torn and not is_open:
+        findings.wrong(f"line {row.number}: torn: expected a newline at the end of a finished log")
+    findings.good += 1
+    if findings.last is None:
+        findings.first = row.record
+        findings.damaged_before_first = findings.damaged_since_last
+    else:
+        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}")
+    findings.last = row.record
+    findings.damaged_since_last = 0
+
+
+def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, damaged: int, place: str) -> None:
+    """Note a gap between two records that should follow each other, but for as many damaged lines between them."""
+    if not 1 <= after.segment - before.segment <= damaged + 1:
+        findings.gaps += 1
+        findings.wrong(f"{place}: gap: expected segment {before.segment + 1}, found {after.segment}")
+    elif after.t_us < before.t_us:
+        findings.gaps += 1
+        findings.wrong(f"{place}: gap: expected a time not before {before.t_us / US_PER_S:.6f} s, "
+                       f"found {after.t_us / US_PER_S:.6f} s")
+
+
+def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
+    try:
+        sidecar = read_sidecar(path)
+    except ValueError:
+        findings.wrong("sidecar: expected a JSON object")
+        return
+    said = sidecar.get("log") if sidecar else None
+    rows = said.get("rows") if isinstance(said, dict) else None
+    if isinstance(rows, int) and rows > findings.good + findings.corrupt + findings.torn:
+        findings.gaps += 1
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of")
+
+
+def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
+    """Note rows and files that are missing between the parts of a session."""
+    named = sorted((path.parent, name.session, name.part, not name.finished, path)
+                   for path in logs if (name := LogName.of(path)))
+    for (folder, session, part, _, before), (next_folder, next_session, next_part, _, after) in pairwise(named):
+        if (folder, session) != (next_folder, next_session) or part == next_part:
+            continue
+        earlier, later = logs[before], logs[after]
+        if earlier.last is not None and later.first is not None:
+            damaged = earlier.damaged_since_last + later.damaged_before_first
+            _compare(later, earlier.last, later.first, damaged, f"after {before.name}")
+
+
+def _check_dump(path: Path) -> FileCheck:
+    findings = _Findings()
+    heard_us: int | None = None
+    try:
+        with open_dump(path) as reader:
+            for event in reader:
+                findings.good += 1
+                if event.source not in ACCELEROMETERS:
+                    continue
+                if heard_us is not None and event.t_us - heard_us > SILENCE_US:
+                    findings.gaps += 1
+                    findings.wrong(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
+                                   f"and {event.t_us / US_PER_S:.6f} s")
+                heard_us = event.t_us
+            if reader.torn_tail:
+                findings.torn = 1
+                findings.wrong("torn: the recording ends in the middle of a line or of its compressed data")
+    except DumpError as error:
+        findings.corrupt = 1
+        findings.wrong(f"corrupt: {str(error).removeprefix(f'{path}:')}")
+    return findings.check(path, "dump", "dump")
