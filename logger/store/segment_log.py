@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import isfinite
+from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from logger.errors import BadInput
@@ -210,6 +211,22 @@ def scan(file: BinaryIO) -> Iterator[Row]:
         except (BadRow, UnicodeDecodeError) as error:
             yield from _salvaged(number, text, torn)
             yield Row(number, "", None, str(error) if isinstance(error, BadRow) else "expected ASCII text", torn)
+
+
+@dataclass(frozen=True)
+class LogContent:
+    """The intact records of one file, in its order; how many lines were damaged, a torn last one among them."""
+
+    records: tuple[WindowRecord, ...]
+    damaged_lines: int
+
+
+def read_log(path: Path) -> LogContent:
+    """Read a whole log, open or finished. Raises ``OSError``; damage is counted, not raised."""
+    with path.open("rb") as file:
+        rows = list(scan(file))
+    records = tuple(row.record for row in rows if row.record is not None)
+    return LogContent(records, len(rows) - len(records))
 
 
 def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
