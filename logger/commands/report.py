@@ -1,0 +1,86 @@
+"""Make one web page of segment logs: map, plots, table. It opens with no network."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from logger.errors import EXIT_DONE, BadInput
+from logger.report.page import LoggedFile, page
+from logger.report.summary import summarise, summary_json
+from logger.store.rotation import LogName, read_sidecar
+from logger.store.segment_log import scan
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog report``."""
+    parser.add_argument("logs", metavar="LOGDIR", type=Path, help="folder of segment logs, or one log file")
+    parser.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="page to write")
+    parser.add_argument("--json", action="store_true", help="also print the summary, as one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog report``."""
+    files = write_report(find_logs(args.logs), args.out)
+    records = [record for file in files for record in file.records]
+    if args.json:
+        print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
+                          "summary": summary_json(summarise(records))}))
+    else:
+        print(f"Report: {args.out} ({len(records)} windows from {len(files)} files)")
+    return EXIT_DONE
+
+
+def write_report(logs: Sequence[Path], out: Path) -> list[LoggedFile]:
+    """Write the page of some log files, whole or not at all; give what was read.
+
+    Raises BadInput when no log has an intact row, or the page cannot be written.
+    """
+    files = [read_logged(log) for log in logs]
+    if not any(file.records for file in files):
+        raise BadInput(f"{', '.join(map(str, logs))}: expected a log with at least one intact row")
+    new = out.with_name(out.name + ".new")
+    try:
+        with new.open("w", encoding="utf-8", errors="xmlcharrefreplace") as file:
+            file.write(page(files))
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(out)
+    except OSError as error:
+        raise BadInput(f"{out}: expected a place where a page can be written ({error.strerror})") from None
+    return files
+
+
+def find_logs(place: Path) -> list[Path]:
+    """The logs in a folder, open ones too, in order of their writing; or the one file. Raises BadInput for none."""
+    if place.is_file():
+        return [place]
+    if not place.is_dir():
+        raise BadInput(f"{place}: expected a folder of segment logs, or one log file")
+    found: dict[tuple[int, int], Path] = {}
+    for path in sorted(place.iterdir()):
+        name = LogName.of(path)
+        if name is not None and (name.finished or (name.session, name.part) not in found):
+            found[name.session, name.part] = path
+    if not found:
+        raise BadInput(f"{place}: expected segment logs (such as 00001-001.csv), found none")
+    return [found[key] for key in sorted(found)]
+
+
+def read_logged(log: Path) -> LoggedFile:
+    """Read a log, damaged or not, and what lies beside it. Raises BadInput for a file that cannot be opened."""
+    try:
+        with log.open("rb") as file:
+            rows = list(scan(file))
+    except OSError as error:
+        raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
+    try:
+        sidecar = read_sidecar(log)
+    except (ValueError, RecursionError):
+        sidecar = None
+    records = [row.record for row in rows if row.record is not None]
+    damaged = sum(row.record is None for row in rows)
+    return LoggedFile(log.name, records, damaged, sidecar)

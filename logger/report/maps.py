@@ -1,0 +1,189 @@
+"""The way on the ground as one SVG picture, coloured by class; no tiles, no network.
+
+Degrees become metres around the middle of the way (a degree of longitude shrinks with the cosine of the latitude),
+which is right to a part in a thousand for a day's drive. Rows are joined when the next begins where the last ended
+and lies near it; what is not joined is a gap, and stays one. Rows of one class in a row are one line, whose points are
+left out where they lie within a third of a pixel of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from math import cos, hypot, radians
+
+import numpy as np
+
+from logger.records import WindowRecord
+from logger.report.figures import WIDTH, nice_step, numbered_mark
+from logger.report.summary import EARTH_RADIUS_M, Place, ground_distance_m, length_m
+
+_MARGIN = 46
+_LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
+_LEAST_SPAN_M = 50.0
+_TOLERANCE = 0.3
+_JOIN_M = 0.5
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """One way to colour the track: a CSS class for the whole, and the style class of each row."""
+
+    name: str
+    style_of: Callable[[WindowRecord], str]
+
+
+def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], places: Sequence[Place]) -> str:
+    """The SVG element of the way; a sentence where no row has a position."""
+    pieces = [piece for piece in joined(records) if piece]
+    if not pieces:
+        return '<p class="empty">No row has a position, so there is no map.</p>'
+    projection = _Projection.around([record for piece in pieces for record in piece])
+    drawn = [(piece, [projection.xy(record) for record in piece]) for piece in pieces]
+    parts = [f'<svg class="map" viewBox="0 0 {WIDTH} {projection.height:.0f}" role="img" aria-label="Map of the way">']
+    parts.append(f'<path class="casing" d="{"".join(_path(points) for _, points in drawn)}"/>')
+    for colouring in colourings:
+        lines = "".join(_coloured(piece, points, colouring) for piece, points in drawn)
+        parts.append(f'<g class="track {escape(colouring.name)}">{lines}</g>')
+    parts.append(_end(projection.xy(pieces[-1][-1]), "end", "End"))
+    parts.append(_end(projection.xy(pieces[0][0]), "start", "Start"))
+    parts += [numbered_mark(*projection.xy(place), str(number)) for number, place in enumerate(places, start=1)
+              if place.lat_deg is not None and place.lon_deg is not None]
+    parts += [_scale_bar(projection), _north(), "</svg>"]
+    return "".join(parts)
+
+
+def joined(records: Sequence[WindowRecord]) -> list[list[WindowRecord]]:
+    """Rows with a position, in stretches without a gap."""
+    pieces: list[list[WindowRecord]] = []
+    last: WindowRecord | None = None
+    for record in records:
+        if record.lat_deg is None or record.lon_deg is None:
+            last = None
+            continue
+        if last is None or not _follows(last, record):
+            pieces.append([])
+        pieces[-1].append(record)
+        last = record
+    return pieces
+
+
+def _follows(last: WindowRecord, record: WindowRecord) -> bool:
+    if last.distance_end_m is None or record.distance_start_m is None or last.drive != record.drive:
+        return False
+    apart_m = ground_distance_m(last, record)
+    near_m = 5 * max(length_m(last), length_m(record))
+    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and apart_m is not None and apart_m < near_m
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """From degrees to the picture."""
+
+    lat_deg: float
+    lon_deg: float
+    middle_m: Point
+    units_per_m: float
+    height: float
+
+    @classmethod
+    def around(cls, records: Sequence[WindowRecord]) -> _Projection:
+        """The largest scale at which all rows fit the picture."""
+        latitudes = [record.lat_deg or 0.0 for record in records]
+        plain = cls((min(latitudes) + max(latitudes)) / 2, records[0].lon_deg or 0.0, (0.0, 0.0), 1.0, 0.0)
+        metres = np.array([plain.metres(record) for record in records])
+        low, high = metres.min(axis=0), metres.max(axis=0)
+        middle = (low + high) / 2
+        wide_m, high_m = np.maximum(high - low, _LEAST_SPAN_M)
+        scale = min((WIDTH - 2 * _MARGIN) / wide_m, (_MOST_HEIGHT - 2 * _MARGIN) / high_m)
+        height = max(high_m * scale + 2 * _MARGIN, _LEAST_HEIGHT)
+        return cls(plain.lat_deg, plain.lon_deg, (float(middle[0]), float(middle[1])), float(scale), float(height))
+
+    def metres(self, place: WindowRecord | Place) -> Point:
+        """East and north of the origin [m]."""
+        east_deg = ((place.lon_deg or 0.0) - self.lon_deg + 180.0) % 360.0 - 180.0
+        north_deg = (place.lat_deg or 0.0) - self.lat_deg
+        return (EARTH_RADIUS_M * radians(east_deg) * cos(radians(self.lat_deg)), EARTH_RADIUS_M * radians(north_deg))
+
+    def xy(self, place: WindowRecord | Place) -> Point:
+        """In the picture, y downwards."""
+        east_m, north_m = self.metres(place)
+        return (WIDTH / 2 + (east_m - self.middle_m[0]) * self.units_per_m,
+                self.height / 2 - (north_m - self.middle_m[1]) * self.units_per_m)
+
+
+def _coloured(piece: Sequence[WindowRecord], points: Sequence[Point], colouring: Colouring) -> str:
+    """Lines of one style each. A row reaches from half-way to the row before to half-way to the next."""
+    styles = [colouring.style_of(record) for record in piece]
+    lines = []
+    start = 0
+    for index in range(1, len(piece) + 1):
+        if index < len(piece) and styles[index] == styles[start]:
+            continue
+        run = list(points[start:index])
+        if start > 0:
+            run.insert(0, _half_way(points[start - 1], points[start]))
+        if index < len(piece):
+            run.append(_half_way(points[index - 1], points[index]))
+        lines.append(f'<path class="{escape(styles[start])}" d="{_path(run)}"/>')
+        start = index
+    return "".join(lines)
+
+
+def _half_way(one: Point, other: Point) -> Point:
+    return (one[0] + other[0]) / 2, (one[1] + other[1]) / 2
+
+
+def _path(points: Sequence[Point]) -> str:
+    kept = [f"{x:.1f} {y:.1f}" for x, y in simplified(points, _TOLERANCE)]
+    return "M" + (" ".join(kept) if len(kept) > 1 else f"{kept[0]}h0")
+
+
+def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
+    """The points without those within ``tolerance`` of the line through the rest (Douglas and Peucker 1973)."""
+    xy = np.asarray(points, dtype=float).reshape(-1, 2)
+    keep = np.zeros(len(xy), dtype=bool)
+    keep[[0, -1]] = True
+    spans = [(0, len(xy) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        inner = xy[first + 1:last] - xy[first]
+        chord = xy[last] - xy[first]
+        length = hypot(*chord)
+        along = np.clip(inner @ chord / length**2, 0.0, 1.0) if length > 0 else np.zeros(len(inner))
+        off = np.linalg.norm(inner - along[:, None] * chord, axis=1)
+        worst = int(off.argmax())
+        if off[worst] > tolerance:
+            keep[first + 1 + worst] = True
+            spans += [(first, first + 1 + worst), (first + 1 + worst, last)]
+    return [(float(x), float(y)) for x, y in xy[keep]]
+
+
+def _end(at: Point, name: str, text: str) -> str:
+    """A disc for the start, a square for the end, each with its word."""
+    x, y = at
+    shape = (f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>' if name == "start" else
+             f'<rect x="{x - 6.5:.1f}" y="{y - 6.5:.1f}" width="13" height="13" rx="2"/>')
+    right = x < WIDTH - 80
+    return (f'<g class="{name}">{shape}<text x="{x + (12 if right else -12):.1f}" y="{y + 4.5:.1f}" '
+            f'text-anchor="{"start" if right else "end"}">{text}</text></g>')
+
+
+def _scale_bar(projection: _Projection) -> str:
+    length_m = nice_step(90 / projection.units_per_m)
+    width = length_m * projection.units_per_m
+    text = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
+    y = projection.height - 14
+    return (f'<g class="scale"><path d="M16 {y - 5:.1f}v5h{width:.1f}v-5"/>'
+            f'<text x="{16 + width / 2:.1f}" y="{y - 6:.1f}" text-anchor="middle">{text}</text></g>')
+
+
+def _north() -> str:
+    x = WIDTH - 24
+    return (f'<g class="scale"><path d="M{x} 40V16m-5 8l5-8l5 8"/>'
+            f'<text x="{x}" y="54" text-anchor="middle">N</text></g>')

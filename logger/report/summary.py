@@ -1,0 +1,233 @@
+"""A drive in a few figures: what the terminal and the page both say.
+
+Lengths weigh, not rows: a window by time has no length and counts in the time only. The roughest places are single
+windows, but of those within ``APART_M`` of each other, on the ground, only the worst is named, so that one pothole,
+or a bad bridge driven both ways, does not fill the list.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
+from itertools import accumulate
+from math import cos, hypot, radians
+from typing import Any
+
+from logger.records import WindowRecord
+from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
+
+APART_M = 50.0
+PLACES = 5
+EARTH_RADIUS_M = 6_371_008.8
+
+IRI_CLASSES: Mapping[str, str] = {
+    "A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor", "F": "extremely poor",
+    "G": "extremely poor", "H": "extremely poor",
+}
+"""ISO 8608 letters, best first, in words."""
+
+COMFORT_WORDS = ("not_uncomfortable", "a_little_uncomfortable", "fairly_uncomfortable", "uncomfortable",
+                 "very_uncomfortable", "extremely_uncomfortable")
+"""ISO 2631 words, best first."""
+
+_DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+@dataclass(frozen=True)
+class Share:
+    """How much of the distance has one name. ``name`` is empty for the distance without a value."""
+
+    name: str
+    distance_m: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A rough window. ``along_m`` is where its middle lies on the way through all rows [m]."""
+
+    along_m: float
+    utc_us: int | None
+    lat_deg: float | None
+    lon_deg: float | None
+    speed_mps: float | None
+    iri_m_per_km: float
+    iri_std_m_per_km: float | None
+    a_w_mps2: float | None
+    comfort: str
+    flags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DriveSummary:
+    """Some rows in figures. None: not known.
+
+    start_utc_us, end_utc_us    of the first and the last row with UTC
+    duration_s                  time inside windows; blind_s of it without speed, so without distance
+    mean_iri_m_per_km           mean over the distance that has an IRI
+    a_w_mps2                    weighted r.m.s. acceleration over the time inside windows
+    iri_classes, comfort        shares of the distance, best first; what has no value comes last
+    roughest                    worst first
+    flags                       word to number of rows, the most frequent first
+    """
+
+    windows: int
+    drives: int
+    start_utc_us: int | None
+    end_utc_us: int | None
+    distance_m: float
+    duration_s: float
+    blind_s: float
+    mean_speed_mps: float | None
+    mean_iri_m_per_km: float | None
+    a_w_mps2: float | None
+    iri_classes: tuple[Share, ...]
+    comfort: tuple[Share, ...]
+    roughest: tuple[Place, ...]
+    flags: Mapping[str, int]
+
+
+def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
+    """Sum up rows in the order of their making, also of several drives."""
+    lengths_m = [length_m(record) for record in records]
+    distance_m = sum(lengths_m)
+    blind_s = sum(record.duration_s for record in records if record.distance_end_m is None)
+    duration_s = sum(record.duration_s for record in records)
+    dated = [record for record in records if record.utc_us is not None]
+    mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True))
+    mean_square = _mean((None if record.a_w_mps2 is None else record.a_w_mps2**2, record.duration_s)
+                        for record in records)
+    return DriveSummary(
+        windows=len(records),
+        drives=len(split_drives(records)),
+        start_utc_us=dated[0].utc_us if dated else None,
+        end_utc_us=end_utc_us(dated[-1]) if dated else None,
+        distance_m=distance_m,
+        duration_s=duration_s,
+        blind_s=blind_s,
+        mean_speed_mps=distance_m / (duration_s - blind_s) if distance_m > 0 else None,
+        mean_iri_m_per_km=mean_iri,
+        a_w_mps2=None if mean_square is None else mean_square**0.5,
+        iri_classes=_shares(records, lengths_m, tuple(IRI_CLASSES), lambda record: record.iri_class),
+        comfort=_shares(records, lengths_m, COMFORT_WORDS, lambda record: record.comfort),
+        roughest=_roughest(records),
+        flags=dict(Counter(flag for record in records for flag in record.flags).most_common()),
+    )
+
+
+def summary_json(summary: DriveSummary) -> dict[str, Any]:
+    """The summary as JSON can hold it; instants as ISO 8601."""
+    fields = asdict(summary)
+    for entry in (fields, *fields["roughest"]):
+        for key in [key for key in entry if key.endswith("utc_us")]:
+            entry[key.removesuffix("_us")] = iso_utc(entry.pop(key))
+    return fields
+
+
+def split_drives(records: Iterable[WindowRecord]) -> list[list[WindowRecord]]:
+    """Rows drive by drive. A new drive begins where its number changes or the rows are counted anew."""
+    drives: list[list[WindowRecord]] = []
+    last: WindowRecord | None = None
+    for record in records:
+        if last is None or record.drive != last.drive or record.segment <= last.segment:
+            drives.append([])
+        drives[-1].append(record)
+        last = record
+    return drives
+
+
+def length_m(record: WindowRecord) -> float:
+    """Length of a window [m]; 0 for one by time."""
+    if record.distance_start_m is None or record.distance_end_m is None:
+        return 0.0
+    return record.distance_end_m - record.distance_start_m
+
+
+def along_m(records: Sequence[WindowRecord]) -> list[float]:
+    """Distance from the first row's start to each row's middle, through all rows [m]."""
+    lengths_m = [length_m(record) for record in records]
+    return [end - length / 2 for end, length in zip(accumulate(lengths_m), lengths_m, strict=True)]
+
+
+def ground_distance_m(one: WindowRecord | Place, other: WindowRecord | Place) -> float | None:
+    """Distance between two places some kilometres apart at most [m]; None when one has no position."""
+    if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
+        return None
+    east_deg = (other.lon_deg - one.lon_deg + 180.0) % 360.0 - 180.0
+    east = radians(east_deg) * cos(radians((one.lat_deg + other.lat_deg) / 2))
+    return EARTH_RADIUS_M * hypot(east, radians(other.lat_deg - one.lat_deg))
+
+
+def end_utc_us(record: WindowRecord) -> int | None:
+    """UTC at the end of a window [us]."""
+    return None if record.utc_us is None else record.utc_us + round(record.duration_s * 1e6)
+
+
+def utc(utc_us: int) -> datetime:
+    """An instant as a date and time."""
+    return _EPOCH + timedelta(microseconds=utc_us)
+
+
+def iso_utc(utc_us: int | None) -> str | None:
+    """An instant as ISO 8601 with milliseconds."""
+    return None if utc_us is None else utc(utc_us).replace(tzinfo=None).isoformat(timespec="milliseconds") + "Z"
+
+
+def class_limits_m_per_km(letter: str) -> tuple[float | None, float | None]:
+    """IRI at the lower and the upper end of a class [m/km]; None where it is open.
+
+    A class reaches from half to twice its geometric mean degree of roughness (ISO 8608, Table 2.2 of Blum 2015).
+    """
+    mean_gd_cm3 = CLASS_GD_N0_CM3[letter]
+    letters = tuple(CLASS_GD_N0_CM3)
+    lower = None if letter == letters[0] else iri_from_gd_n0(mean_gd_cm3 / 2)
+    upper = None if letter == letters[-1] else iri_from_gd_n0(mean_gd_cm3 * 2)
+    return lower, upper
+
+
+def _mean(weighted: Iterable[tuple[float | None, float]]) -> float | None:
+    known = [(value, weight) for value, weight in weighted if value is not None]
+    total = sum(weight for _, weight in known)
+    return sum(value * weight for value, weight in known) / total if total > 0 else None
+
+
+def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: tuple[str, ...],
+            name_of: Callable[[WindowRecord], str]) -> tuple[Share, ...]:
+    """Distance per name, all names that lie between the best and the worst that occur, then the rest."""
+    sums: dict[str, float] = dict.fromkeys(names, 0.0)
+    rest = 0.0
+    for record, length in zip(records, lengths_m, strict=True):
+        if name_of(record) in sums:
+            sums[name_of(record)] += length
+        else:
+            rest += length
+    total = sum(lengths_m)
+    if total <= 0:
+        return ()
+    worst = max((index for index, name in enumerate(names) if sums[name] > 0), default=-1)
+    shares = [Share(name, sums[name], sums[name] / total) for name in names[:worst + 1]]
+    return tuple([*shares, Share("", rest, rest / total)] if rest > 0 else shares)
+
+
+def _roughest(records: Sequence[WindowRecord]) -> tuple[Place, ...]:
+    candidates = [
+        Place(along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
+              record.iri_std_m_per_km, record.a_w_mps2, record.comfort, record.flags)
+        for record, along in zip(records, along_m(records), strict=True)
+        if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)
+    ]
+    found: list[Place] = []
+    for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
+        if all(_apart_m(place, other) >= APART_M for other in found):
+            found.append(place)
+            if len(found) == PLACES:
+                break
+    return tuple(found)
+
+
+def _apart_m(one: Place, other: Place) -> float:
+    ground_m = ground_distance_m(one, other)
+    return abs(one.along_m - other.along_m) if ground_m is None else ground_m
