@@ -1,0 +1,590 @@
+"""An accelerometer on a serial line: the PASCO PS-2119, or anything that sends samples or lines of text.
+
+The problem: what an AirLink 2 sends is not public, so what a frame means must stay out of the code until a real
+device has settled it. And a radio link delivers late and in bursts what the sensor measured at even intervals, while
+road roughness wants the time of each sample.
+
+The solution, three layers: a ``BytePort`` brings bytes, ``drivers.framing`` finds frames in them, and a profile says
+what a frame means. A profile is a data file: shipped ones lie in ``drivers/profiles``, anyone may name another by
+its path. ``SampleClock`` rebuilds the sample times from the arrival times.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib import resources
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+from drivers.errors import SettingsError
+from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
+from drivers.readings import AccelerationBlock
+
+STANDARD_GRAVITY_MPS2 = 9.80665
+
+WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
+UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}
+AXES = "xyz"
+PROFILE_BYTES_MAX = 65_536
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Raw counts of X, Y, Z at 0 g and at +1 g, each axis by itself."""
+
+    zero_g_raw: Triple
+    one_g_raw: Triple
+
+    def __post_init__(self) -> None:
+        if any(one == zero for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)):
+            raise SettingsError("calibration: expected different counts at 0 g and at 1 g on every axis")
+
+    @property
+    def mps2_per_count(self) -> Triple:
+        """Scale of X, Y, Z [m/s2 per count]."""
+        x, y, z = (
+            STANDARD_GRAVITY_MPS2 / (one - zero) for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)
+        )
+        return x, y, z
+
+
+@dataclass(frozen=True)
+class FrameLayout:
+    """Where X, Y and Z stand in a frame of fixed length, as 16-bit words.
+
+    valid_raw       (lowest, highest) count the sensor gives; there it is clipped, outside it is no sample
+    upright_axis    0, 1, 2: the axis along which the sensor feels gravity; None: mounted anyhow
+    """
+
+    length_bytes: int
+    sync: bytes
+    word: str
+    offsets: tuple[int, int, int]
+    valid_raw: tuple[int, int]
+    upright_axis: int | None
+    calibration: Calibration
+
+    def counts(self, frames: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+        """(..., length) bytes to (..., 3) counts of X, Y, Z."""
+        columns = [offset + byte for offset in self.offsets for byte in (0, 1)]
+        words = np.ascontiguousarray(frames[..., columns]).view(WORDS[self.word])
+        return words.astype(np.int64)
+
+    def plausible(self, frames: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+        """(n, length) bytes -> (n,): all three counts are such as the sensor gives."""
+        counts = self.counts(frames)
+        low, high = self.valid_raw
+        return np.asarray(((counts >= low) & (counts <= high)).all(axis=1))
+
+    def oriented(self, groups: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+        """(m, k, length) bytes -> (m,): over k frames gravity is felt along the upright axis (by the medians)."""
+        middle = np.sort(self.counts(groups), axis=1)[:, groups.shape[1] // 2]
+        accel = np.abs((middle - self.calibration.zero_g_raw) * self.calibration.mps2_per_count)
+        along: npt.NDArray[np.bool_] = np.argmax(accel, axis=1) == self.upright_axis
+        return along
+
+
+@dataclass(frozen=True)
+class LineLayout:
+    """Lines ``x,y,z``: m/s2 per unit, and where the range ends [in units]."""
+
+    unit_mps2: float
+    range_units: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What the bytes of a device mean. ``verified``: a real device has confirmed it. ``scale``: see below."""
+
+    name: str
+    version: int
+    verified: bool
+    source: str
+    rate_hz: float
+    clock_tolerance: float
+    layout: FrameLayout | LineLayout
+
+    @property
+    def scale(self) -> Triple:
+        """m/s2 per count or unit of X, Y, Z by the profile's own calibration."""
+        if isinstance(self.layout, FrameLayout):
+            return self.layout.calibration.mps2_per_count
+        return (self.layout.unit_mps2,) * 3
+
+
+def shipped_profiles() -> list[str]:
+    """Names of the profiles in the package."""
+    files = resources.files("drivers.profiles").iterdir()
+    return sorted(file.name.removesuffix(".yaml") for file in files if file.name.endswith(".yaml"))
+
+
+def load_profile(name_or_path: str | Path) -> Profile:
+    """A shipped profile by its name, or a user's own by its path (ending in .yaml or .yml).
+
+    Raises SettingsError naming file, key and what was expected.
+    """
+    place = str(name_or_path)
+    if place.endswith((".yaml", ".yml")):
+        try:
+            with Path(place).open("rb") as file:
+                text = file.read(PROFILE_BYTES_MAX + 1)
+        except OSError as error:
+            raise SettingsError(f"{place}: expected a readable profile file ({error.strerror})") from error
+    elif place in shipped_profiles():
+        place += ".yaml"
+        text = resources.files("drivers.profiles").joinpath(place).read_bytes()
+    else:
+        known = ", ".join(shipped_profiles())
+        raise SettingsError(f"profile {place!r}: expected one of {known}, or the path of a .yaml file")
+    if len(text) > PROFILE_BYTES_MAX:
+        raise SettingsError(f"{place}: expected at most {PROFILE_BYTES_MAX} bytes")
+    try:
+        content = yaml.safe_load(text)
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark else ""
+        raise SettingsError(f"{place}{line}: expected YAML") from error
+    return _profile(_Keys(place, "", content))
+
+
+class _Keys:
+    """The keys of one mapping in a profile file: each asked for once, none left over."""
+
+    def __init__(self, place: str, path: str, content: object) -> None:
+        self._place = place
+        self._path = path
+        if not isinstance(content, Mapping):
+            raise SettingsError(f"{place}: {path.rstrip('.') or 'file'}: expected keys with values")
+        self._content: dict[Any, Any] = dict(content)
+
+    def wrong(self, key: str, expected: str) -> SettingsError:
+        return SettingsError(f"{self._place}: {self._path}{key}: expected {expected}")
+
+    def _take(self, key: str, expected: str) -> Any:
+        if key not in self._content:
+            raise self.wrong(key, f"{expected}, but the key is missing")
+        return self._content.pop(key)
+
+    def inner(self, key: str) -> _Keys:
+        return _Keys(self._place, f"{self._path}{key}.", self._take(key, "keys with values"))
+
+    def text(self, key: str) -> str:
+        value = self._take(key, "text")
+        if not isinstance(value, str):
+            raise self.wrong(key, "text")
+        return value.strip()
+
+    def flag(self, key: str) -> bool:
+        value = self._take(key, "true or false")
+        if not isinstance(value, bool):
+            raise self.wrong(key, "true or false")
+        return value
+
+    def choice(self, key: str, options: list[str]) -> str:
+        expected = " or ".join(options)
+        value = self._take(key, expected)
+        if value not in options:
+            raise self.wrong(key, expected)
+        return str(value)
+
+    def number(self, key: str, low: float, high: float) -> float:
+        expected = f"a number from {low:g} to {high:g}"
+        return self._checked(key, self._take(key, expected), low, high, expected)
+
+    def whole(self, key: str, low: int, high: int) -> int:
+        expected = f"a whole number from {low} to {high}"
+        return self._whole(key, self._take(key, expected), low, high, expected)
+
+    def numbers(self, key: str, count: int, low: float, high: float) -> list[float]:
+        expected = f"a list of {count} numbers from {low:g} to {high:g}"
+        return [self._checked(key, value, low, high, expected) for value in self._list(key, count, expected)]
+
+    def wholes(self, key: str, count: int, low: int, high: int) -> list[int]:
+        expected = f"a list of {count} whole numbers from {low} to {high}"
+        return [self._whole(key, value, low, high, expected) for value in self._list(key, count, expected)]
+
+    def _list(self, key: str, count: int, expected: str) -> list[object]:
+        values = self._take(key, expected)
+        if not isinstance(values, list) or len(values) != count:
+            raise self.wrong(key, expected)
+        return values
+
+    def _checked(self, key: str, value: object, low: float, high: float, expected: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise self.wrong(key, expected)
+        return float(value)
+
+    def _whole(self, key: str, value: object, low: int, high: int, expected: str) -> int:
+        if not isinstance(value, int):
+            raise self.wrong(key, expected)
+        return int(self._checked(key, value, low, high, expected))
+
+    def finish(self) -> None:
+        for key in self._content:
+            raise self.wrong(str(key), "no such key")
+
+
+def _profile(keys: _Keys) -> Profile:
+    framing = keys.choice("framing", ["frames", "lines"])
+    layout = _frame_layout(keys.inner("frame")) if framing == "frames" else _line_layout(keys.inner("line"))
+    profile = Profile(
+        name=keys.text("name"),
+        version=keys.whole("version", 1, 1_000_000),
+        verified=keys.flag("verified"),
+        source=keys.text("source"),
+        rate_hz=keys.number("rate_hz", 1, 10_000),
+        clock_tolerance=keys.number("clock_tolerance_ppm", 1, 50_000) * 1e-6,
+        layout=layout,
+    )
+    keys.finish()
+    return profile
+
+
+def _frame_layout(keys: _Keys) -> FrameLayout:
+    length = keys.whole("length_bytes", 6, 256)
+    sync_text = keys.text("sync")
+    try:
+        sync = bytes.fromhex(sync_text)
+    except ValueError:
+        raise keys.wrong("sync", "bytes in hex, or empty") from None
+    if len(sync) > length - 6:
+        raise keys.wrong("sync", "start bytes that leave six bytes of the frame for X, Y, Z")
+    x, y, z = keys.wholes("offsets", 3, len(sync), length - 2)
+    low, high = keys.wholes("valid_raw", 2, -32768, 65535)
+    if low >= high:
+        raise keys.wrong("valid_raw", "the lower count first")
+    axis = keys.choice("upright_axis", [*AXES, "none"])
+    zero, one = (keys.numbers(key, 3, -32768, 65535) for key in ("zero_g_raw", "one_g_raw"))
+    if any(a == b for a, b in zip(zero, one, strict=True)):
+        raise keys.wrong("one_g_raw", "other counts than those of zero_g_raw")
+    layout = FrameLayout(
+        length_bytes=length,
+        sync=sync,
+        word=keys.choice("word", list(WORDS)),
+        offsets=(x, y, z),
+        valid_raw=(low, high),
+        upright_axis=None if axis == "none" else AXES.index(axis),
+        calibration=Calibration((zero[0], zero[1], zero[2]), (one[0], one[1], one[2])),
+    )
+    keys.finish()
+    return layout
+
+
+def _line_layout(keys: _Keys) -> LineLayout:
+    layout = LineLayout(UNITS_MPS2[keys.choice("unit", list(UNITS_MPS2))], keys.number("range", 1e-3, 1e4))
+    keys.finish()
+    return layout
+
+
+class SampleClock:
+    """Times of samples taken at even intervals, from the times at which they arrived.
+
+    A sample arrives a latency after it was taken that is never negative and now and then small. Arrival minus index
+    times period is therefore bounded below by the true time line, and the line is the lower envelope:
+
+    1. Settling. Samples are held for ``SETTLE_US`` of arrival time; the line starts at their lower envelope.
+    2. Following, in blocks of ``BLOCK`` samples. An arrival below the line pulls it down at once: no sample is later
+       than its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of
+       the least distance, at most by the tolerance of the clock. The period is the median of the slopes between the
+       lowest arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within
+       the tolerance of the nominal one.
+    3. Finding the line again. Arrivals more than ``OFF_US`` late are held. If one comes back to the line within
+       ``SETTLE_US``, they were a jam in the link and keep their places on the line. If not, samples were lost: the
+       clock settles anew behind the hole. Arrivals that much too early make it settle anew at once.
+
+    Times come out in whole microseconds, strictly increasing (where they must, by 1 us), and do not depend on how
+    the arrivals were cut into calls. The smallest latency cannot be known and stays in the times.
+    """
+
+    SETTLE_US = 300_000
+    OFF_US = 250_000
+    HELD_MAX = 4096
+    BLOCK = 128
+    BLOCKS = 8
+    GAIN = 0.25
+
+    def __init__(self, rate_hz: float, tolerance: float) -> None:
+        nominal_us = 1e6 / rate_hz
+        self._shortest_us = nominal_us * (1 - tolerance)
+        self._longest_us = nominal_us * (1 + tolerance)
+        self._climb_us_max = nominal_us * tolerance
+        self._period_us = nominal_us
+        self._held = np.empty(0, dtype=np.int64)
+        self._last_us = -(2**62)
+        self._points: list[tuple[int, int]] = []
+        self._lowest = (0, 0)
+        self._number = 0
+        self._following = False
+        self.resyncs = 0
+        self._begin_block(0.0, nominal_us)
+
+    def feed(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Take (n,) arrivals, not decreasing; return the times [us] of the next samples that are certain, (m,)."""
+        waiting = np.concatenate((self._held, arrivals_us))
+        times = [np.empty(0, dtype=np.int64)]
+        while len(waiting):
+            count = self._on_line(waiting) if self._following else self._ripe(waiting)
+            if count is None:
+                self._following = False
+                self.resyncs += 1
+                continue
+            if count == 0:
+                break
+            accept = self._follow if self._following else self._settle
+            times.append(self._increasing(accept(waiting[:count])))
+            waiting = waiting[count:]
+        self._held = waiting
+        return np.concatenate(times)
+
+    def restart(self) -> npt.NDArray[np.int64]:
+        """Samples may be missing from here on: settle anew. Returns the times of those held so far."""
+        held, self._held = self._held, np.empty(0, dtype=np.int64)
+        times = self._increasing(self._settle(held)) if len(held) else held
+        self._following = False
+        return times
+
+    def _ripe(self, waiting: npt.NDArray[np.int64]) -> int:
+        """How many of the first samples are to settle together; 0 when more may belong to them."""
+        count = int(np.searchsorted(waiting, waiting[0] + self.SETTLE_US))
+        if count == len(waiting) < self.HELD_MAX:
+            return 0
+        return min(count, self.HELD_MAX)
+
+    def _on_line(self, waiting: npt.NDArray[np.int64]) -> int | None:
+        """How many of the first samples belong to the line; 0 when that is open, None when the line is lost."""
+        above_us = waiting[: self.BLOCK - self._index] - self._line(min(len(waiting), self.BLOCK - self._index))
+        off = np.abs(above_us) > self.OFF_US
+        if not off[0]:
+            return int(np.argmax(off)) if off.any() else len(off)
+        if above_us[0] < 0:
+            return None
+        waiting = waiting[: self.HELD_MAX]
+        returned = waiting - self._line(len(waiting)) <= self.OFF_US
+        ripe = self._ripe(waiting)
+        back = int(np.argmax(returned)) if returned.any() else len(waiting)
+        if back < len(waiting) and (ripe == 0 or back <= ripe):
+            return back
+        return None if ripe else 0
+
+    def _line(self, count: int) -> npt.NDArray[np.float64]:
+        """The line [us] at the next samples, as it was drawn at the beginning of the block."""
+        return self._base_us + self._step_us * np.arange(self._index, self._index + count, dtype=np.float64)
+
+    def _settle(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        """Start a line below all arrivals."""
+        run_us = self._period_us * np.arange(len(arrivals_us), dtype=np.float64)
+        lowest = int(np.argmin(arrivals_us - run_us))
+        start_us = float(arrivals_us[lowest] - run_us[lowest])
+        self._points = [(lowest, int(arrivals_us[lowest]))]
+        self._number = len(arrivals_us)
+        self._following = True
+        self._begin_block(start_us + self._period_us * len(arrivals_us), self._period_us)
+        return start_us + run_us
+
+    def _begin_block(self, base_us: float, step_us: float) -> None:
+        self._base_us = base_us
+        self._step_us = step_us
+        self._index = 0
+        self._pulled_us = 0.0
+        self._least_us = np.inf
+
+    def _follow(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        """Times of samples that belong to the line."""
+        times = []
+        while len(arrivals_us):
+            part = arrivals_us[: self.BLOCK - self._index]
+            line_us = self._line(len(part))
+            above_us = part - line_us
+            lowest = int(np.argmin(above_us))
+            if above_us[lowest] < self._least_us:
+                self._least_us = float(above_us[lowest])
+                self._lowest = (self._number + self._index + lowest, int(part[lowest]))
+            pulled_us: npt.NDArray[np.float64] = np.minimum.accumulate(np.minimum(above_us, self._pulled_us))
+            self._pulled_us = float(pulled_us[-1])
+            times.append(line_us + pulled_us)
+            self._index += len(part)
+            if self._index == self.BLOCK:
+                self._next_block()
+            arrivals_us = arrivals_us[len(part) :]
+        return np.concatenate(times)
+
+    def _next_block(self) -> None:
+        self._points = [*self._points, self._lowest][-self.BLOCKS :]
+        self._number += self.BLOCK
+        if len(self._points) >= 3:
+            slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in combinations(self._points, 2)]
+            self._period_us = min(max(float(np.median(slopes)), self._shortest_us), self._longest_us)
+        climb_us = min(self.GAIN * max(self._least_us, 0.0) / self.BLOCK, self._climb_us_max)
+        self._begin_block(self._base_us + self._step_us * self.BLOCK + self._pulled_us, self._period_us + climb_us)
+
+    def _increasing(self, times_us: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+        """Whole microseconds, each at least one later than the one before."""
+        steps = np.arange(len(times_us))
+        whole = np.floor(times_us).astype(np.int64) - steps
+        times: npt.NDArray[np.int64] = np.maximum.accumulate(np.maximum(whole, self._last_us + 1)) + steps
+        self._last_us = int(times[-1])
+        return times
+
+
+class _Samples(NamedTuple):
+    """Decoded samples, before they have their times: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
+
+    after_loss: bool
+    offsets: npt.NDArray[np.int64]
+    accel_mps2: npt.NDArray[np.float64]
+    clipped: npt.NDArray[np.bool_]
+    good: npt.NDArray[np.bool_]
+
+
+class _FrameReader:
+    """Bytes to samples by a frame layout."""
+
+    def __init__(self, layout: FrameLayout) -> None:
+        told_by_gravity = layout.upright_axis is not None and not layout.sync
+        self._layout = layout
+        self.framer = FixedFramer(
+            layout.length_bytes, layout.plausible, layout.oriented if told_by_gravity else None, layout.sync
+        )
+
+    def read(self, data: bytes) -> list[_Samples]:
+        return [self._samples(frame) for frame in self.framer.feed(data)]
+
+    def _samples(self, run: Frame) -> _Samples:
+        layout = self._layout
+        frames = np.frombuffer(run.data, dtype=np.uint8).reshape(-1, layout.length_bytes)
+        counts = layout.counts(frames)
+        low, high = layout.valid_raw
+        calibration = layout.calibration
+        zero_raw, scale_mps2 = np.array((calibration.zero_g_raw, calibration.mps2_per_count), dtype=np.float64)
+        accel_mps2: npt.NDArray[np.float64] = (counts - zero_raw) * scale_mps2
+        offsets = run.start + layout.length_bytes * np.arange(len(frames), dtype=np.int64)
+        clipped = np.asarray(((counts <= low) | (counts >= high)).any(axis=1))
+        return _Samples(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
+
+
+_DECIMAL = rb" *([+-]?(?:\d{1,6}(?:\.\d{0,12})?|\.\d{1,12})) *"
+_LINE = re.compile(_DECIMAL + rb"," + _DECIMAL + rb"," + _DECIMAL + rb"(?:\*([0-9A-Fa-f]{2}) *)?")
+_NO_SAMPLE = (np.nan, np.nan, np.nan)
+
+
+class _LineReader:
+    """Lines of text to samples. A bad line still takes the place of one sample."""
+
+    def __init__(self, layout: LineLayout) -> None:
+        self._layout = layout
+        self.framer = LineFramer()
+
+    def read(self, data: bytes) -> list[_Samples]:
+        frames = self.framer.feed(data)
+        cuts = [0, *(k for k, frame in enumerate(frames) if k and frame.after_loss), len(frames)]
+        return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
+
+    def _samples(self, lines: list[Frame]) -> _Samples:
+        values = np.array([_triple(line.data) for line in lines], dtype=np.float64)
+        largest = np.abs(values).max(axis=1)
+        return _Samples(
+            lines[0].after_loss,
+            np.array([line.start for line in lines], dtype=np.int64),
+            values * self._layout.unit_mps2,
+            largest >= self._layout.range_units,
+            largest <= 2 * self._layout.range_units,
+        )
+
+
+def _triple(line: bytes) -> Triple:
+    """The three numbers of a line; not-a-numbers when it is damaged."""
+    match = _LINE.fullmatch(line)
+    if match is None or (match[4] and exclusive_or(line[: line.index(b"*")]) != int(match[4], 16)):
+        return _NO_SAMPLE
+    return float(match[1]), float(match[2]), float(match[3])
+
+
+@dataclass(frozen=True)
+class PascoCounters:
+    """What came in so far.
+
+    frames          good ones
+    bad_frames      in their place, but with values or a checksum that cannot be
+    dropped_bytes   bytes that belonged to no frame
+    resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
+    """
+
+    frames: int
+    bad_frames: int
+    dropped_bytes: int
+    resyncs: int
+
+
+class PascoDecoder:
+    """Bytes of the device in, blocks of acceleration out, by a profile. Raises nothing, whatever the bytes.
+
+    calibration   of this very unit, instead of the profile's; SettingsError where the profile has no raw counts
+
+    At the start and after a hole in the bytes the sample clock settles: 0.3 s of samples come out together, and are
+    lost if the stream ends before. A bad frame is left out and counted. What ``take`` returns over time does not
+    depend on when it is called.
+    """
+
+    def __init__(self, profile: Profile, calibration: Calibration | None = None) -> None:
+        self._reader: _FrameReader | _LineReader
+        if isinstance(profile.layout, FrameLayout):
+            layout = profile.layout if calibration is None else replace(profile.layout, calibration=calibration)
+            self._reader = _FrameReader(layout)
+        elif calibration is None:
+            self._reader = _LineReader(profile.layout)
+        else:
+            raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
+        self._clock = SampleClock(profile.rate_hz, profile.clock_tolerance)
+        self._arrivals = Arrivals()
+        self._chunks: list[bytes] = []
+        self._untimed: list[_Samples] = []
+        self._frames = 0
+        self._bad_frames = 0
+
+    @property
+    def counters(self) -> PascoCounters:
+        """What came in so far and was taken."""
+        return PascoCounters(self._frames, self._bad_frames, self._reader.framer.dropped_bytes, self._clock.resyncs)
+
+    def feed(self, t_us: int, data: bytes) -> None:
+        """Take the bytes that arrived at ``t_us`` [us, monotonic]."""
+        self._arrivals.note(t_us, len(data))
+        self._chunks.append(data)
+
+    def take(self) -> AccelerationBlock:
+        """All samples that are complete and have their times, oldest first; may be none."""
+        samples = self._reader.read(b"".join(self._chunks))
+        self._chunks.clear()
+        times = [np.empty(0, dtype=np.int64)]
+        for some in samples:
+            if some.after_loss:
+                times.append(self._clock.restart())
+            times.append(self._clock.feed(self._arrivals.many(some.offsets)))
+            good = int(some.good.sum())
+            self._frames += good
+            self._bad_frames += len(some.good) - good
+        self._arrivals.forget(self._reader.framer.position)
+        self._untimed += samples
+        return self._timed(np.concatenate(times))
+
+    def _timed(self, t_us: npt.NDArray[np.int64]) -> AccelerationBlock:
+        """Give the oldest samples their times; the others wait."""
+        if len(t_us) == 0:
+            return AccelerationBlock(t_us, np.empty((0, 3)), np.empty(0, dtype=np.bool_))
+        accel_mps2 = np.concatenate([some.accel_mps2 for some in self._untimed])
+        clipped = np.concatenate([some.clipped for some in self._untimed])
+        good = np.concatenate([some.good for some in self._untimed])
+        n = len(t_us)
+        no_offsets = np.empty(0, dtype=np.int64)
+        self._untimed = [_Samples(False, no_offsets, accel_mps2[n:], clipped[n:], good[n:])]
+        keep = good[:n]
+        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep])
