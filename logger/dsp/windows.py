@@ -55,6 +55,14 @@ class GridSamples:
         return GridSamples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 
+def joined(parts: list[GridSamples]) -> GridSamples:
+    """Consecutive samples as one; at least one part."""
+    if len(parts) == 1:
+        return parts[0]
+    names = GridSamples.__dataclass_fields__
+    return GridSamples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
 @dataclass(frozen=True)
 class Window:
     """What one window holds. Figures are nan when too few of its samples are good."""

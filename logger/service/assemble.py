@@ -10,7 +10,7 @@ from typing import Any
 from drivers.bma220 import Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.dump import DumpHeader
 from drivers.nmea import NmeaDecoder
-from drivers.pasco import PascoDecoder, load_profile
+from drivers.pasco import FrameLayout, PascoDecoder, Profile, load_profile
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.roads.from_acceleration import RmsRelation, rms_relation
@@ -58,7 +58,7 @@ def instrument(config: AccelerometerConfig) -> Instrument:
             "oversample": chip.oversample,
         }
         return Instrument(Bma220Decoder(chip.range_g), chip.oversample, noise_mps2, description)
-    profile = load_profile(config.pasco.profile)
+    profile = _mounted(load_profile(config.pasco.profile), Axis.from_word(config.vertical_axis))
     if not profile.verified and not config.pasco.accept_unverified:
         raise BadInput(
             f"profile {profile.name} is unverified: nobody has compared it with a real device; "
@@ -69,7 +69,7 @@ def instrument(config: AccelerometerConfig) -> Instrument:
         "profile": profile.name,
         "profile_version": profile.version,
         "verified": profile.verified,
-        "calibration": config.pasco.calibration,
+        "calibration": asdict(config.pasco.calibration) if config.pasco.calibration else None,
     }
     decoder = PascoDecoder(profile, config.pasco.calibration)
     return Instrument(decoder, 1, SERIAL_NOISE_MPS2, description)
@@ -147,6 +147,13 @@ def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None) -> 
             f"{', '.join(vehicle_names())}"
         )
     return replace(config, accelerometer=replace(sensor, bma220=chip, pasco=serial), vehicle=path)
+
+
+def _mounted(profile: Profile, up: Axis) -> Profile:
+    """The profile for a sensor mounted this way: frames without start bytes are told apart by gravity."""
+    if not isinstance(profile.layout, FrameLayout) or profile.layout.upright_axis is None:
+        return profile
+    return replace(profile, layout=replace(profile.layout, upright_axis=up.column))
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ is not `settled` until they have forgotten the start.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,8 @@ from drivers.readings import AccelerationBlock
 from logger.comfort.iso2631 import RunningRms
 from logger.dsp.resample import Decimator, GridResampler, GridRun
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
-from logger.dsp.weightings.weighting import Weighting
-from logger.dsp.windows import GridSamples
+from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
+from logger.dsp.windows import GridSamples, joined
 from logger.units import US_PER_S
 
 GRID_RATE_HZ = 100
@@ -28,10 +28,12 @@ GRID_STEP_US = US_PER_S // GRID_RATE_HZ
 GRAVITY_CORNER_HZ = 0.2
 SETTLING_S = 4.0
 LINE_OVER_HOLE_US = 500_000
-SILENCE_US = 1_000_000
+SILENCE_US = 2_000_000
 START_MEAN_SAMPLES = 50
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Times = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -63,19 +65,22 @@ class SignalChain:
         self._low_pass = BlockFilter(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ)) if low_pass_hz else None
         self._weighting = BlockFilter(np.asarray(weighting.sections[GRID_RATE_HZ]))
         self._running = RunningRms(GRID_RATE_HZ)
+        self._unweighted: GridSamples | None = None
         self._next_us: int | None = None
         self._last_mps2: float | None = None
         self._since_start = 0
+        self.late_samples = 0
 
     def push(self, block: AccelerationBlock) -> list[GridSamples]:
         """More samples of the sensor; gives what is ready on the grid."""
         if not len(block):
             return []
         vertical = self._axis.sign * block.accel_mps2[:, self._axis.column]
-        return self._filtered(self._resampler.push(block.t_us, vertical, block.clipped))
+        first = self._first_in_time(block.t_us)
+        return self._thinned(self._resampler.push(block.t_us[first:], vertical[first:], block.clipped[first:]))
 
     def advance(self, start_us: int, now_us: int) -> list[GridSamples]:
-        """Let time pass. A sensor that has been silent for a second is missing from the grid up to then;
+        """Let time pass. A sensor that has been silent for two seconds is missing from the grid up to then;
         ``start_us`` is when the drive began, for a sensor that has not spoken yet."""
         begun_us = self._next_us if self._next_us is not None else start_us
         missing_until_us = now_us - SILENCE_US
@@ -85,34 +90,43 @@ class SignalChain:
         begun_us = self._next_us if self._next_us is not None else start_us
         if begun_us < missing_until_us:
             out.append(self._absent(begun_us, missing_until_us))
-            self._last_mps2 = None
         return out
 
     def flush(self) -> list[GridSamples]:
-        """What is still inside the resampler and the decimator."""
-        out = self._filtered(self._resampler.flush())
-        rest = self._decimator.flush()
-        return out + [self._samples(run) for run in rest]
+        """What is still inside, up to the last sample; the filters start anew with the next one."""
+        out = self._thinned(self._resampler.flush())
+        out += self._filtered(self._decimator.flush())
+        out += self._overdue()
+        self._last_mps2 = None
+        return out
+
+    def _first_in_time(self, t_us: Times) -> int:
+        """Index of the first sample that is not older than what has already been given up as missing."""
+        if self._last_mps2 is not None or self._next_us is None:
+            return 0
+        first = int(np.searchsorted(t_us, self._next_us))
+        self.late_samples += first
+        return first
+
+    def _thinned(self, runs: list[GridRun]) -> list[GridSamples]:
+        return [part for run in runs for part in self._filtered(self._decimator.push(run))]
 
     def _filtered(self, runs: list[GridRun]) -> list[GridSamples]:
         out = []
-        for fine in runs:
-            for run in self._decimator.push(fine):
-                if run.new_start:
-                    out += self._start_anew(run)
-                out.append(self._samples(run))
+        for run in runs:
+            if run.new_start:
+                out += self._start_anew(run)
+            out += self._samples(run)
         return out
 
     def _start_anew(self, run: GridRun) -> list[GridSamples]:
         """Before the first run and between two: what is missing, and the state of the filters."""
-        out = []
         hole_us = run.t0_us - self._next_us if self._next_us is not None else 0
-        if self._next_us is not None and hole_us >= GRID_STEP_US // 2:
-            if self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:
-                return [self._line(self._next_us, run.t0_us, float(run.values[0]))]
+        if self._next_us is not None and self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:
+            return self._line(self._next_us, run.t0_us, self._last_mps2, float(run.values[0]))
+        out = self._overdue()
+        if self._next_us is not None:
             out.append(self._absent(self._next_us, run.t0_us))
-        elif self._last_mps2 is not None:
-            return out
         self._reset(float(np.mean(run.values[:START_MEAN_SAMPLES])))
         return out
 
@@ -122,46 +136,67 @@ class SignalChain:
         if self._low_pass is not None:
             self._low_pass.reset(level_mps2)
         self._running.reset()
+        self._unweighted = None
         self._since_start = 0
 
-    def _line(self, begin_us: int, end_us: int, next_mps2: float) -> GridSamples:
-        t_us = np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
-        assert self._last_mps2 is not None
-        knots_us = [begin_us - GRID_STEP_US, end_us]
-        values = np.interp(t_us, knots_us, [self._last_mps2, next_mps2])
+    def _line(self, begin_us: int, end_us: int, from_mps2: float, to_mps2: float) -> list[GridSamples]:
+        t_us = _grid_us(begin_us, end_us)
+        if not len(t_us):
+            return []
+        values = np.interp(t_us, [begin_us - GRID_STEP_US, end_us], [from_mps2, to_mps2])
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
         return self._filter(t_us, values, present=nowhere, interpolated=nowhere, clipped=nowhere)
 
     def _absent(self, begin_us: int, end_us: int) -> GridSamples:
-        t_us = np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
-        self._next_us = int(t_us[-1]) + GRID_STEP_US if len(t_us) else begin_us
+        t_us = _grid_us(begin_us, end_us)
+        if len(t_us):
+            self._next_us = int(t_us[-1]) + GRID_STEP_US
         zero = np.zeros(len(t_us))
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
         return GridSamples(t_us, zero, zero, zero, nowhere, nowhere, nowhere, nowhere)
 
-    def _samples(self, run: GridRun) -> GridSamples:
+    def _samples(self, run: GridRun) -> list[GridSamples]:
         t_us = run.t0_us + GRID_STEP_US * np.arange(len(run.values), dtype=np.int64)
-        self._last_mps2 = float(run.values[-1])
         everywhere = np.ones(len(t_us), dtype=np.bool_)
         return self._filter(t_us, run.values, present=everywhere, interpolated=run.bridged, clipped=run.clipped)
 
-    def _filter(
-        self,
-        t_us: npt.NDArray[np.int64],
-        values: Floats,
-        present: npt.NDArray[np.bool_],
-        interpolated: npt.NDArray[np.bool_],
-        clipped: npt.NDArray[np.bool_],
-    ) -> GridSamples:
+    def _filter(self, t_us: Times, values: Floats, present: Bools, interpolated: Bools, clipped: Bools
+                ) -> list[GridSamples]:
+        """Run the filters over more samples. The weighting is a whole sample behind, so as many samples wait for it."""
+        self._next_us = int(t_us[-1]) + GRID_STEP_US
+        self._last_mps2 = float(values[-1])
         if self._low_pass is not None:
             values = self._low_pass.process(values)
         accel = self._high_pass.process(values)
-        weighted = self._weighting.process(values)
         settled = self._since_start + np.arange(len(values)) >= SETTLING_S * GRID_RATE_HZ
         self._since_start += len(values)
-        self._next_us = int(t_us[-1]) + GRID_STEP_US if len(t_us) else self._next_us
-        running = self._running.process(weighted)
-        return GridSamples(t_us, accel, weighted, running, present, interpolated, settled, clipped)
+        weighted = self._weighting.process(values)
+        blank = np.zeros(len(values))
+        waiting = GridSamples(t_us, accel, blank, blank, present, interpolated, settled, clipped)
+        if self._unweighted is None:
+            weighted = weighted[DELAY_SAMPLES:]
+        else:
+            waiting = joined([self._unweighted, waiting])
+        self._unweighted = waiting.part(len(weighted), len(waiting))
+        return self._weighed(waiting.part(0, len(weighted)), weighted)
+
+    def _overdue(self) -> list[GridSamples]:
+        """The samples that still wait for the weighting, at the end of a run: it is fed the last value once more."""
+        waiting, self._unweighted = self._unweighted, None
+        if waiting is None or self._last_mps2 is None:
+            return []
+        return self._weighed(waiting, self._weighting.process(np.full(len(waiting), self._last_mps2)))
+
+    def _weighed(self, samples: GridSamples, weighted_mps2: Floats) -> list[GridSamples]:
+        if not len(samples):
+            return []
+        running = self._running.process(weighted_mps2)
+        return [replace(samples, weighted_mps2=weighted_mps2, running_rms_mps2=running)]
+
+
+def _grid_us(begin_us: int, end_us: int) -> Times:
+    """Instants of the grid from ``begin_us`` to half a step before ``end_us``."""
+    return np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
 
 
 def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import shutil
-from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
 
+from drivers.bma220 import gravity_warning
 from drivers.nmea import NmeaDecoder
 from logger.service.config import Config
 from logger.service.core import Core
@@ -51,6 +53,7 @@ class Observer:
         self._rows = 0
         self._row_us: int | None = None
         self._failed = False
+        self._warned_of_gravity = False
 
     def write(self, now_us: int) -> None:
         """Renew the status file; once a minute a line in the log."""
@@ -63,6 +66,7 @@ class Observer:
             if not self._failed:
                 log.warning("status file %s: %s", self._config.status_file, error.strerror)
             self._failed = True
+        self._look_at_gravity()
         if now_us - self._told_us >= HEALTH_LINE_US:
             self._told_us = now_us
             log.info("%s", self.line())
@@ -87,7 +91,7 @@ class Observer:
             uptime_s=(now_us - self._began_us) / US_PER_S,
             updated_t_us=now_us,
             accelerometer=self._sensor("accelerometer", now_us, self._accelerometer_place(), self._core.samples),
-            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes, self._decoder.counters),
+            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes, asdict(self._decoder.counters)),
             fix_valid=fix.valid if fix else None,
             satellites=fix.satellites if fix else None,
             utc_known=self._core.utc_known,
@@ -99,11 +103,22 @@ class Observer:
             last_window=self._core.last_record,
             counters={
                 "missed_samples": self._deadlines.missed,
+                "late_samples": self._pipeline.late_samples,
                 "bad_events": self._core.bad_events,
                 "time_jumps": self._pipeline.timebase.time_jumps,
                 "rejected_fixes": self._pipeline.odometer.rejected_fixes,
             },
         )
+
+    def _look_at_gravity(self) -> None:
+        """Tell, once, when the samples cannot be those of a car that stands on the earth."""
+        block = self._core.last_block
+        if block is None or self._config.accelerometer.driver != "bma220":
+            return
+        warning = gravity_warning(block, self._config.accelerometer.bma220.range_g)
+        if warning is not None and not self._warned_of_gravity:
+            log.warning("%s", warning)
+        self._warned_of_gravity = warning is not None
 
     def _state(self, now_us: int) -> ServiceState:
         if not self._core.samples and not self._core.rows:
@@ -112,7 +127,7 @@ class Observer:
         return "recording" if recent else "standing"
 
     def _sensor(
-        self, name: str, now_us: int, place: str, readings: int, counters: Counter[str] | None = None
+        self, name: str, now_us: int, place: str, readings: int, counters: Mapping[str, int] | None = None
     ) -> SensorStatus:
         part = self._sensors[name]
         state = part.state()

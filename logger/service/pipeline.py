@@ -8,14 +8,14 @@ is known, over a short loss bridged, and when no fix has come for longer than th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
 
 from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
-from logger.dsp.windows import GridSamples, Window, WindowCutter, runs_of_equal
+from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.records import WindowRecord
 from logger.roads.from_acceleration import RmsRelation, iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain
@@ -87,6 +87,11 @@ class Pipeline:
         self._pending += self._chain.flush()
         return self._recorded(self._release(None) + self._cutter.break_off())
 
+    @property
+    def late_samples(self) -> int:
+        """Samples that came after their time had been given up as missing."""
+        return self._chain.late_samples
+
     def _settled_until_us(self, now_us: int) -> int:
         """Samples before this instant will not learn more about their motion."""
         last_us = self.odometer.last_t_us
@@ -98,7 +103,7 @@ class Pipeline:
     def _release(self, until_us: int | None) -> list[Window]:
         if not self._pending:
             return []
-        waiting = _joined(self._pending)
+        waiting = joined(self._pending)
         count = len(waiting) if until_us is None else int(np.searchsorted(waiting.t_us, until_us))
         self._pending = [waiting.part(count, len(waiting))] if count < len(waiting) else []
         if not count:
@@ -193,12 +198,6 @@ class Pipeline:
         if window.start_m is None or window.end_m is None:
             return None
         return self.odometer.place(0.5 * (window.start_m + window.end_m), window.leg)
-
-
-def _joined(parts: list[GridSamples]) -> GridSamples:
-    if len(parts) == 1:
-        return parts[0]
-    return GridSamples(*(np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(GridSamples)))
 
 
 def _known(value: float) -> float | None:

@@ -69,8 +69,10 @@ class Bma220Source:
         return Event(t_us, self.name, data)
 
     def close(self) -> None:
-        """Let go of the bus; the chip is left running."""
-        bus, self._bus, self._device = self._bus, None, None
+        """Suspend the chip if it can still be told, and let go of the bus."""
+        bus, device, self._bus, self._device = self._bus, self._device, None, None
+        if device is not None:
+            device.stop()
         if bus is not None:
             bus.close()
 

@@ -18,13 +18,14 @@ import tty
 from pathlib import Path
 
 import numpy as np
-from figures import Figures
 
 from drivers.dump import Event, open_dump
 from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+
+from figures import Figures
 
 STEP_US = 10_000
 WARM_UP_S = 5.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -59,7 +61,7 @@ def test_portions_do_not_matter(cuts: list[int], seed: int) -> None:
     def cut(edges: list[int]) -> list[Window]:
         cutter = WindowCutter(WINDOW_M, 5.0, STEP_US)
         windows = []
-        for low, high in zip([0, *edges], [*edges, count], strict=True):
+        for low, high in pairwise([0, *edges, count]):
             windows += push(cutter, part.part(low, high), distance_m[low:high], speed_mps[low:high])
         return windows + cutter.break_off()
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from replaying import core_for, rows_of
-
 from drivers.dump import Event
 from logger.demo.simulated_drive import Drive
 from logger.errors import BadInput
+
+from replaying import core_for, rows_of
 
 
 @pytest.fixture(scope="module")

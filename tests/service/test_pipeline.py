@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from replaying import rows_of
 
 from drivers.bma220 import Bma220Decoder
 from logger.demo.simulated_drive import Drive
+from logger.dsp.resample import GridResampler
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.records import WindowRecord
 from logger.service.config import Config, GpsConfig
 from logger.service.odometer import EARTH_RADIUS_M
+
+from replaying import rows_of
 
 CONFIG = Config(gps=GpsConfig(latency_s=0.15))
 
@@ -34,7 +37,7 @@ def at(drive: Drive, record: WindowRecord, offset_s: float) -> int:
 
 
 def test_windows_follow_one_another_without_hole(placed: list[WindowRecord]) -> None:
-    for before, after in zip(placed[:-1], placed[1:], strict=True):
+    for before, after in pairwise(placed):
         assert before.distance_end_m == after.distance_start_m
         assert before.t_us < after.t_us
 
@@ -58,9 +61,11 @@ def test_places_are_within_the_receivers_error(short_drive: Drive, placed: list[
         i = at(short_drive, record, record.duration_s / 2)
         north = np.radians(record.lat_deg - short_drive.motion.lat_deg[i]) * EARTH_RADIUS_M
         east = np.radians(record.lon_deg - short_drive.motion.lon_deg[i]) * EARTH_RADIUS_M * np.cos(np.radians(39))
-        errors_m.append(float(np.hypot(north, east)))
-    assert np.median(errors_m) < 1.5
-    assert max(errors_m) < 4.0
+        errors_m.append((north, east))
+    error_m = np.array(errors_m)
+    # The receiver is off by a metre or two for minutes; what the logger adds to that is seen from window to window.
+    assert np.hypot(*error_m.mean(axis=0)) < 3.0
+    assert np.hypot(*error_m.std(axis=0)) < 0.7
 
 
 def test_utc_is_that_of_the_receiver(short_drive: Drive, records: list[WindowRecord]) -> None:
@@ -101,10 +106,11 @@ def test_comfort_is_that_of_the_exact_weighting_of_the_same_samples(
     for event in events:
         decoder.feed(event.t_us, event.data)
     block = decoder.take()
-    level = block.accel_mps2[:, 2].mean()
-    # The same samples on the same grid: a host-paced sensor sits on it within tens of microseconds.
-    grid_us = np.arange(block.t_us[0], block.t_us[-1], 10_000)
-    values = np.interp(grid_us, block.t_us, block.accel_mps2[:, 2]) - level
+    resampler = GridResampler(100)
+    runs = resampler.push(block.t_us, block.accel_mps2[:, 2], block.clipped) + resampler.flush()
+    values = np.concatenate([run.values for run in runs])
+    values -= values.mean()
+    grid_us = runs[0].t0_us + 10_000 * np.arange(len(values))
     count = 1 << int(np.ceil(np.log2(2 * len(values))))
     f_hz = np.fft.rfftfreq(count, 0.01)
     response = np.zeros(len(f_hz), dtype=complex)
