@@ -12,7 +12,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.report.page import LoggedFile, page
 from logger.report.summary import summarise, summary_json
 from logger.store.rotation import LogName, read_sidecar
-from logger.store.segment_log import scan
+from logger.store.segment_log import read_log
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,14 +73,11 @@ def find_logs(place: Path) -> list[Path]:
 def read_logged(log: Path) -> LoggedFile:
     """Read a log, damaged or not, and what lies beside it. Raises BadInput for a file that cannot be opened."""
     try:
-        with log.open("rb") as file:
-            rows = list(scan(file))
+        content = read_log(log)
     except OSError as error:
         raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
     try:
         sidecar = read_sidecar(log)
     except (ValueError, RecursionError):
         sidecar = None
-    records = [row.record for row in rows if row.record is not None]
-    damaged = sum(row.record is None for row in rows)
-    return LoggedFile(log.name, records, damaged, sidecar)
+    return LoggedFile(log.name, content.records, content.damaged_lines, sidecar)

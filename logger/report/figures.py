@@ -13,7 +13,8 @@ from math import ceil, floor, log10
 
 WIDTH = 1000
 _HEIGHT = 190
-_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 46, 14, 34
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 60, 14, 34
+_NAME_ROOM = 11
 MAX_POINTS = 4000
 """More points than this are drawn as means of neighbours: a screen has no more columns."""
 
@@ -63,7 +64,7 @@ def line_figure(plot: Plot) -> str:
               for tick in y_ticks]
     parts += [f'<text class="tick" x="{frame.x(tick * 1000):.1f}" y="{_HEIGHT - _BOTTOM + 18}" '
               f'text-anchor="middle">{tick:g}</text>' for tick in x_ticks]
-    parts += [_level(frame, level) for level in plot.levels if level.value < frame.top]
+    parts += _levels(frame, plot.levels)
     parts.append(f'<text class="tick" x="{WIDTH - _RIGHT}" y="{_HEIGHT - 2}" text-anchor="end">distance [km]</text>')
     if errors:
         parts.append(f'<path class="band" d="{_band(frame, along_m, values, errors, runs)}"/>')
@@ -107,10 +108,19 @@ class _Frame:
         return _TOP + (_HEIGHT - _TOP - _BOTTOM) * (1 - share)
 
 
-def _level(frame: _Frame, level: Level) -> str:
-    y = frame.y(level.value)
-    return (f'<path class="level" d="M{_LEFT} {y:.1f}H{WIDTH - _RIGHT}"/>'
-            f'<text class="tick" x="{WIDTH - _RIGHT + 6}" y="{y + 4:.1f}">{escape(level.name)}</text>')
+def _levels(frame: _Frame, levels: Sequence[Level]) -> list[str]:
+    """The lines of the levels; a name where the one above it leaves room."""
+    parts = []
+    named_y = 0.0
+    for level in sorted(levels, key=lambda level: -level.value):
+        y = frame.y(level.value)
+        if level.value >= frame.top:
+            continue
+        parts.append(f'<path class="level" d="M{_LEFT} {y:.1f}H{WIDTH - _RIGHT}"/>')
+        if y - named_y >= _NAME_ROOM:
+            named_y = y
+            parts.append(f'<text class="tick" x="{WIDTH - _RIGHT + 6}" y="{y + 4:.1f}">{escape(level.name)}</text>')
+    return parts
 
 
 def _thinned(plot: Plot) -> tuple[list[float], list[Value], list[Value], int]:

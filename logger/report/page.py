@@ -14,12 +14,13 @@ from html import escape
 from itertools import accumulate
 from typing import Any
 
+from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.records import WindowRecord
 from logger.report.figures import Level, Plot, line_figure
 from logger.report.maps import Colouring, track_map
 from logger.report.style import STYLE
 from logger.report.summary import (
-    COMFORT_WORDS,
+    COMFORT_NAMES,
     IRI_CLASSES,
     DriveSummary,
     Place,
@@ -43,6 +44,8 @@ from logger.report.terminal import (
 MAX_TABLE_ROWS = 5000
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
+
+_COMFORT_SHORT = {"fairly_uncomfortable": "fairly", "very_uncomfortable": "very", "extremely_uncomfortable": "extreme"}
 
 FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
@@ -120,14 +123,14 @@ def _tiles(summary: DriveSummary) -> str:
 
 def _map_section(records: Sequence[WindowRecord], summary: DriveSummary) -> str:
     by_iri = Colouring("by-iri", lambda record: "s" + _rank(record.iri_class, tuple(IRI_CLASSES)))
-    by_comfort = Colouring("by-comfort", lambda record: "s" + _rank(record.comfort, COMFORT_WORDS))
+    by_comfort = Colouring("by-comfort", lambda record: "s" + _rank(record.comfort, COMFORT_NAMES))
     return (
         '<section><h2>Map</h2><input class="pick" type="radio" name="pick" id="pick-iri" checked>'
         '<input class="pick" type="radio" name="pick" id="pick-comfort"><div class="switch">'
         '<label for="pick-iri">Roughness</label><label for="pick-comfort">Comfort</label></div><div>'
         f"{track_map(records, (by_iri, by_comfort), summary.roughest)}"
         f'{_legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words)}'
-        f'{_legend("by-comfort", summary.comfort, COMFORT_WORDS, comfort_words)}'
+        f'{_legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words)}'
         "</div></section>")
 
 
@@ -140,7 +143,7 @@ def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of
 def _shares_section(summary: DriveSummary) -> str:
     return ('<section class="columns">'
             f'<div><h2>Road by IRI class</h2>{_shares(summary.iri_classes, tuple(IRI_CLASSES), class_words)}</div>'
-            f'<div><h2>Road by comfort</h2>{_shares(summary.comfort, COMFORT_WORDS, comfort_words)}</div></section>')
+            f'<div><h2>Road by comfort</h2>{_shares(summary.comfort, COMFORT_NAMES, comfort_words)}</div></section>')
 
 
 def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> str:
@@ -198,17 +201,19 @@ def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSumma
     breaks = list(accumulate(len(drive) for drive in by_drive))
     class_levels = [Level(limit, letter) for letter in IRI_CLASSES
                     if (limit := class_limits_m_per_km(letter)[0]) is not None]
+    comfort_levels = [Level(limit, _COMFORT_SHORT[word]) for limit, word in COMFORT_WORDS if word in _COMFORT_SHORT]
     marks = [(place.along_m, place.iri_m_per_km, str(number)) for number, place in enumerate(summary.roughest, start=1)]
     plots = (
         Plot("Roughness, IRI", "m/km", at_m, [record.iri_m_per_km for record in measured],
              errors=[record.iri_std_m_per_km for record in measured], levels=class_levels, breaks=breaks, marks=marks),
-        Plot("Weighted acceleration, a_w", "m/s²", at_m, [record.a_w_mps2 for record in measured], breaks=breaks),
+        Plot("Weighted acceleration, a_w", "m/s²", at_m, [record.a_w_mps2 for record in measured],
+             levels=comfort_levels, breaks=breaks),
         Plot("Speed", "km/h", at_m, [None if record.speed_mps is None else record.speed_mps * 3.6
                                      for record in measured], breaks=breaks),
     )
     return ('<section><h2>Along the way</h2>' + "".join(line_figure(plot) for plot in plots)
             + '<p class="hint">The shaded band is the estimate plus and minus one standard error; dotted lines are the '
-              "lower limits of the IRI classes.</p></section>")
+              "lower limits of the IRI classes, and of discomfort: fairly, very, extreme.</p></section>")
 
 
 def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:

@@ -19,10 +19,10 @@ h2{font-size:18px;font-weight:620;margin:44px 0 12px}
 .sub,.unit,.empty,.hint{color:var(--soft)}
 .sub{margin:0 0 24px}
 .hint{font-size:13px;margin:8px 0 0}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;background:var(--line);
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;
 border:1px solid var(--line);
 border-radius:8px;overflow:hidden;margin:0}
-.tiles div{background:var(--ground);padding:12px 16px}
+.tiles div{box-shadow:0 0 0 1px var(--line);padding:12px 16px}
 .tiles dt{font-size:12.5px;color:var(--soft)}
 .tiles dd{margin:0;font-size:22px;font-weight:600;font-variant-numeric:tabular-nums;white-space:nowrap}
 .tiles small{font-size:13px;font-weight:400;color:var(--soft)}
@@ -39,7 +39,8 @@ svg text{font:12px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-se
 .map{background:var(--panel);border:1px solid var(--line);border-radius:8px}
 .map path{fill:none;stroke-linecap:round;stroke-linejoin:round}
 .casing{stroke:var(--casing);stroke-width:8.5;stroke-opacity:.85}
-.track path{stroke-width:5.5}
+.track path{stroke-width:5.5;stroke-linecap:butt}
+.track path[d$=h0]{stroke-linecap:round}
 .s0{stroke:var(--c0)}.s1{stroke:var(--c1)}.s2{stroke:var(--c2)}.s3{stroke:var(--c3)}.s4{stroke:var(--c4)}
 .s5{stroke:var(--c5)}
 .s6{stroke:var(--c6)}.s7{stroke:var(--c7)}.sx{stroke:var(--none)}
@@ -56,20 +57,22 @@ svg .mark text{fill:var(--ground);font-size:10.5px;font-weight:650}
 color:var(--soft)}
 .legend i,.bars i{display:inline-block;width:18px;height:6px;border-radius:3px;margin-right:7px;
 vertical-align:2px;box-shadow:0 0 0 1px var(--casing)}
-figure{margin:0 0 14px}
+figure{margin:0 0 14px;overflow-x:auto}
+.plot{min-width:640px}
 figcaption{font-size:13.5px;font-weight:600;margin-bottom:2px}
 figcaption .unit{font-weight:400}
 .grid{stroke:var(--faint);stroke-width:1}
 .level{stroke:var(--line);stroke-dasharray:2 4}
-.line{fill:none;stroke:var(--ink);stroke-width:1.2;stroke-linejoin:round;stroke-linecap:round}
-.band{fill:var(--c1);fill-opacity:.38}
+.line{fill:none;stroke:var(--ink);stroke-width:1;stroke-linejoin:round;stroke-linecap:round}
+.band{fill:var(--c1);fill-opacity:.55}
 .columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,1fr));gap:0 48px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:13.5px;font-variant-numeric:tabular-nums}
 th{text-align:left;font-weight:600;color:var(--soft);font-size:12.5px;vertical-align:bottom}
 th,td{padding:5px 12px 5px 0;border-bottom:1px solid var(--faint)}
 td.n,th.n{text-align:right}
-td.bar{width:34%}
+td.n,td:first-child{white-space:nowrap}
+td.bar{width:50%;min-width:60px}
 td.bar span{display:block;height:10px;border-radius:2px;min-width:2px}
 a{color:inherit;text-decoration-color:var(--soft);text-underline-offset:2px}
 details{margin-top:14px;border-top:1px solid var(--line);padding-top:12px}

@@ -15,6 +15,7 @@ from itertools import accumulate
 from math import cos, hypot, radians
 from typing import Any
 
+from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 
@@ -28,8 +29,7 @@ IRI_CLASSES: Mapping[str, str] = {
 }
 """ISO 8608 letters, best first, in words."""
 
-COMFORT_WORDS = ("not_uncomfortable", "a_little_uncomfortable", "fairly_uncomfortable", "uncomfortable",
-                 "very_uncomfortable", "extremely_uncomfortable")
+COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 """ISO 2631 words, best first."""
 
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
@@ -112,7 +112,7 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
         mean_iri_m_per_km=mean_iri,
         a_w_mps2=None if mean_square is None else mean_square**0.5,
         iri_classes=_shares(records, lengths_m, tuple(IRI_CLASSES), lambda record: record.iri_class),
-        comfort=_shares(records, lengths_m, COMFORT_WORDS, lambda record: record.comfort),
+        comfort=_shares(records, lengths_m, COMFORT_NAMES, lambda record: record.comfort),
         roughest=_roughest(records),
         flags=dict(Counter(flag for record in records for flag in record.flags).most_common()),
     )

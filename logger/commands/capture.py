@@ -1,0 +1,163 @@
+"""Record the raw bytes of a serial port, with the time of their arrival, as a dump.
+
+For an instrument whose frames nobody knows yet: what comes is kept byte by byte, and the first look that is printed
+at the end shows what kind of frames it may be. End it with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from drivers.dump import DumpHeader, DumpWriter, Event
+from drivers.hardware import open_serial
+from drivers.ports import BytePort
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.units import US_PER_S
+
+_CHUNK_BYTES = 4096
+_WAIT_S = 0.2
+_LOOK_BYTES = 65536
+_SHOWN_BYTES = 64
+_LONGEST_FRAME = 128
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog capture``."""
+    parser.add_argument("port", metavar="PORT", help="serial port, such as /dev/ttyUSB0")
+    parser.add_argument("--baud", type=int, default=115200, metavar="N", help="bits per second (default: 115200)")
+    parser.add_argument("--seconds", type=float, metavar="N", help="end after this time (default: at Ctrl-C)")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.dump[.gz]", help="dump to write; must be new")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog capture``."""
+    if not args.out.name.endswith((".dump", ".dump.gz")):
+        raise BadInput(f"{args.out}: expected a name that ends in .dump or .dump.gz")
+    if args.seconds is not None and not args.seconds > 0:
+        raise BadInput(f"--seconds {args.seconds:g}: expected more than 0")
+    port = open_serial(args.port, args.baud)
+    try:
+        header = DumpHeader(None, {"driver": "pasco", "port": args.port, "baud": args.baud}, {}, "unknown")
+        writer = _new_dump(args.out, header)
+        print(f"recording {args.port} at {args.baud} baud to {args.out}; Ctrl-C ends it", file=sys.stderr)
+        try:
+            with _stopped_by_signals() as stop:
+                look, total, duration_s, fault = _record(port, writer, args.seconds, stop.is_set, _now_us)
+        finally:
+            writer.close()
+    finally:
+        port.close()
+    print(f"\r{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {args.out}")
+    print("\n".join(first_look(look)))
+    if fault is not None:
+        print(f"ridelog: {fault}; what came before is kept", file=sys.stderr)
+    return EXIT_DONE if total and fault is None else EXIT_CHECK_FAILED
+
+
+def first_look(data: bytes) -> list[str]:
+    """What a stream of bytes looks like, as lines for a person: text or frames, and how long they may be."""
+    if not data:
+        return ["Nothing came. Check that the device is on and sends, the baud rate, and TX against RX."]
+    lines = ["First bytes:", *_hex_rows(data[:_SHOWN_BYTES])]
+    text = sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) / len(data)
+    if text > 0.95 and b"\n" in data:
+        whole = data.split(b"\n")[1:-1] or data.split(b"\n")[:1]
+        sample = whole[len(whole) // 2].decode("ascii", "replace").strip()
+        return [*lines, f"Looks like text, {len(whole)} lines; one of them: {sample!r}",
+                "If a line is \"x,y,z\", the profile 'lines' reads it."]
+    lines.append(f"Looks binary: {text:.0%} of the bytes are printable.")
+    common = ", ".join(f"{byte:02x} ({count / len(data):.0%})" for byte, count in Counter(data).most_common(4))
+    lines.append(f"Most common bytes: {common}")
+    distances = repeat_distances(data)
+    if distances:
+        shown = ", ".join(f"{distance} ({share:.0%})" for distance, share in distances)
+        lines.append(f"Bytes come again most often after: {shown} bytes. The first is a guess at the frame length.")
+    return lines
+
+
+def repeat_distances(data: bytes) -> list[tuple[int, float]]:
+    """The shortest distances after which a byte comes again clearly more often than usual, with the share that does.
+
+    Frames of fixed length with fixed bytes in them show as their length and multiples of it; nothing else shows.
+    """
+    stream = np.frombuffer(data, dtype=np.uint8)
+    longest = min(_LONGEST_FRAME, len(data) // 4)
+    shares = [float(np.mean(stream[distance:] == stream[:-distance])) for distance in range(1, longest + 1)]
+    if not shares:
+        return []
+    most, usual = max(shares), float(np.mean(shares))
+    if most < max(1.5 * usual, 0.05):
+        return []
+    return [entry for entry in enumerate(shares, start=1) if entry[1] > (most + usual) / 2][:3]
+
+
+def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: Callable[[], bool],
+            now_us: Callable[[], int]) -> tuple[bytes, int, float, str | None]:
+    """Move bytes from the port to the dump until stopped, timed out or cut off.
+
+    Gives the first bytes, how many there were, the time [s], and what cut it off.
+    """
+    look = bytearray()
+    total = 0
+    start_us = told_us = now_us()
+    told_bytes = 0
+    fault = None
+    while not stopped() and (seconds is None or now_us() - start_us < seconds * US_PER_S):
+        try:
+            data = port.read(_CHUNK_BYTES, _WAIT_S)
+        except OSError as error:
+            fault = error.strerror or str(error)
+            break
+        at_us = now_us()
+        if data:
+            writer.write(Event(at_us, "pasco", data))
+            look += data[:_LOOK_BYTES - len(look)]
+            total += len(data)
+        if at_us - told_us >= US_PER_S:
+            rate = (total - told_bytes) * US_PER_S / (at_us - told_us)
+            print(f"\r{total} bytes, {rate:.0f} bytes/s   ", end="", file=sys.stderr, flush=True)
+            told_us, told_bytes = at_us, total
+            writer.flush(sync=True)
+    return bytes(look), total, (now_us() - start_us) / US_PER_S, fault
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and SIGTERM set, while inside."""
+    stop = threading.Event()
+    wanted = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in wanted]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(wanted, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _new_dump(path: Path, header: DumpHeader) -> DumpWriter:
+    try:
+        return DumpWriter(path, header)
+    except FileExistsError:
+        raise BadInput(f"{path}: expected a name that is not taken; a recording is never overwritten") from None
+    except OSError as error:
+        raise BadInput(f"{path}: expected a place where a dump can be written ({error.strerror})") from None
+
+
+def _hex_rows(data: bytes) -> list[str]:
+    return [f"  {data[start:start + 16].hex(' '):47}  "
+            + "".join(chr(byte) if 32 <= byte < 127 else "." for byte in data[start:start + 16])
+            for start in range(0, len(data), 16)]
+
+
+def _now_us() -> int:
+    return time.monotonic_ns() // 1000

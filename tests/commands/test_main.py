@@ -1,0 +1,92 @@
+"""The command line: verbs, help, and faults that end in one line and a status."""
+
+import pkgutil
+import subprocess
+import sys
+import types
+from collections.abc import Callable
+
+import pytest
+
+import logger.commands
+from drivers.errors import DumpError, NotPresent, SettingsError
+from logger.commands import main
+from logger.errors import BadInput, CheckFailed
+
+
+def test_every_file_of_the_folder_is_a_verb_and_every_verb_a_file() -> None:
+    files = {module.name for module in pkgutil.iter_modules(logger.commands.__path__)}
+    assert files - {"main"} == set(main.VERBS)
+
+
+@pytest.mark.parametrize("verb", main.VERBS)
+def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as leaving:
+        main.main([verb, "--help"])
+    assert leaving.value.code == 0
+    assert f"usage: ridelog {verb}" in capsys.readouterr().out
+
+
+def test_help_lists_the_verbs_and_loads_nothing_heavy() -> None:
+    script = ("import sys\nfrom logger.commands.main import main\n"
+              "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+              "print('heavy:', *{'numpy', 'scipy', 'yaml', 'serial', 'importlib.metadata'} & set(sys.modules))")
+    out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert all(f"\n  {verb} " in out and meaning in out for verb, meaning in main.VERBS.items())
+    assert out.endswith("heavy:\n")
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("ridelog ")
+
+
+@pytest.mark.parametrize("arguments", [[], ["dance"], ["--dance"], ["status", "--dance"], ["replay"]])
+def test_wrong_use_is_one_line_and_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as leaving:
+        main.main(arguments)
+    told = capsys.readouterr()
+    assert leaving.value.code == 2
+    assert told.out == ""
+    assert told.err.count("\n") == 1
+    assert "--help')" in told.err
+
+
+def fault(error: BaseException) -> Callable[[object], int]:
+    def run(args: object) -> int:
+        raise error
+    return run
+
+
+@pytest.mark.parametrize(("error", "status", "told"), [
+    (BadInput("a.yaml:3: expected a number"), 2, "ridelog: a.yaml:3: expected a number\n"),
+    (CheckFailed("2 rows\nare torn"), 1, "ridelog: 2 rows are torn\n"),
+    (DumpError("a.dump:1: expected a header"), 2, "ridelog: a.dump:1: expected a header\n"),
+    (SettingsError("range_g 3"), 2, "ridelog: range_g 3\n"),
+    (NotPresent("/dev/ttyUSB7: no such port"), 2, "ridelog: /dev/ttyUSB7: no such port\n"),
+    (PermissionError(13, "Permission denied", "/x"), 2, "ridelog: /x: Permission denied\n"),
+    (KeyboardInterrupt(), 130, ""),
+])
+def test_an_expected_fault_is_one_line_and_its_status(
+        error: BaseException, status: int, told: str, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    verb = types.ModuleType("logger.commands.verify", "A verb that fails.")
+    verb.__dict__.update(add_arguments=lambda parser: None, run=fault(error))
+    monkeypatch.setitem(sys.modules, "logger.commands.verify", verb)
+    monkeypatch.setattr(sys, "argv", ["ridelog", "verify"])
+    with pytest.raises(SystemExit) as leaving:
+        main.run()
+    assert leaving.value.code == status
+    assert capsys.readouterr().err == told
+
+
+def test_a_closed_pipe_is_no_traceback() -> None:
+    script = "from logger.commands.main import run; run()"
+    with subprocess.Popen([sys.executable, "-c", script, "--version"], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        told = process.stderr.read()
+    assert told == b""
+    assert process.returncode == main.EXIT_PIPE_CLOSED
