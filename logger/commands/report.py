@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
                           "summary": summary_json(summarise(records))}))
     else:
-        print(f"Report: {args.out} ({len(records)} windows from {len(files)} files)")
+        print(f"Report: {args.out} ({len(records)} windows from {len(files)} file{'s' * (len(files) != 1)})")
     return EXIT_DONE
 
 

@@ -223,12 +223,12 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
     if missing:
         notes.append(f'<span class="warn">Without their description (.json):</span> {escape(", ".join(missing[:20]))}')
     if damaged:
-        notes.append(f'<span class="warn">{damaged} damaged lines were left out.</span>')
+        notes.append(f'<span class="warn">{damaged} damaged {"line was" if damaged == 1 else "lines were"} left out.</span>')
     if summary.blind_s > 0:
         notes.append(f"{span_words(summary.blind_s)} without any speed are in no distance, no map and no plot.")
     notes += [f"iri_m_per_km: {escape(str(meaning))}"
               for meaning in _different(_inside(file.sidecar or {}, "iri_m_per_km") for file in files)]
-    notes.append(f"{summary.windows} windows from {len(files)} log files")
+    notes.append(f"{summary.windows} windows from {len(files)} log file{'s' * (len(files) != 1)}")
     flags = "".join(f"<tr><td>{escape(flag)}</td><td class=n>{count}</td><td class=n>{count / summary.windows:.1%}</td>"
                     f"<td>{escape(FLAG_MEANINGS.get(flag, ''))}</td></tr>" for flag, count in summary.flags.items())
     table = (f'<div class="scroll"><table><tr><th>Flag</th><th class=n>Windows</th><th class=n>Share</th><th>Meaning'

@@ -1,0 +1,158 @@
+"""The page: whole, safe whatever the files say, small, and made by the command from what lies in a folder."""
+
+import json
+import re
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from logger.commands import main
+from logger.errors import BadInput
+from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, LoggedFile, page
+from logger.store.segment_log import HEADER, format_row
+
+SIDECAR: dict[str, Any] = {"ridelog_version": "1.2", "sensor": {"driver": "bma220", "verified": True},
+                           "vehicle": {"name": "rav4-2009"}, "settings": {"gps": {"baud": 9600}}, "log": {"part": 1}}
+HOSTILE = "</script></style><script>alert(1)</script><img src=//evil onerror=alert(1)>\"'&\ud800"
+
+
+class Tags(HTMLParser):
+    """Every tag with its attributes, and whether elements that must be closed are."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag in ("main", "section", "div", "table", "details", "svg", "g", "figure", "pre", "ul", "a", "dl"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self.open:
+            assert self.open.pop() == tag
+
+
+def text_of(page_text: str) -> str:
+    return " ".join(unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", page_text)).split())
+
+
+def test_the_page_says_the_figures(drive) -> None:
+    rows = drive(300, {40: {"iri_m_per_km": 14.2, "iri_std_m_per_km": 2.1, "iri_class": "D", "flags": ("clipped",)}})
+    text = text_of(page([LoggedFile("00001-001.csv", rows, 2, SIDECAR)]))
+    for words in ("Road roughness of a drive", "17 May 2025, 14:02 to 14:04 UTC · vehicle rav4-2009 · ridelog 1.2",
+                  "3.0 km", "2 min 30 s", "14.2 ± 2.1", "46.50364, 6.50000", "Sensor: bma220",
+                  "2 damaged lines were left out", "clipped 1 0.3%", '"baud": 9600', "All windows (300)"):
+        assert words in text
+
+
+def test_every_flag_that_rows_carry_is_explained() -> None:
+    assert set(FLAG_MEANINGS) == {"gps_lost", "gap", "clipped", "slow", "fast", "stationary", "time_unset", "partial",
+                                  "unsettled", "blind"}
+
+
+def test_the_page_needs_nothing_from_elsewhere(drive) -> None:
+    text = page([LoggedFile("a.csv", drive(200), 0, SIDECAR)])
+    tags = Tags(text)
+    assert tags.open == []
+    assert not {"script", "link", "iframe", "img", "object", "base"} & {tag for tag, _ in tags.tags}
+    assert "//" not in re.sub(r"<!doctype[^>]*>", "", text)
+    assert "url(" not in text
+    assert "@import" not in text
+    assert {attributes["href"][:4] for tag, attributes in tags.tags if tag == "a" and attributes["href"]} == {"geo:"}
+
+
+def test_hostile_text_stays_text(drive) -> None:
+    hostile = {0: {"comfort": HOSTILE, "iri_class": HOSTILE, "flags": (HOSTILE,), "iri_m_per_km": 99.0}}
+    sidecars: list[Any] = [
+        {"sensor": {"driver": HOSTILE, "profile": HOSTILE}, "vehicle": {"name": HOSTILE}, "ridelog_version": HOSTILE,
+         "iri_m_per_km": HOSTILE, HOSTILE: HOSTILE},
+        {"sensor": HOSTILE, "vehicle": HOSTILE, "iri_m_per_km": [HOSTILE]}, None]
+    files = [LoggedFile(HOSTILE, drive(5, hostile), 1, sidecar) for sidecar in sidecars]
+    tags = Tags(page(files))
+    assert not {"script", "img"} & {tag for tag, _ in tags.tags}
+    assert not [name for _, attributes in tags.tags for name in attributes if name.startswith("on")]
+    assert tags.open == []
+
+
+def test_a_sensor_nobody_has_verified_is_said_so(drive) -> None:
+    unverified = {**SIDECAR, "sensor": {"driver": "pasco", "profile": "ps2119", "verified": False}}
+    text = text_of(page([LoggedFile("a.csv", drive(3), 0, unverified)]))
+    assert "Sensor: pasco ps2119 . What its bytes mean is not verified" in text.replace("ps2119.", "ps2119 .")
+    assert "Without their description (.json): a.csv" in text_of(page([LoggedFile("a.csv", drive(3), 0, None)]))
+
+
+def test_a_long_drive_makes_a_page_of_less_than_2_mb(drive) -> None:
+    letters, words = "ABCDEFGH", ("not_uncomfortable", "extremely_uncomfortable")
+    changes = {index: {"iri_class": letters[index % 8], "comfort": words[index % 2], "lon_deg": 6.5 + index % 7 * 1e-5,
+                       "iri_m_per_km": 1 + index % 13 * 2.71, "flags": ("gps_lost", "time_unset")}
+               for index in range(5000)}
+    assert len(page([LoggedFile("a.csv", drive(5000, changes), 0, SIDECAR)]).encode()) < 2_000_000
+
+
+def test_a_table_too_long_says_what_it_leaves_out(drive) -> None:
+    text = page([LoggedFile("a.csv", drive(MAX_TABLE_ROWS + 7), 0, SIDECAR)])
+    assert "7 more rows are in the log files" in text
+
+
+@pytest.mark.parametrize("changes", [
+    {"lat_deg": None, "lon_deg": None}, {"iri_m_per_km": None, "iri_std_m_per_km": None, "iri_class": ""},
+    {"distance_start_m": None, "distance_end_m": None, "lat_deg": None, "lon_deg": None, "speed_mps": None},
+    {"utc_us": None}, {"a_w_mps2": None, "comfort": "", "mtvv_mps2": None, "vdv_mps175": None, "crest_factor": None}])
+def test_what_is_not_known_leaves_a_whole_page(drive, changes: dict[str, Any]) -> None:
+    for rows in (1, 3):
+        text = page([LoggedFile("a.csv", drive(rows, dict.fromkeys(range(rows), changes)), 0, {})])
+        assert Tags(text).open == []
+        assert "None" not in text_of(text)
+        assert "nan" not in text_of(text)
+
+
+def write_log(path: Path, rows: list[Any], sidecar: object = SIDECAR, extra: str = "") -> None:
+    path.write_text("\n".join([HEADER, *map(format_row, rows)]) + "\n" + extra, encoding="utf-8")
+    (path.parent / f"{path.name.partition('.')[0]}.json").write_text(json.dumps(sidecar), encoding="utf-8")
+
+
+def test_the_command_reads_a_folder_in_order(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_log(tmp_path / "00002-001.csv.part", drive(4), extra="5,2025-05")
+    write_log(tmp_path / "00001-002.csv", drive(8)[5:], {**SIDECAR, "vehicle": {"name": "\ud800"}})
+    write_log(tmp_path / "00001-001.csv", drive(5))
+    write_log(tmp_path / "00001-001.csv.part", drive(3))
+    (tmp_path / "notes.csv").write_text("mine", encoding="utf-8")
+    out = tmp_path / "page.html"
+    assert main.main(["report", str(tmp_path), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["files"] == ["00001-001.csv", "00001-002.csv", "00002-001.csv.part"]
+    assert told["summary"]["windows"] == 12
+    assert told["summary"]["drives"] == 2
+    text = out.read_text(encoding="utf-8")
+    assert "Road roughness of 2 drives" in text
+    assert "1 damaged line was left out" in text
+    assert sorted(path.name for path in tmp_path.iterdir() if "page" in path.name) == ["page.html"]
+
+
+def test_the_command_takes_one_file_and_tells_where_the_page_is(drive, tmp_path: Path,
+                                                                capsys: pytest.CaptureFixture[str]) -> None:
+    write_log(tmp_path / "00001-001.csv", drive(5))
+    (tmp_path / "00001-001.json").write_text("{torn", encoding="utf-8")
+    assert main.main(["report", str(tmp_path / "00001-001.csv"), "--out", str(tmp_path / "p.html")]) == 0
+    assert capsys.readouterr().out == f"Report: {tmp_path}/p.html (5 windows from 1 file)\n"
+
+
+def test_the_command_refuses_what_is_no_log(drive, tmp_path: Path) -> None:
+    out = ["--out", str(tmp_path / "p.html")]
+    with pytest.raises(BadInput, match="expected a folder"):
+        main.main(["report", str(tmp_path / "gone"), *out])
+    with pytest.raises(BadInput, match="expected segment logs"):
+        main.main(["report", str(tmp_path), *out])
+    write_log(tmp_path / "00001-001.csv", [], extra="nonsense\n")
+    with pytest.raises(BadInput, match=r"00001-001\.csv: expected a log with at least one intact row"):
+        main.main(["report", str(tmp_path), *out])
+    write_log(tmp_path / "00001-001.csv", drive(2))
+    with pytest.raises(BadInput, match="expected a place where a page can be written"):
+        main.main(["report", str(tmp_path), "--out", str(tmp_path / "no" / "p.html")])
+    assert not (tmp_path / "p.html").exists()
