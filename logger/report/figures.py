@@ -55,7 +55,7 @@ def line_figure(plot: Plot) -> str:
     along_m, values, errors, group = _thinned(plot)
     top = max((value for value in values if value is not None), default=1.0) * 1.05 or 1.0
     end_m = max(plot.along_m, default=1.0) or 1.0
-    y_ticks, x_ticks = nice_ticks(top, 4), nice_ticks(end_m / 1000, 8)
+    y_ticks, x_ticks = nice_ticks(top, 5), nice_ticks(end_m / 1000, 8)
     frame = _Frame(end_m, max(top, y_ticks[-1]))
     runs = _runs(values, {index // group for index in plot.breaks})
     parts = [f'<svg class="plot" viewBox="0 0 {WIDTH} {_HEIGHT}" role="img" aria-label="{escape(plot.title)}">']

@@ -223,7 +223,8 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
     if missing:
         notes.append(f'<span class="warn">Without their description (.json):</span> {escape(", ".join(missing[:20]))}')
     if damaged:
-        notes.append(f'<span class="warn">{damaged} damaged {"line was" if damaged == 1 else "lines were"} left out.</span>')
+        lines = "line was" if damaged == 1 else "lines were"
+        notes.append(f'<span class="warn">{damaged} damaged {lines} left out.</span>')
     if summary.blind_s > 0:
         notes.append(f"{span_words(summary.blind_s)} without any speed are in no distance, no map and no plot.")
     notes += [f"iri_m_per_km: {escape(str(meaning))}"

@@ -45,6 +45,11 @@ def distance_words(distance_m: float) -> str:
     return f"{distance_m / 1000:.1f} km" if distance_m >= 1000 else f"{distance_m:.0f} m"
 
 
+def percent_words(share: float) -> str:
+    """A share: ``38%``, and ``<1%`` for one that would be rounded to nothing."""
+    return "<1%" if 0 < share < 0.005 else f"{share:.0%}"
+
+
 def date_words(summary: DriveSummary) -> str:
     """When it was: ``17 May 2025, 14:02 to 14:20 UTC``."""
     if summary.start_utc_us is None or summary.end_utc_us is None:
@@ -94,7 +99,7 @@ def _bars(shares: Sequence[Share], words_of: Callable[[str], str], drawn: bool) 
     if not shares:
         return ["  no distance was measured"]
     width = max(len(words_of(share.name)) for share in shares)
-    return [f"  {words_of(share.name):{width}}  {_bar(share.share, drawn)} {share.share:5.0%} "
+    return [f"  {words_of(share.name):{width}}  {_bar(share.share, drawn)} {percent_words(share.share):>5} "
             f"{distance_words(share.distance_m):>8}" for share in shares]
 
 

@@ -30,6 +30,7 @@ def test_a_share_above_nothing_always_shows(drive) -> None:
     for encoding in ("utf-8", "ascii"):
         line = next(line for line in screen(summarise(drive(1000, ROUGH)), encoding).splitlines() if "  D" in line)
         assert any(sign in line for sign in "▏#")
+        assert " <1% " in line
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp437", "utf-8", "no-such-encoding"])
