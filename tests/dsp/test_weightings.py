@@ -64,7 +64,7 @@ def test_stored_sections_are_within_0_02_db_of_the_formula() -> None:
     road = design_error(WEIGHTING, WEIGHTING.sections[100], 100, np.geomspace(0.1, 20.0, 1000))
     print(f"Wk at 100 Hz: {error.magnitude_db:.4f} dB to 40 Hz; phase {road.phase_deg:.2f} deg to 20 Hz")
     assert error.magnitude_db < 0.02
-    assert road.phase_deg < 1.0
+    assert road.phase_deg < 0.2
 
 
 def test_stored_sections_are_those_of_the_design() -> None:

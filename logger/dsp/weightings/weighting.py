@@ -22,9 +22,9 @@ Polynomial = tuple[float, ...]
 # Rows b0, b1, b2, a0, a1, a2 for ``logger.dsp.sections.BlockFilter``.
 Sections = tuple[tuple[float, float, float, float, float, float], ...]
 
-# Every set of sections runs this many whole samples behind the formula: output k + 1 belongs to the instant of input k.
-# Without the sample, magnitude and phase cannot both be met near half the sample rate.
-DELAY_SAMPLES = 1
+# Every set of sections runs this many whole samples behind the formula: output k + 5 belongs to the instant of input k.
+# Without them, magnitude and phase cannot both be met up to near half the sample rate (see ``logger.dsp.design``).
+DELAY_SAMPLES = 5
 
 
 @dataclass(frozen=True)
