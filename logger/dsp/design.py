@@ -199,7 +199,7 @@ class _Fit:
 
 
 def _thiran(delay_samples: float, order: int) -> Floats:
-    """Denominator of the all-pass of maximally flat delay (Thiran; Laakso et al.); stable for a delay above order - 1."""
+    """Denominator of the all-pass of maximally flat delay (Thiran), stable for delays above order - 1."""
     place = delay_samples - order + np.arange(order + 1)
     return np.array([(-1) ** k * math.comb(order, k) * np.prod(place / (place + k)) for k in range(order + 1)])
 
