@@ -43,8 +43,7 @@ def bma220_settings(config: AccelerometerConfig) -> Bma220Settings:
 
 
 def instrument(config: AccelerometerConfig) -> Instrument:
-    """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be, and
-    BadInput for an unverified profile that nobody has accepted."""
+    """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be."""
     if config.driver == "bma220":
         chip = bma220_settings(config)
         step_mps2 = mps2_per_count(chip.range_g)
@@ -59,11 +58,6 @@ def instrument(config: AccelerometerConfig) -> Instrument:
         }
         return Instrument(Bma220Decoder(chip.range_g), chip.oversample, noise_mps2, description)
     profile = _mounted(load_profile(config.pasco.profile), Axis.from_word(config.vertical_axis))
-    if not profile.verified and not config.pasco.accept_unverified:
-        raise BadInput(
-            f"profile {profile.name} is unverified: nobody has compared it with a real device; "
-            "set accelerometer.pasco.accept_unverified to true to use it all the same"
-        )
     description = {
         "driver": "pasco",
         "profile": profile.name,
@@ -138,7 +132,7 @@ def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None) -> 
         range_g=says.get("range_g", sensor.bma220.range_g),
         oversample=says.get("oversample", sensor.bma220.oversample),
     )
-    serial = replace(sensor.pasco, profile=says.get("profile", sensor.pasco.profile), accept_unverified=True)
+    serial = replace(sensor.pasco, profile=says.get("profile", sensor.pasco.profile))
     name = vehicle or header.vehicle
     path = vehicle_file(name) if name in vehicle_names() else Path(name)
     if not path.is_file():

@@ -66,6 +66,7 @@ class SignalChain:
         self._weighting = BlockFilter(np.asarray(weighting.sections[GRID_RATE_HZ]))
         self._running = RunningRms(GRID_RATE_HZ)
         self._unweighted: GridSamples | None = None
+        self._early = DELAY_SAMPLES
         self._next_us: int | None = None
         self._last_mps2: float | None = None
         self._since_start = 0
@@ -137,6 +138,7 @@ class SignalChain:
             self._low_pass.reset(level_mps2)
         self._running.reset()
         self._unweighted = None
+        self._early = DELAY_SAMPLES
         self._since_start = 0
 
     def _line(self, begin_us: int, end_us: int, from_mps2: float, to_mps2: float) -> list[GridSamples]:
@@ -162,7 +164,8 @@ class SignalChain:
 
     def _filter(self, t_us: Times, values: Floats, present: Bools, interpolated: Bools, clipped: Bools
                 ) -> list[GridSamples]:
-        """Run the filters over more samples. The weighting is a whole sample behind, so as many samples wait for it."""
+        """Run the filters over more samples. The weighting is some whole samples behind; as many wait for it, and its
+        first outputs belong to instants before the start."""
         self._next_us = int(t_us[-1]) + GRID_STEP_US
         self._last_mps2 = float(values[-1])
         if self._low_pass is not None:
@@ -173,9 +176,10 @@ class SignalChain:
         weighted = self._weighting.process(values)
         blank = np.zeros(len(values))
         waiting = GridSamples(t_us, accel, blank, blank, present, interpolated, settled, clipped)
-        if self._unweighted is None:
-            weighted = weighted[DELAY_SAMPLES:]
-        else:
+        early = min(self._early, len(weighted))
+        self._early -= early
+        weighted = weighted[early:]
+        if self._unweighted is not None:
             waiting = joined([self._unweighted, waiting])
         self._unweighted = waiting.part(len(weighted), len(waiting))
         return self._weighed(waiting.part(0, len(weighted)), weighted)
@@ -185,7 +189,8 @@ class SignalChain:
         waiting, self._unweighted = self._unweighted, None
         if waiting is None or self._last_mps2 is None:
             return []
-        return self._weighed(waiting, self._weighting.process(np.full(len(waiting), self._last_mps2)))
+        weighted = self._weighting.process(np.full(self._early + len(waiting), self._last_mps2))
+        return self._weighed(waiting, weighted[self._early :])
 
     def _weighed(self, samples: GridSamples, weighted_mps2: Floats) -> list[GridSamples]:
         if not len(samples):

@@ -1,7 +1,7 @@
 """The live service: threads that listen, one loop that thinks.
 
 Each source has a thread of its own that does nothing but look at its device at the right moment and put what it
-got, with the time, into a queue. The main loop empties the queue ten times a second, brings the events into
+got, with the time, into a queue. The main loop empties the queue four times a second, brings the events into
 order of time, records them if asked to, feeds the core, and tells systemd and the status file how things stand.
 So a slow card or a slow window never delays a sample, and a pipeline that hangs stops feeding the watchdog.
 """
@@ -22,7 +22,7 @@ from logger.service.supervisor import Supervisor
 from logger.store.rotation import SegmentLog
 from logger.units import US_PER_S
 
-LOOP_S = 0.1
+LOOP_S = 0.25
 HOLD_BACK_US = 60_000
 GATHER_S = 0.03
 CLOSED_WAIT_S = 0.1
@@ -40,21 +40,20 @@ class Deadlines:
 
     def __init__(self, step_us: int) -> None:
         self._step_us = step_us
-        self._next_us: int | None = None
+        self._next_us = 0
         self.missed = 0
 
     def wait(self) -> None:
         """Sleep until the next instant."""
         now_us = monotonic_us()
-        if self._next_us is None:
-            self._next_us = now_us
-        self._next_us += self._step_us
-        late_us = now_us - self._next_us
-        if late_us > 0:
-            skipped = late_us // self._step_us + 1
+        self._next_us = (self._next_us or now_us) + self._step_us
+        wait_us = self._next_us - now_us
+        if wait_us < 0:
+            skipped = -wait_us // self._step_us + 1
             self.missed += skipped
             self._next_us += skipped * self._step_us
-        time.sleep(max(self._next_us - now_us, 0) / US_PER_S)
+            wait_us = self._next_us - now_us
+        time.sleep(wait_us / US_PER_S)
 
 
 class Listener(threading.Thread):

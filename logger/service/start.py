@@ -25,7 +25,7 @@ from logger.store.rotation import SegmentLog, next_session, repair
 from logger.units import US_PER_S
 
 SERIAL_WAIT_S = 0.5
-LONGEST_BEAT_S = 1.0
+LONGEST_BEAT_S = 2.0
 log = logging.getLogger(__name__)
 
 
@@ -35,7 +35,8 @@ def serve(config: Config, stop: threading.Event) -> None:
     relation, vehicle = assemble.relation(config)
     directory = config.log.directory
     directory.mkdir(parents=True, exist_ok=True)
-    repair(directory)
+    for repaired in repair(directory):
+        log.info("repaired %s", repaired)
     session = next_session(directory)
     segment_log = SegmentLog(directory, session, assemble.sidecar(config, sensor, vehicle), config.log.max_file_bytes)
     recorder = _recorder(config, sensor, session)

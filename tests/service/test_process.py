@@ -213,7 +213,7 @@ def test_status_for_a_person_and_for_a_program(
     ("text", "line", "word"),
     [
         ("gps: {prot: /dev/x}\n", 1, "prot"),
-        ("log:\n  sync_s: soon\n", 2, "sync_s"),
+        ("log:\n  sync_s: soon\n", 2, "number"),
         ("vehicle: hovercraft\n", 1, "hovercraft"),
         ("gps: {baud: 9600\n", 2, "expected"),
     ],
