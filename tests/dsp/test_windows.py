@@ -90,7 +90,8 @@ def test_missing_samples_are_flagged_and_a_window_of_them_has_no_figures() -> No
     present[100:103] = False
     present[400:480] = False
     distance_m = 10.0 * np.arange(count) * 0.01
-    windows = push(WindowCutter(WINDOW_M, 5.0, STEP_US), samples(count, present=present), distance_m, np.full(count, 10.0))
+    part = samples(count, present=present)
+    windows = push(WindowCutter(WINDOW_M, 5.0, STEP_US), part, distance_m, np.full(count, 10.0))
     assert "gap" in windows[1].flags
     assert np.isfinite(windows[1].a_w_mps2)
     assert "gap" in windows[5].flags
