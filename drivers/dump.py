@@ -37,6 +37,9 @@ LINE_BYTES = 65536
 EVENT_BYTES = 32000
 """Most bytes in one event: in hex, with time and source, they fit a line."""
 
+BMA220_HEX_DIGITS = 6
+"""One read of X, Y and Z: three bytes."""
+
 LATEST_US = 10**15 - 1
 """No monotonic clock has run for 31 years."""
 
@@ -141,7 +144,7 @@ class DumpReader:
                 except (ValueError, KeyError):
                     raise _complaint(self._path, number, line, last_us) from None
                 if not (last_us <= t_us <= LATEST_US and digits.isdigit() and len(fraction) == 6 and whole and text
-                        and len(line) <= LINE_BYTES):
+                        and len(line) <= LINE_BYTES and (name != b"bma220" or len(text) == BMA220_HEX_DIGITS)):
                     raise _complaint(self._path, number, line, last_us)
                 last_us = t_us
                 yield event
@@ -213,9 +216,10 @@ class DumpWriter:
 
     def write(self, event: Event) -> None:
         """Add an event. Raises ``ValueError`` for one that no reader would accept: an unknown source, a time
-        before the last one's or out of range, no bytes, or more than ``EVENT_BYTES``."""
+        before the last one's or out of range, no bytes, more than ``EVENT_BYTES``, or a read that is not three bytes."""
         t_us, source, data = event
-        if not (source in SOURCES and self._last_us <= t_us <= LATEST_US and 0 < len(data) <= EVENT_BYTES):
+        fits = len(data) == BMA220_HEX_DIGITS // 2 if source == "bma220" else 0 < len(data) <= EVENT_BYTES
+        if not (source in SOURCES and self._last_us <= t_us <= LATEST_US and fits):
             raise ValueError(f"event {source!r} at {t_us} us with {len(data)} bytes, after {self._last_us} us, "
                              "cannot be recorded")
         self._last_us = t_us
@@ -307,7 +311,8 @@ def _complaint(path: Path, number: int, line: bytes, last_us: int) -> DumpError:
     elif int(fields[0].replace(b".", b"")) < last_us:
         expected = f"a time not before the last one, {last_us // 1_000_000}.{last_us % 1_000_000:06d}"
     else:
-        expected = "at least one byte, in pairs of hex digits"
+        expected = "three bytes" if fields[1] == b"bma220" else "at least one byte"
+        expected += ", in pairs of hex digits"
     return DumpError(f"{path}:{number}: expected {expected}, found {line[:60].decode('ascii', 'replace')!r}")
 
 

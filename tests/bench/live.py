@@ -126,7 +126,7 @@ def _lateness_us(t_us: np.ndarray) -> np.ndarray:
 
 
 def _lost(t_us: np.ndarray) -> int:
-    return int(round((t_us[-1] - t_us[0]) / STEP_US)) + 1 - len(t_us)
+    return round((t_us[-1] - t_us[0]) / STEP_US) + 1 - len(t_us)
 
 
 def _cpu_s(pid: int) -> float:

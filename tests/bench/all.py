@@ -1,0 +1,24 @@
+"""Run every benchmark of this folder, one after the other; exit 1 when a goal is missed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+NOT_BENCHMARKS = ("all.py", "figures.py")
+
+
+def main() -> int:
+    """Run them all."""
+    folder = Path(__file__).parent
+    missed = 0
+    for script in sorted(folder.glob("*.py")):
+        if script.name not in NOT_BENCHMARKS:
+            print(f"== {script.stem}", flush=True)
+            missed += subprocess.run([sys.executable, script], check=False).returncode != 0
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

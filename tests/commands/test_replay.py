@@ -1,0 +1,132 @@
+"""``ridelog replay`` and ``ridelog demo`` as a person runs them."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+import subprocess
+import zlib
+from pathlib import Path
+
+import pytest
+
+from drivers.dump import DumpHeader, DumpWriter, Event
+
+PATIENCE_S = 60
+CONTRACT = (
+    "segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,iri_std_m_per_km,"
+    "iri_rms_m_per_km,a_w_mps2,mtvv_mps2,vdv_mps175,crest_factor,comfort,iri_class,flags"
+)
+
+
+def call(*words: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=PATIENCE_S)
+
+
+def rows(folder: Path) -> list[str]:
+    return [line for path in sorted(folder.glob("*.csv")) for line in path.read_text().splitlines()[1:]]
+
+
+def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path) -> None:
+    done = call(ridelog, "demo", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "Roughest places" in done.stdout
+    assert str(tmp_path / "out") in done.stdout
+    assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
+    assert len(rows(tmp_path / "out")) > 400
+    assert call(ridelog, "verify", tmp_path / "out").returncode == 0
+
+
+def test_rows_are_as_the_format_says(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+    done = call(ridelog, "replay", short_dump, "--out", tmp_path, "--json")
+    outcome = json.loads(done.stdout)
+    (log,) = sorted(tmp_path.glob("*.csv"))
+    assert outcome["files"] == [log.name]
+    text = log.read_text()
+    header = text.splitlines()[0].split(",")
+    assert ",".join(header[:18]) == CONTRACT
+    assert header[-1] == "crc32"
+    for line in text.splitlines()[1:]:
+        body, _, check = line.rpartition(",")
+        assert check == f"{zlib.crc32(body.encode()):08x}"
+    records = list(csv.DictReader(text.splitlines()))
+    assert outcome["rows"] == len(records)
+    assert [int(record["segment"]) for record in records] == list(range(1, len(records) + 1))
+    sidecar = json.loads(log.with_suffix(".json").read_text())
+    assert sidecar["sensor"]["verified"] is True
+
+
+def test_the_rate_changes_nothing_but_the_time_it_takes(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+    for rate in ("0", "40"):
+        assert call(ridelog, "replay", short_dump, "--out", tmp_path / rate, "--rate", rate).returncode == 0
+    assert rows(tmp_path / "0") == rows(tmp_path / "40")
+
+
+def test_a_recording_that_was_cut_gives_what_it_holds(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+    text = gzip.decompress(short_dump.read_bytes())
+    cut = tmp_path / "cut.dump"
+    cut.write_bytes(text[: len(text) * 2 // 3])
+    done = call(ridelog, "replay", cut, "--out", tmp_path / "out")
+    assert done.returncode == 0
+    assert "cut short" in done.stdout
+    whole = tmp_path / "whole"
+    call(ridelog, "replay", short_dump, "--out", whole)
+    kept = rows(tmp_path / "out")
+    assert len(kept) > 20
+    same = [a == b for a, b in zip(kept[:-4], rows(whole), strict=False)]
+    assert all(same)
+
+
+def test_an_unverified_profile_is_named_in_every_log(ridelog: Path, tmp_path: Path) -> None:
+    dump = tmp_path / "raw.dump"
+    writer = DumpWriter(dump, DumpHeader(None, {"driver": "pasco", "profile": "ps2119"}, {"baud": 9600}, "rav4-2009"))
+    frame = (4096).to_bytes(2, "little") * 2 + (4424).to_bytes(2, "little")
+    for count in range(3000):
+        writer.write(Event(1_000_000 + 10_000 * count, "pasco", frame))
+    writer.close()
+    done = call(ridelog, "replay", dump, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    (sidecar,) = (tmp_path / "out").glob("*-001.json")
+    sensor = json.loads(sidecar.read_text())["sensor"]
+    assert sensor["profile"] == "ps2119"
+    assert sensor["verified"] is False
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", ":1: expected"),
+        (b"hello\n", ":1: expected"),
+        (
+            b'# ridelog-dump 1 {"start_utc": null, "accelerometer": {"driver": "bma220"}, "gps": {}, '
+            b'"vehicle": "cart"}\n',
+            "cart",
+        ),
+        (
+            b'# ridelog-dump 1 {"start_utc": null, "accelerometer": {"driver": "bma220"}, "gps": {}, '
+            b'"vehicle": "rav4-2009"}\n1.000000 bma220 0000\n2.000000 bma220 000040\n',
+            ":2: expected three bytes",
+        ),
+        (
+            b'# ridelog-dump 1 {"start_utc": null, "accelerometer": {"driver": "bma220", "range_g": 3}, "gps": {}, '
+            b'"vehicle": "rav4-2009"}\n',
+            "range",
+        ),
+    ],
+)
+def test_bad_recordings_are_refused_in_one_line(ridelog: Path, tmp_path: Path, content: bytes, said: str) -> None:
+    dump = tmp_path / "bad.dump"
+    dump.write_bytes(content)
+    done = call(ridelog, "replay", dump, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert said in done.stderr
+    assert not done.stdout
+
+
+def test_no_such_recording(ridelog: Path, tmp_path: Path) -> None:
+    done = call(ridelog, "replay", tmp_path / "none.dump", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "none.dump" in done.stderr
+    assert done.stderr.count("\n") == 1
