@@ -1,0 +1,218 @@
+"""The spectrum of a measured profile, its degree of roughness, its waviness and its class (ISO 8608).
+
+A road's spectrum falls so steeply that the plain method lies: a window leaks the long waves into the short ones, and a
+hill outweighs everything. And the bare spectrum is so ragged that no line through it can be seen (Fig 2.7, 2.9).
+
+- Here the spectrum of the *slope* is taken, which is nearly level, and divided by the exact response of the
+  difference between samples. Segments half over each other that cover the road evenly, each freed of its mean slope
+  (which is to detrend the elevation), under a Hann window, averaged.
+- It is averaged in bands (Eq 2.4 to 2.6): octaves up to a centre of 0.0312 cycles per metre, third octaves up to 0.25,
+  twelfth octaves above. Their edges are powers of 2^(1/12): 2^-6.5 = 0.011 and 2^1.5 = 2.83 are among them.
+- A straight line through the logarithms between 0.011 and 2.83 gives the degree of roughness Gd(n0) at 0.1 cycle per
+  metre and the waviness (Eq 2.1). Each octave weighs the same, however many bands it has; the logarithm of a chancy
+  value is low on the average, which is allowed for. Standard errors say what the length of the road leaves to
+  chance, and more where the spectrum strays from a line by more than chance.
+
+What is left out: waves above a quarter of the sampling rate, where shorter ones pose as longer ones (from 1 cycle per
+metre on at a spacing of 0.25 m), and waves longer than two thirds of a segment, which detrending touches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.iso8608 import CLASS_GD_N0_CM3, CM3_M3, HIGHEST_CPM, LOWEST_CPM, REFERENCE_N0_CPM, road_class
+
+Array = npt.NDArray[np.float64]
+
+SHORTEST_M = 100.0
+COARSEST_SPACING_M = 0.3
+
+_SEGMENT_M = 4 / LOWEST_CPM  # four steps of wave number in the longest octave
+_MOST_HALVES = 16  # a longer road gets longer segments instead of more: its longest waves show more sharply
+_LAST_OCTAVE_EDGE = -4.5  # exponents of 2: the octave centred at 2^-5 ends here, and
+_LAST_THIRD_EDGE = -4.5 + 8 / 3  # the third octave centred at 2^-2 here
+_CLEAR_OF_TREND = 1.5  # in steps of wave number: the mean slope takes a part of the first one only
+_CLEAR_OF_ALIASES = 0.25
+_STEPS_PER_WINDOW = 0.9  # how much wider a Hann window makes a band look, in steps of wave number
+_TWO_SIGMA = 2.0
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided displacement spectrum of a profile.
+
+    psd_m3         (b,) at wave numbers step, 2 step ... [m3, that is m2 per cycle/m]
+    step_cpm       resolution Be [cycle/m]
+    chance_m       length of road that counts: a band of width B has a relative variance of 1 / (B chance_m)
+    """
+
+    psd_m3: Array
+    step_cpm: float
+    chance_m: float
+
+    @property
+    def wave_number_cpm(self) -> Array:
+        """(b,) [cycle/m]."""
+        return self.step_cpm * np.arange(1.0, len(self.psd_m3) + 1)
+
+
+@dataclass(frozen=True)
+class Bands:
+    """A spectrum averaged in bands: edges (b + 1,) [cycle/m], values (b,), degrees of freedom (b,) of each value."""
+
+    edges_cpm: Array
+    psd_m3: Array
+    freedom: Array
+
+    @property
+    def centre_cpm(self) -> Array:
+        """Geometric middle of each band [cycle/m]."""
+        return np.sqrt(self.edges_cpm[1:] * self.edges_cpm[:-1])
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """A straight line through a spectrum (Eq 2.1), and the class it means.
+
+    classes                    every class that lies within two standard errors of the degree of roughness
+    lowest_cpm, highest_cpm    between which wave numbers the line was laid [cycle/m]
+    """
+
+    gd_n0_cm3: float
+    gd_n0_std_cm3: float
+    waviness: float
+    waviness_std: float
+    road_class: str
+    classes: tuple[str, ...]
+    lowest_cpm: float
+    highest_cpm: float
+
+
+def acceleration_psd(wave_number_cpm: npt.ArrayLike, displacement_psd_m3: npt.ArrayLike) -> Array:
+    """Spectrum of the second derivative of elevation by distance [1/m2 per cycle/m] (Eq 2.3)."""
+    wave_number = np.asarray(wave_number_cpm, dtype=float)
+    return np.asarray((2 * np.pi * wave_number) ** 4 * np.asarray(displacement_psd_m3))
+
+
+def spectrum(elevation_m: npt.ArrayLike, spacing_m: float) -> Spectrum:
+    """The displacement spectrum of a profile.
+
+    elevation_m    (n,) at uniform spacing [m]
+
+    Segments are at least 364 m and there are at most 15 of them; a road of less than 546 m is one segment.
+    ValueError unless there are at least 16 finite elevations.
+    """
+    elevation = np.asarray(elevation_m, dtype=float)
+    if elevation.ndim != 1 or len(elevation) < 16 or not np.isfinite(elevation).all():
+        raise ValueError("expected a row of at least 16 finite elevations")
+    slope = np.diff(elevation) / spacing_m
+    halves = min(max(2, int(len(slope) * spacing_m / _SEGMENT_M * 2)), _MOST_HALVES)
+    hop = len(slope) // halves
+    size = 2 * hop
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(size) / size)
+
+    power = np.zeros(hop + 1)
+    weight = np.zeros(halves * hop)
+    for start in range(0, (halves - 1) * hop, hop):
+        piece = slope[start:start + size]
+        power += np.abs(np.fft.rfft((piece - piece.mean()) * window)) ** 2
+        weight[start:start + size] += window**2
+    slope_psd = 2 * spacing_m * power[1:] / weight.sum()
+
+    step_cpm = 1 / (size * spacing_m)
+    difference = 2 * np.sin(np.pi * step_cpm * spacing_m * np.arange(1, hop + 1)) / spacing_m
+    chance_m = spacing_m * weight.sum() ** 2 / (weight @ weight)
+    return Spectrum(slope_psd / difference**2, step_cpm, float(chance_m))
+
+
+def band_edges(lowest_cpm: float, highest_cpm: float) -> Array:
+    """Edges of the smoothing bands of ISO 8608 that lie whole between two wave numbers [cycle/m]; (b + 1,)."""
+    exponents = np.concatenate([
+        np.arange(_LAST_OCTAVE_EDGE - 8, _LAST_OCTAVE_EDGE),
+        _LAST_OCTAVE_EDGE + np.arange(8) / 3,
+        _LAST_THIRD_EDGE + np.arange(12 * 12) / 12,
+    ])
+    edges = 2.0**exponents
+    return edges[(edges >= lowest_cpm) & (edges <= highest_cpm)]
+
+
+def smooth(of: Spectrum, edges_cpm: Array) -> Bands:
+    """Averages between neighbouring edges (Eq 2.4 to 2.6).
+
+    Each value of the spectrum stands for the step of wave number around it, and a band takes the part of a step that
+    lies in it: Eq 2.4 for a band that reaches over several steps, and as it should be for one inside a single step,
+    where the printed sum goes wrong. ValueError if an edge lies outside the spectrum.
+    """
+    borders = of.step_cpm * (np.arange(len(of.psd_m3) + 1) + 0.5)
+    if edges_cpm[0] < borders[0] or edges_cpm[-1] > borders[-1]:
+        raise ValueError(f"expected band edges within {borders[0]:.4g} ... {borders[-1]:.4g} cycle/m")
+    below = np.concatenate([[0.0], np.cumsum(of.psd_m3) * of.step_cpm])
+    width_cpm = np.diff(edges_cpm)
+    psd_m3 = np.diff(np.interp(edges_cpm, borders, below)) / width_cpm
+    return Bands(edges_cpm, psd_m3, 2 * of.chance_m * (width_cpm + _STEPS_PER_WINDOW * of.step_cpm))
+
+
+def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float | None = None) -> Roughness:
+    """Degree of roughness, waviness and class of a profile.
+
+    elevation_m      (n,) at uniform spacing [m]
+    widest_step_m    for a profile that was resampled: the widest distance it had between samples [m]; waves shorter
+                     than four of those are left out
+
+    ValueError for a profile below 100 m, which is too short to tell; with samples more than 300 mm apart; not finite;
+    or without any roughness.
+    """
+    elevation = np.asarray(elevation_m, dtype=float)
+    length_m = (elevation.size - 1) * spacing_m
+    if length_m < SHORTEST_M * (1 - 1e-9):
+        raise ValueError(f"too short to tell its class: expected at least {SHORTEST_M:g} m, found {length_m:.4g} m")
+    if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
+        raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
+    measured_m = max(spacing_m, widest_step_m or 0.0)
+    of = spectrum(elevation, spacing_m)
+    edges = band_edges(max(LOWEST_CPM, _CLEAR_OF_TREND * of.step_cpm), min(HIGHEST_CPM, _CLEAR_OF_ALIASES / measured_m))
+    if not len(edges) or edges[-1] < 4 * REFERENCE_N0_CPM:
+        raise ValueError(f"expected samples at most {_CLEAR_OF_ALIASES / REFERENCE_N0_CPM / 4:g} m apart, "
+                         f"found a step of {measured_m:.4g} m")
+    return straight_line(of, edges)
+
+
+def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
+    """Lay the line of Eq 2.1 through the bands of a spectrum, at least three.
+
+    ValueError if there is a band without any roughness in it.
+    """
+    bands = smooth(of, edges_cpm)
+    if not (bands.psd_m3 > 0).all():
+        raise ValueError("expected a road with some roughness at every wavelength; this one is perfectly smooth")
+
+    # A mean of nu squares has, in logarithms, the mean -1/nu - 1/(3 nu^2) and the variance 2/nu + 2/nu^2.
+    nu = bands.freedom
+    level = np.log(bands.psd_m3 / CM3_M3) + 1 / nu + 1 / (3 * nu**2)
+    terms = np.column_stack([np.ones(len(nu)), -np.log(bands.centre_cpm / REFERENCE_N0_CPM)])
+    octaves = np.diff(np.log2(bands.edges_cpm))
+    solve = np.linalg.solve(terms.T @ (octaves[:, None] * terms), terms.T * octaves)
+    log_gd, waviness = solve @ level
+
+    # Neighbouring bands share a window's width, so over all of them each brings only its own width of chance.
+    variance = (solve**2) @ (1 / (of.chance_m * np.diff(bands.edges_cpm)))
+    stray = np.sum((level - terms @ [log_gd, waviness]) ** 2 / (2 / nu + 2 / nu**2)) / (len(nu) - 2)
+    log_std, waviness_std = np.sqrt(variance * max(1.0, stray))
+
+    ends = [road_class(float(np.exp(log_gd + sigma * log_std))) for sigma in (-_TWO_SIGMA, _TWO_SIGMA)]
+    letters = "".join(CLASS_GD_N0_CM3)
+    gd_n0_cm3 = float(np.exp(log_gd))
+    return Roughness(
+        gd_n0_cm3=gd_n0_cm3,
+        gd_n0_std_cm3=gd_n0_cm3 * float(log_std),
+        waviness=float(waviness),
+        waviness_std=float(waviness_std),
+        road_class=road_class(gd_n0_cm3),
+        classes=tuple(letters[letters.index(ends[0]):letters.index(ends[1]) + 1]),
+        lowest_cpm=float(bands.edges_cpm[0]),
+        highest_cpm=float(bands.edges_cpm[-1]),
+    )
