@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 SHORTEST_M = 100.0
 COARSEST_SPACING_M = 0.3
 
+_HIGHEST_M = 1e4
 _SEGMENT_M = 4 / LOWEST_CPM  # four steps of wave number in the longest octave
 _MOST_HALVES = 16  # a longer road gets longer segments instead of more: its longest waves show more sharply
 _LAST_OCTAVE_EDGE = -4.5  # exponents of 2: the octave centred at 2^-5 ends here, and
@@ -104,11 +105,11 @@ def spectrum(elevation_m: npt.ArrayLike, spacing_m: float) -> Spectrum:
     elevation_m    (n,) at uniform spacing [m]
 
     Segments are at least 364 m and there are at most 15 of them; a road of less than 546 m is one segment.
-    ValueError unless there are at least 16 finite elevations.
+    ValueError unless there are at least 16 elevations, all of them on Earth.
     """
     elevation = np.asarray(elevation_m, dtype=float)
-    if elevation.ndim != 1 or len(elevation) < 16 or not np.isfinite(elevation).all():
-        raise ValueError("expected a row of at least 16 finite elevations")
+    if elevation.ndim != 1 or len(elevation) < 16 or not (np.abs(elevation) < _HIGHEST_M).all():
+        raise ValueError(f"expected a row of at least 16 finite elevations below {_HIGHEST_M:g} m")
     slope = np.diff(elevation) / spacing_m
     halves = min(max(2, int(len(slope) * spacing_m / _SEGMENT_M * 2)), _MOST_HALVES)
     hop = len(slope) // halves

@@ -148,6 +148,7 @@ def test_what_is_possible_is_named() -> None:
     (np.zeros(999), 0.1, None, "too short.*at least 100 m, found 99.8 m"),
     (np.zeros(500), 0.4, None, "at most 0.3 m apart, found 0.4 m"),
     (np.full(2000, np.nan), 0.1, None, "finite"),
+    (np.full(2000, 1e200), 0.1, None, "below 10000 m"),
     (np.zeros(2000), 0.1, None, "perfectly smooth"),
     (np.zeros(2000), 0.1, 2.0, "at most 0.625 m apart, found a step of 2 m"),
 ])
