@@ -216,7 +216,7 @@ class DumpWriter:
 
     def write(self, event: Event) -> None:
         """Add an event. Raises ``ValueError`` for one that no reader would accept: an unknown source, a time
-        before the last one's or out of range, no bytes, more than ``EVENT_BYTES``, a chip read that is not three bytes."""
+        before the last one's or out of range, no bytes, more than ``EVENT_BYTES``, a chip read of other than 3."""
         t_us, source, data = event
         fits = len(data) == BMA220_HEX_DIGITS // 2 if source == "bma220" else 0 < len(data) <= EVENT_BYTES
         if not (source in SOURCES and self._last_us <= t_us <= LATEST_US and fits):
