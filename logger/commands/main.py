@@ -22,6 +22,7 @@ VERBS = {
     "status": "what the running service is doing",
     "verify": "check logs and dumps for damage and gaps",
     "report": "make one web page of logs: map, plots, table",
+    "iri": "exact IRI of a measured profile",
     "capture": "record the raw bytes of a serial port",
 }
 EXIT_INTERRUPTED = 130
