@@ -77,7 +77,7 @@ def test_state_transition_has_the_printed_coefficients() -> None:
 
 @pytest.mark.parametrize("spacing_m", [0.005, 0.025, 0.1, 0.25, 0.3])
 def test_a_straight_grade_has_no_roughness(spacing_m: float) -> None:
-    """The printed first coefficient would make 0.03 of grade an IRI of 0.0005 m/km at 0.25 m."""
+    """The printed first coefficient would give a grade of 3 % an IRI of 0.00003 m/km at 0.25 m."""
     assert iri(7.0 + 0.03 * np.arange(0, 100, spacing_m), spacing_m) < 1e-8
 
 
