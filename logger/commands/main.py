@@ -23,6 +23,7 @@ VERBS = {
     "verify": "check logs and dumps for damage and gaps",
     "report": "make one web page of logs: map, plots, table",
     "iri": "exact IRI of a measured profile",
+    "road": "make a random road, or tell the class of a measured one",
     "capture": "record the raw bytes of a serial port",
 }
 EXIT_INTERRUPTED = 130

@@ -1,0 +1,216 @@
+"""Random roads of ISO 8608, and the class of a measured one.
+
+  ridelog road generate --class B --length 1000 --out road.csv
+  ridelog road classify road.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.roads.gd_iri import Expected
+    from logger.roads.spectrum import Array, Roughness
+    from logger.store.profile_file import Profile
+
+_LENGTHS_M = (11.0, 1e6)
+_SPACINGS_M = (0.001, 0.3)
+_WAVINESSES = (1.5, 3.0)
+_MOST_SAMPLES = 20_000_000
+_LINES_AT_ONCE = 100_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the two verbs."""
+    verbs = parser.add_subparsers(dest="road_verb", required=True, metavar="generate|classify")
+    make = verbs.add_parser("generate", help="make a random road", allow_abbrev=False,
+                            description="Make a random road with the spectrum of ISO 8608. Same numbers, same road.")
+    rough = make.add_mutually_exclusive_group(required=True)
+    rough.add_argument("--class", dest="road_class", metavar="A-H", type=str.upper, choices=list("ABCDEFGH"),
+                       help="class; the road gets the geometric mean of its degrees of roughness")
+    rough.add_argument("--gd", type=float, metavar="CM3", help="degree of roughness Gd(n0) [cm3]")
+    rough.add_argument("--iri", type=float, metavar="M_PER_KM",
+                       help="IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation")
+    make.add_argument("--waviness", type=float, default=2.0, metavar="W", help="1.5 to 3 (default: 2)")
+    make.add_argument("--length", type=float, default=1000.0, metavar="M", help="[m] (default: 1000)")
+    make.add_argument("--spacing", type=float, default=0.05, metavar="M", help="between samples [m] (default: 0.05)")
+    make.add_argument("--seed", type=int, default=1, metavar="N", help="another number, another road (default: 1)")
+    make.add_argument("--out", type=Path, metavar="FILE", help="CSV file to write (default: to stdout)")
+    make.add_argument("--json", action="store_true", help="print what was made as one JSON object; needs --out")
+
+    tell = verbs.add_parser("classify", help="class, degree of roughness and waviness of a profile", allow_abbrev=False,
+                            description="Class, degree of roughness and waviness of a profile of at least 100 m.")
+    tell.add_argument("profile", type=Path, metavar="PROFILE", help="CSV or ERD file")
+    tell.add_argument("--resample", type=float, metavar="M",
+                      help="for an unevenly spaced profile: lay straight lines between its samples and take a sample "
+                           "every M metres; what was between wide samples stays unknown")
+    tell.add_argument("--psd", type=Path, metavar="FILE", help="write the smoothed spectrum of the (left) track as CSV")
+    tell.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog road``."""
+    return _generate(args) if args.road_verb == "generate" else _classify(args)
+
+
+# --- generate ---
+
+
+def _generate(args: argparse.Namespace) -> int:
+    from logger.roads.iri import iri
+    from logger.roads.iso8608 import generate, road_class
+
+    if args.json and args.out is None:
+        raise BadInput("--json: expected --out FILE with it, as stdout holds the JSON")
+    _check_range("--length", args.length, *_LENGTHS_M, "m")
+    _check_range("--spacing", args.spacing, *_SPACINGS_M, "m")
+    _check_range("--waviness", args.waviness, *_WAVINESSES, "")
+    if args.seed < 0:
+        raise BadInput(f"--seed {args.seed}: expected 0 or more")
+    if args.length / args.spacing > _MOST_SAMPLES:
+        raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected at most {_MOST_SAMPLES} samples")
+    gd_n0_cm3 = _wanted_gd(args)
+    elevation = generate(gd_n0_cm3, args.length, args.spacing, args.seed, args.waviness)
+    made = {
+        "class": road_class(gd_n0_cm3), "gd_n0_cm3": gd_n0_cm3, "waviness": args.waviness, "seed": args.seed,
+        "iri_m_per_km": iri(elevation, args.spacing), "spacing_m": args.spacing, "samples": len(elevation),
+    }
+    if args.out is None:
+        sys.stdout.writelines(_csv(elevation, args.spacing))
+    else:
+        with args.out.open("w", encoding="ascii", newline="\n") as file:
+            file.writelines(_csv(elevation, args.spacing))
+    if args.json:
+        print(json.dumps(made | {"file": str(args.out)}))
+    else:
+        print(_made_in_words(made, args.out), file=sys.stderr)
+    return EXIT_DONE
+
+
+def _wanted_gd(args: argparse.Namespace) -> float:
+    from logger.roads import gd_iri, iso8608
+
+    if args.road_class is not None:
+        return iso8608.CLASS_GD_N0_CM3[args.road_class]
+    if args.gd is not None:
+        _check_range("--gd", args.gd, 1e-3, 1e7, "cm3")
+        return float(args.gd)
+    _check_range("--iri", args.iri, 0.01, 1000, "m/km")
+    if args.waviness == iso8608.STANDARD_WAVINESS:
+        return iso8608.gd_n0_from_iri(args.iri)
+    return gd_iri.gd_of_road(args.iri, args.length, args.waviness).value
+
+
+def _check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
+    if not lowest <= value <= highest:
+        raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}".rstrip())
+
+
+def _csv(elevation_m: Array, spacing_m: float) -> Iterator[str]:
+    """A profile's lines in blocks; a tenth of a micrometre is finer than any profiler."""
+    yield "distance_m,elevation_m\n"
+    for first in range(0, len(elevation_m), _LINES_AT_ONCE):
+        block = elevation_m[first:first + _LINES_AT_ONCE].tolist()
+        yield "".join(f"{number * spacing_m:.6f},{value:.7f}\n" for number, value in enumerate(block, start=first))
+
+
+def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
+    length_m = (made["samples"] - 1) * made["spacing_m"]
+    return (f"{out or 'stdout'}: {length_m:.10g} m in {made['samples']} samples, class {made['class']}, "
+            f"Gd(n0) {made['gd_n0_cm3']:.5g} cm3, waviness {made['waviness']:g}, seed {made['seed']}, "
+            f"IRI {made['iri_m_per_km']:.2f} m/km")
+
+
+# --- classify ---
+
+
+def _classify(args: argparse.Namespace) -> int:
+    from logger.store.profile_file import read_profile
+
+    profile = read_profile(args.profile, args.resample)
+    tracks = [profile.elevation_m] + ([profile.elevation_right_m] if profile.elevation_right_m is not None else [])
+    try:
+        told = [tell(track, profile) for track in tracks]
+    except ValueError as error:
+        raise BadInput(f"{args.profile}: {error}") from None
+    if args.psd is not None:
+        args.psd.write_text(_psd_csv(profile, told[0].roughness), encoding="ascii")
+    if args.json:
+        print(json.dumps(told[0].as_json() | ({"right": told[1].as_json()} if len(told) > 1 else {})))
+        return EXIT_DONE
+    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
+    print(f"{args.profile.name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm")
+    for name, track in zip(("left track", "right track") if len(told) > 1 else ("",), told, strict=True):
+        print(f"\n{name}\n" if name else "")
+        print("\n".join(track.lines()))
+    return EXIT_DONE
+
+
+@dataclass(frozen=True)
+class Told:
+    """What one wheel track is: its spectrum's line, its exact IRI, and the IRI that such a line lets expect."""
+
+    roughness: Roughness
+    iri_m_per_km: float
+    expected: Expected
+
+    def as_json(self) -> dict[str, Any]:
+        """Named fields, SI units in the names."""
+        from logger.roads.iso8608 import iri_from_gd_n0
+
+        found = self.roughness
+        return {
+            "class": found.road_class, "gd_n0_cm3": found.gd_n0_cm3, "waviness": found.waviness,
+            "iri_m_per_km": self.iri_m_per_km, "gd_n0_std_cm3": found.gd_n0_std_cm3,
+            "waviness_std": found.waviness_std, "classes_possible": list(found.classes),
+            "iri_of_gd_m_per_km": iri_from_gd_n0(found.gd_n0_cm3),
+            "iri_expected_m_per_km": self.expected.value, "iri_expected_std_m_per_km": self.expected.std,
+            "lowest_cpm": found.lowest_cpm, "highest_cpm": found.highest_cpm,
+        }
+
+    def lines(self) -> list[str]:
+        """For a person."""
+        from logger.report.summary import IRI_CLASSES
+        from logger.roads.iso8608 import iri_from_gd_n0
+
+        found = self.roughness
+        doubt = "" if len(found.classes) == 1 else \
+            f"; the road is too short or too odd to be sure: it may be {' or '.join(found.classes)}"
+        return [
+            f"class      {found.road_class}: {IRI_CLASSES[found.road_class]}{doubt}",
+            f"Gd(n0)     {found.gd_n0_cm3:.4g} +- {found.gd_n0_std_cm3:.2g} cm3, from waves of "
+            f"{1 / found.highest_cpm:.2g} to {1 / found.lowest_cpm:.2g} m",
+            f"waviness   {found.waviness:.2f} +- {found.waviness_std:.2f} (the classes have 2)",
+            f"IRI        {self.iri_m_per_km:.2f} m/km; this Gd(n0) means {iri_from_gd_n0(found.gd_n0_cm3):.2f} by "
+            f"Eq 4.39, with this waviness {self.expected.value:.2f} +- {self.expected.std:.2f}",
+        ]
+
+
+def tell(elevation_m: Array, profile: Profile) -> Told:
+    """Measure one track of a profile. ValueError as in ``logger.roads.spectrum.classify``."""
+    from logger.roads.gd_iri import iri_of_road
+    from logger.roads.iri import iri
+    from logger.roads.spectrum import classify
+
+    roughness = classify(elevation_m, profile.spacing_m, profile.widest_step_m)
+    expected = iri_of_road(roughness.gd_n0_cm3, (len(elevation_m) - 1) * profile.spacing_m, roughness.waviness)
+    return Told(roughness, iri(elevation_m, profile.spacing_m), expected)
+
+
+def _psd_csv(profile: Profile, found: Roughness) -> str:
+    from logger.roads.spectrum import acceleration_psd, band_edges, smooth, spectrum
+
+    bands = smooth(spectrum(profile.elevation_m, profile.spacing_m), band_edges(found.lowest_cpm, found.highest_cpm))
+    columns = (bands.edges_cpm[:-1], bands.edges_cpm[1:], bands.psd_m3,
+               acceleration_psd(bands.centre_cpm, bands.psd_m3), bands.freedom)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    header = "lowest_cpm,highest_cpm,displacement_psd_m3,acceleration_psd_per_m,degrees_of_freedom\n"
+    return header + "".join(",".join(f"{value:.7g}" for value in row) + "\n" for row in rows)

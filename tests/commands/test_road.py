@@ -1,0 +1,146 @@
+"""``ridelog road``: what it writes can be read, what it reads is told, and what it cannot use is one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.roads import iso8608
+from logger.roads.iri import iri
+from logger.store.profile_file import read_profile
+
+
+def generate(path: Path, *arguments: str) -> None:
+    assert main(["road", "generate", "--out", str(path), *arguments]) == 0
+
+
+def classify(path: Path, capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    capsys.readouterr()
+    assert main(["road", "classify", str(path), "--json", *arguments]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1
+    told: dict = json.loads(lines[0])
+    return told
+
+
+def test_a_road_is_written_as_a_profile(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "road.csv"
+    generate(path, "--class", "b", "--length", "120", "--spacing", "0.1", "--seed", "7", "--waviness", "2.5")
+    profile = read_profile(path)
+    assert profile.spacing_m == pytest.approx(0.1)
+    assert profile.elevation_m == pytest.approx(iso8608.generate(64, 120, 0.1, 7, 2.5), abs=0.51e-7)
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert "120 m in 1201 samples, class B, Gd(n0) 64 cm3, waviness 2.5, seed 7" in output.err
+
+
+def test_without_a_file_it_goes_to_stdout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generate(tmp_path / "road.csv", "--gd", "100", "--length", "20")
+    capsys.readouterr()
+    assert main(["road", "generate", "--gd", "100", "--length", "20"]) == 0
+    output = capsys.readouterr()
+    assert output.out == (tmp_path / "road.csv").read_text()
+    assert output.err.startswith("stdout: 20 m in 401 samples")
+
+
+@pytest.mark.parametrize("waviness", ["2", "2.5"])
+def test_an_iri_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str], waviness: str) -> None:
+    generate(tmp_path / "road.csv", "--iri", "5", "--waviness", waviness, "--length", "5000", "--json")
+    made = json.loads(capsys.readouterr().out)
+    assert made["iri_m_per_km"] == pytest.approx(5, rel=0.02)
+    assert made["class"] == ("B" if waviness == "2" else "C")
+    assert made["samples"] == 100_001
+
+
+def test_classify_prints_the_fields_of_the_contract(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generate(tmp_path / "road.csv", "--class", "C", "--length", "600", "--spacing", "0.1")
+    told = classify(tmp_path / "road.csv", capsys)
+    assert list(told)[:4] == ["class", "gd_n0_cm3", "waviness", "iri_m_per_km"]
+    assert told["class"] == "C"
+    assert told["gd_n0_cm3"] == pytest.approx(256, abs=3 * told["gd_n0_std_cm3"])
+    assert told["waviness"] == pytest.approx(2, abs=3 * told["waviness_std"])
+    assert told["iri_m_per_km"] == pytest.approx(iri(iso8608.generate(256, 600, 0.1, 1), 0.1), rel=1e-5)
+    assert told["iri_m_per_km"] == pytest.approx(told["iri_expected_m_per_km"],
+                                                 abs=3 * told["iri_expected_std_m_per_km"])
+
+
+def test_two_tracks_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    left, right = (iso8608.generate(gd, 300, 0.1, 1) for gd in (64, 1024))
+    rows = "".join(f"{0.1 * number:.1f},{a},{b}\n" for number, (a, b) in enumerate(zip(left, right, strict=True)))
+    path = tmp_path / "tracks.csv"
+    path.write_text("distance_m,elevation_m,elevation_right_m\n" + rows)
+    told = classify(path, capsys)
+    assert (told["class"], told["right"]["class"]) == ("B", "D")
+    assert main(["road", "classify", str(path)]) == 0
+    screen = capsys.readouterr().out
+    assert "left track" in screen
+    assert "class      D: poor" in screen
+
+
+def test_a_person_sees_errors_and_doubt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generate(tmp_path / "road.csv", "--gd", "128", "--length", "150")
+    capsys.readouterr()
+    assert main(["road", "classify", str(tmp_path / "road.csv")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "road.csv: 150.00 m, one sample every 50 mm"
+    assert lines[2].endswith("it may be B or C")
+    assert [line.split()[0] for line in lines[2:]] == ["class", "Gd(n0)", "waviness", "IRI"]
+    assert "+-" in lines[3]
+    assert "Eq 4.39" in lines[5]
+
+
+def test_the_smoothed_spectrum_as_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generate(tmp_path / "road.csv", "--class", "B", "--length", "3000", "--spacing", "0.1")
+    classify(tmp_path / "road.csv", capsys, "--psd", str(tmp_path / "psd.csv"))
+    low, high, displacement, acceleration, freedom = np.loadtxt(tmp_path / "psd.csv", delimiter=",", skiprows=1).T
+    assert low[1:] == pytest.approx(high[:-1])
+    centre = np.sqrt(low * high)
+    assert np.mean(displacement / (64e-6 * (centre / 0.1) ** -2)) == pytest.approx(1, abs=0.05)
+    assert acceleration == pytest.approx(displacement * (2 * np.pi * centre) ** 4, rel=1e-5)
+    assert (freedom > 10).all()
+
+
+def test_an_uneven_profile_can_be_resampled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    road = iso8608.generate(256, 1000, 0.05, 3)
+    kept = np.flatnonzero(np.arange(len(road)) % 9 % 5 % 2 == 0)  # steps of 0.05 to 0.15 m
+    path = tmp_path / "uneven.csv"
+    path.write_text("distance_m,elevation_m\n" + "".join(f"{0.05 * i:.2f},{road[i]:.6f}\n" for i in kept))
+    with pytest.raises(BadInput, match=r"uneven\.csv:\d+: expected even steps"):
+        main(["road", "classify", str(path)])
+    told = classify(path, capsys, "--resample", "0.1")
+    assert told["class"] == "C"
+    assert told["highest_cpm"] < 0.25 / 0.0999
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--class", "A", "--length", "5"], "--length 5: expected 11 to 1e\\+06 m"),
+    (["--class", "A", "--length", "nan"], "--length nan"),
+    (["--class", "A", "--spacing", "0"], "--spacing 0: expected 0.001 to 0.3 m"),
+    (["--class", "A", "--waviness", "4"], "--waviness 4: expected 1.5 to 3"),
+    (["--gd", "-1"], "--gd -1: expected 0.001"),
+    (["--iri", "inf"], "--iri inf: expected 0.01 to 1000 m/km"),
+    (["--gd", "1", "--seed", "-1"], "--seed -1: expected 0 or more"),
+    (["--gd", "1", "--length", "1e6", "--spacing", "0.01"], "at most 20000000 samples"),
+    (["--gd", "1", "--json"], "--json: expected --out FILE"),
+])
+def test_a_road_that_cannot_be_made(arguments: list[str], message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        main(["road", "generate", *arguments])
+
+
+@pytest.mark.parametrize("arguments", [[], ["generate"], ["generate", "--class", "J"],
+                                       ["generate", "--class", "A", "--iri", "2"], ["classify"]])
+def test_wrong_use_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["road", *arguments])
+    assert left.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_profile_that_is_too_short(tmp_path: Path) -> None:
+    generate(tmp_path / "road.csv", "--class", "A", "--length", "60")
+    with pytest.raises(BadInput, match=r"road\.csv: too short to tell its class: expected at least 100 m, found 60 m"):
+        main(["road", "classify", str(tmp_path / "road.csv")])
