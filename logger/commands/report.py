@@ -39,6 +39,8 @@ def write_report(logs: Sequence[Path], out: Path) -> list[LoggedFile]:
 
     Raises BadInput when no log has an intact row, or the page cannot be written.
     """
+    if out.exists() and not out.is_file():
+        raise BadInput(f"{out}: expected the name of a file to write")
     files = [read_logged(log) for log in logs]
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(map(str, logs))}: expected a log with at least one intact row")

@@ -1,5 +1,6 @@
 """The service: reads the sensors, cuts the drive into windows, writes the logs.
 
+Exit status 0: stopped as asked; 1: the system failed it (start it again); 2: wrong settings (do not).
 systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.
 """
 
@@ -11,6 +12,7 @@ import signal
 import threading
 from pathlib import Path
 
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.service.config import find_config, load_config
 
 
@@ -31,5 +33,10 @@ def run(args: argparse.Namespace) -> int:
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    serve(config, stop)
-    return 0
+    try:
+        serve(config, stop)
+    except OSError as error:
+        # Not status 2: a full card or a lost mount may be well again at the next start, which systemd makes.
+        logging.getLogger(__name__).error("stopped by the system: %s", error)
+        return EXIT_CHECK_FAILED
+    return EXIT_DONE

@@ -123,7 +123,7 @@ def load_config(path: Path) -> Config:
         "vehicle": _vehicle,
         "pipeline": _pipeline,
         "log": _log,
-        "status_file": _path,
+        "status_file": _file_to_write,
     })(load_mapping(path))
 
 
@@ -168,6 +168,13 @@ def _or_none(word: str, read: Read) -> Read:
 
 def _path(node: Node) -> Path:
     return Path(node.file).parent.resolve() / node.text()
+
+
+def _file_to_write(node: Node) -> Path:
+    path = _path(node)
+    if path.exists() and not path.is_file():
+        raise node.wrong("the name of a file to write (this is a folder or a device)")
+    return path
 
 
 def _is_path(text: str) -> bool:

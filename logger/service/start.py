@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import threading
 import time
 from collections import deque
@@ -13,6 +14,7 @@ from drivers.dump import DumpWriter, Event, open_dump
 from drivers.hardware import open_i2c, open_serial
 from drivers.ports import I2cBus
 from drivers.replay import RecordedBus
+from logger.errors import BadInput
 from logger.service import assemble
 from logger.service.config import Config
 from logger.service.core import Core
@@ -34,7 +36,7 @@ def serve(config: Config, stop: threading.Event) -> None:
     sensor = assemble.instrument(config.accelerometer)
     relation, vehicle = assemble.relation(config)
     directory = config.log.directory
-    directory.mkdir(parents=True, exist_ok=True)
+    _make(directory)
     for repaired in repair(directory):
         log.info("repaired %s", repaired)
     session = next_session(directory)
@@ -64,6 +66,16 @@ def serve(config: Config, stop: threading.Event) -> None:
     notifier.stopping()
     observer.remove()
     log.info("stopped: %d rows written", core.rows)
+
+
+def _make(directory: Path) -> None:
+    """The folder of the logs. Raises BadInput where no folder can be or may be written to."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except (PermissionError, NotADirectoryError, FileExistsError) as error:
+        raise BadInput(f"{directory}: expected a folder for the logs ({error.strerror})") from None
+    if not os.access(directory, os.W_OK | os.X_OK):
+        raise BadInput(f"{directory}: expected a folder that the service may write to")
 
 
 def _recorder(config: Config, sensor: assemble.Instrument, session: int) -> DumpWriter | None:

@@ -130,3 +130,11 @@ def test_no_such_recording(ridelog: Path, tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "none.dump" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_report_never_replaces_a_device(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+    call(ridelog, "replay", short_dump, "--out", tmp_path)
+    (tmp_path / "folder").mkdir()
+    done = call(ridelog, "report", tmp_path, "--out", tmp_path / "folder")
+    assert done.returncode == 2
+    assert "expected the name of a file" in done.stderr

@@ -116,3 +116,10 @@ def test_the_file_that_is_given_is_the_one_that_is_read(tmp_path: Path) -> None:
     assert find_config(tmp_path / "my.yaml") == tmp_path / "my.yaml"
     with pytest.raises(BadInput, match="expected a readable file"):
         load_config(tmp_path / "my.yaml")
+
+
+def test_a_status_file_that_is_a_device_is_refused(tmp_path: Path) -> None:
+    config = tmp_path / "ridelog.yaml"
+    config.write_text("status_file: /dev/null\n")
+    with pytest.raises(BadInput, match=r"ridelog\.yaml:1: expected the name of a file"):
+        load_config(config)
