@@ -270,22 +270,6 @@ class Bma220Decoder:
         return AccelerationBlock(t_us, counts.astype(np.float64) * self.mps2_per_count, clipped)
 
 
-def gravity_warning(block: AccelerationBlock, range_g: int) -> str | None:
-    """A line for the status when the mean acceleration of a second or more is not about 1 g long, else None.
-
-    The length of the mean vector is compared, so that vibration averages out; cornering and braking add a few
-    hundredths. Allowed: 0.2 g (zero offset of +-95 mg on two axes and such manoeuvres) and one count of the range.
-    A warning, not an error: the car may be moving, and the sensor may be a little off.
-    """
-    if len(block) == 0:
-        return None
-    length_g = float(np.linalg.norm(block.accel_mps2.mean(axis=0))) / STANDARD_GRAVITY_MPS2
-    allowed_g = 0.2 + range_g / 32
-    if abs(length_g - 1) <= allowed_g:
-        return None
-    return f"mean acceleration is {length_g:.2f} g, expected 1 within {allowed_g:.2f}: check range, wiring and supply"
-
-
 def _fault(error: OSError, chip: int) -> DeviceError:
     """What a failed transfer means, in one line."""
     if error.errno in NOT_ACKNOWLEDGED:

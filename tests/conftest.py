@@ -7,19 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from logger.demo.motion import Bump, Stretch
-from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import Drive, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 
-SHORT_PLAN = DrivePlan(
-    speed_knots=((0, 0), (3, 0), (9, 10), (30, 12), (36, 0), (41, 0), (47, 14), (70, 14)),
-    stretches=(Stretch(200, 60), Stretch(200, 250)),
-    bumps=(Bump(330, 0.05, 1.5),),
-    reception=Reception(first_fix_s=6, lost=((20, 24),), corrupted_s=15),
-    seed=5,
-)
+from drives import SHORT_PLAN
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,8 @@ from drivers.dump import open_dump
 from logger.errors import BadInput
 from logger.service.config import Config, load_config
 
+LOWEST_RATE, HIGHEST_RATE = 0.01, 1e6
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog replay``."""
@@ -31,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog replay``."""
-    if args.rate < 0:
-        raise BadInput(f"--rate {args.rate:g}: expected 0 or more")
+    if args.rate != 0 and not LOWEST_RATE <= args.rate <= HIGHEST_RATE:
+        raise BadInput(f"--rate {args.rate:g}: expected 0, or a number from {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
     config = load_config(args.config) if args.config else Config()
     outcome = replay(args.dump, args.out, config, args.rate, args.vehicle, quiet=args.json)
     if args.json:
@@ -84,24 +86,26 @@ def replay(dump: Path, out: Path, config: Config, rate: float, vehicle: str | No
     from logger.service import assemble
     from logger.service.core import Core
     from logger.service.replay import Player
+    from logger.store.folder_lock import FolderLock
     from logger.store.rotation import SegmentLog, next_session, repair
 
     with open_dump(dump) as reader:
-        config = assemble.config_for_dump(reader.header, config, vehicle)
+        config = assemble.config_for_dump(reader.header, config, vehicle, place=f"{dump}:1")
         config = replace(config, log=replace(config.log, directory=out))
-        out.mkdir(parents=True, exist_ok=True)
-        repair(out)
         sensor = assemble.instrument(config.accelerometer)
         relation, vehicle_facts = assemble.relation(config)
-        session = next_session(out)
         facts = assemble.sidecar(config, sensor, vehicle_facts) | {"replayed_from": dump.name}
-        segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-        pipeline = assemble.pipeline(config, sensor, relation)
-        core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
-        started_s = time.monotonic()
-        player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
-        played = player.play(reader)
-        wall_s = time.monotonic() - started_s
+        out.mkdir(parents=True, exist_ok=True)
+        with FolderLock(out):
+            repair(out)
+            session = next_session(out)
+            segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
+            pipeline = assemble.pipeline(config, sensor, relation)
+            core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
+            player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
+            started_s = time.monotonic()
+            played = player.play(reader)
+            wall_s = time.monotonic() - started_s
     if not quiet:
         print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
     return _outcome(out, session, core.rows, played.duration_s, wall_s, reader.torn_tail)

@@ -141,6 +141,7 @@ def _sampled(
     rare = rng.random(count) < _RARE_SHARE
     late_us[rare] = rng.uniform(*_RARE_LATE_US, rare.sum())
     since_us = np.round(np.arange(count) * US_PER_S / plan.rate_hz + late_us).astype(np.int64)
+    since_us = np.maximum.accumulate(since_us)  # a read that is late delays those that follow at once
     felt = np.stack([motion.forward_mps2, motion.left_mps2, accel + STANDARD_GRAVITY_MPS2], axis=1)
     step = since_us / (STEP_S * US_PER_S)
     grid = np.arange(len(motion.time_s))

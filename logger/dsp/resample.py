@@ -198,6 +198,7 @@ STOP_HZ = 62.0
 SLOW_RATE_HZ = 100
 STOP_DB = 65.0
 BLOCK = 16
+BRIDGED_SHARE = 0.5
 
 
 def decimation_taps(factor: int) -> Floats:
@@ -219,8 +220,9 @@ class Decimator:
 
     The filter is symmetric, and an output is given the time of its middle; it comes half a filter later (85 ms).
     A run is taken to have stood at its first value before it began and to stay at its last after it ended, so
-    the slow run covers the same stretch. An output is clipped or bridged when one of the ``factor`` inputs about
-    it is. Factor 1 passes everything through. Raises ValueError for a factor below 1.
+    the slow run covers the same stretch. An output is clipped when one of the ``factor`` inputs about it is, and
+    bridged when half of them are: one reading that came late is no hole. Factor 1 passes everything through.
+    Raises ValueError for a factor below 1.
 
     The work is laid out like that of ``logger.dsp.sections``: one matrix for a fixed block, zeros for what has
     not arrived, so that no split of the input changes a bit.
@@ -287,8 +289,9 @@ class Decimator:
 
     def _run(self, values: Floats) -> GridRun:
         used = len(values) * self._factor
-        marks = np.logical_or.reduce(self._marks[:, :used].reshape(2, len(values), self._factor), axis=2)
-        run = GridRun(self._next_us, SLOW_RATE_HZ, values, marks[0], marks[1], self._new_start)
+        clipped, bridged = self._marks[:, :used].reshape(2, len(values), self._factor)
+        hole: Bools = np.asarray(bridged.mean(axis=1) >= BRIDGED_SHARE)
+        run = GridRun(self._next_us, SLOW_RATE_HZ, values, clipped.any(axis=1), hole, self._new_start)
         self._marks = self._marks[:, used:]
         self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
         self._new_start = False

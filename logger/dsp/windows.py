@@ -84,7 +84,7 @@ class Window:
 
 
 # Columns that are summed, then columns of which the largest counts.
-_COUNT, _GOOD, _A2, _W2, _W4, _CLIPPED, _MISSING, _UNSETTLED, _BRIDGED, _SPEED = range(10)
+_COUNT, _GOOD, _A2, _W2, _W4, _CLIPPED, _ABSENT, _INTERPOLATED, _UNSETTLED, _BRIDGED, _SPEED = range(11)
 _PEAK, _RUNNING = range(2)
 
 
@@ -97,7 +97,7 @@ class _Open:
         self.start_m = start_m
         self.whole = whole
         self.last_m: float | None = start_m
-        self.sums = np.zeros(10)
+        self.sums = np.zeros(11)
         self.largest = np.zeros(2)
         self.stood = False
 
@@ -114,7 +114,8 @@ class _Open:
             squares.sum(),
             squares @ squares,
             np.count_nonzero(part.clipped),
-            np.count_nonzero(~part.present) + np.count_nonzero(part.interpolated),
+            np.count_nonzero(~part.present),
+            np.count_nonzero(part.interpolated),
             np.count_nonzero(~part.settled & part.present),
             np.count_nonzero(bridged),
             speed_mps.sum(),
@@ -124,13 +125,13 @@ class _Open:
             self.largest = np.maximum(self.largest, (np.abs(weighted).max(), part.running_rms_mps2[good].max()))
 
     def close(self, end_m: float | None, step_s: float, complete: bool) -> Window | None:
-        """The finished window; None when it never held a sample."""
+        """The finished window; None when nothing is known of it: neither a sample nor a place."""
         count = self.sums[_COUNT]
-        if count == 0:
+        blind = self.key[0]
+        if count == 0 or (blind and self.sums[_ABSENT] == count):
             return None
         good = self.sums[_GOOD]
         known = good >= GOOD_SHARE * count
-        blind = self.key[0]
         return Window(
             t_us=self.t_us,
             duration_s=float(count * step_s),
@@ -151,7 +152,7 @@ class _Open:
     def _flags(self, blind: bool, complete: bool) -> list[str]:
         found = {
             "clipped": self.sums[_CLIPPED] > 0,
-            "gap": self.sums[_MISSING] > 0,
+            "gap": self.sums[_ABSENT] + self.sums[_INTERPOLATED] > 0,
             "unsettled": self.sums[_UNSETTLED] > 0,
             "gps_lost": blind or self.sums[_BRIDGED] > 0,
             "blind": blind,

@@ -9,13 +9,16 @@ from typing import Any
 
 from drivers.bma220 import Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.dump import DumpHeader
+from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder
 from drivers.pasco import FrameLayout, PascoDecoder, Profile, load_profile
+from logger.dsp.fixed_point import FixedFilter
+from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.roads.from_acceleration import RmsRelation, rms_relation
 from logger.service.chain import Axis, SignalChain, recorder_gain
-from logger.service.config import AccelerometerConfig, Config
+from logger.service.config import AXES, AccelerometerConfig, Config
 from logger.service.core import AccelerationDecoder
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.shipped import vehicle_file, vehicle_names, version
@@ -94,7 +97,8 @@ def pipeline(config: Config, sensor: Instrument, vehicle_relation: RmsRelation) 
         noise_rms_mps2=sensor.noise_rms_mps2,
     )
     axis = Axis.from_word(config.accelerometer.vertical_axis)
-    chain = SignalChain(axis, WEIGHTING, sensor.oversample, config.pipeline.low_pass_hz)
+    make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
+    chain = SignalChain(axis, WEIGHTING, sensor.oversample, config.pipeline.low_pass_hz, make_filter)
     return Pipeline(settings, chain, vehicle_relation)
 
 
@@ -118,29 +122,40 @@ def dump_header(config: Config, sensor: Instrument) -> DumpHeader:
     return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, config.vehicle.stem)
 
 
-def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None) -> Config:
+def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None, place: str = "header") -> Config:
     """Settings for a replay: those given, with what the recording says about its sensor and its vehicle.
 
-    Raises BadInput where the recording names what is not known here.
+    Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """
     says = header.accelerometer
-    sensor = replace(config.accelerometer, driver=says["driver"])
-    if "vertical_axis" in says:
-        sensor = replace(sensor, vertical_axis=str(says["vertical_axis"]))
-    chip = replace(
-        sensor.bma220,
-        range_g=says.get("range_g", sensor.bma220.range_g),
-        oversample=says.get("oversample", sensor.bma220.oversample),
-    )
-    serial = replace(sensor.pasco, profile=says.get("profile", sensor.pasco.profile))
+    chip, serial = config.accelerometer.bma220, config.accelerometer.pasco
+    axis = says.get("vertical_axis", config.accelerometer.vertical_axis)
+    if axis not in AXES:
+        raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {axis!r}")
+    range_g, oversample = (says.get(key, getattr(chip, key)) for key in ("range_g", "oversample"))
+    if type(range_g) is not int or type(oversample) is not int:
+        raise BadInput(f"{place}: expected whole numbers for 'range_g' and 'oversample'")
+    profile = says.get("profile", serial.profile)
+    if not isinstance(profile, str):
+        raise BadInput(f"{place}: expected 'profile' as a name")
     name = vehicle or header.vehicle
     path = vehicle_file(name) if name in vehicle_names() else Path(name)
     if not path.is_file():
         raise BadInput(
-            f"the recording's vehicle {name!r} is not known here; expected --vehicle FILE.yaml or one of: "
+            f"{place}: the recording's vehicle {name!r} is not known here; expected --vehicle FILE.yaml or one of: "
             f"{', '.join(vehicle_names())}"
         )
-    return replace(config, accelerometer=replace(sensor, bma220=chip, pasco=serial), vehicle=path)
+    sensor = AccelerometerConfig(
+        driver=says["driver"],
+        vertical_axis=axis,
+        bma220=replace(chip, range_g=range_g, oversample=oversample),
+        pasco=replace(serial, profile=profile),
+    )
+    try:
+        instrument(sensor)
+    except SettingsError as error:
+        raise BadInput(f"{place}: {error}") from None
+    return replace(config, accelerometer=sensor, vehicle=path)
 
 
 def _mounted(profile: Profile, up: Axis) -> Profile:

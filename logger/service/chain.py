@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
 from logger.comfort.iso2631 import RunningRms
+from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.resample import Decimator, GridResampler, GridRun
-from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
+from logger.dsp.sections import BlockFilter, SectionRows, butterworth_sos, frequency_response
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
 from logger.dsp.windows import GridSamples, joined
 from logger.units import US_PER_S
@@ -55,15 +56,17 @@ class SignalChain:
     weighting     frequency weighting with stored sections for 100 Hz
     oversample    the sensor is read at this multiple of 100 Hz
     low_pass_hz   corner of a second-order low-pass; None: not used
+    make_filter   the arithmetic of the recursive filters: ``BlockFilter``, or ``FixedFilter.for_acceleration``
     """
 
-    def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None) -> None:
+    def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None,
+                 make_filter: Callable[[SectionRows], BlockFilter | FixedFilter] = BlockFilter) -> None:
         self._axis = axis
         self._resampler = GridResampler(GRID_RATE_HZ * oversample)
         self._decimator = Decimator(oversample)
-        self._high_pass = BlockFilter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
-        self._low_pass = BlockFilter(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ)) if low_pass_hz else None
-        self._weighting = BlockFilter(np.asarray(weighting.sections[GRID_RATE_HZ]))
+        self._high_pass = make_filter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
+        self._low_pass = make_filter(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ)) if low_pass_hz else None
+        self._weighting = make_filter(weighting.sections[GRID_RATE_HZ])
         self._running = RunningRms(GRID_RATE_HZ)
         self._unweighted: GridSamples | None = None
         self._early = DELAY_SAMPLES
@@ -91,6 +94,12 @@ class SignalChain:
         begun_us = self._next_us if self._next_us is not None else start_us
         if begun_us < missing_until_us:
             out.append(self._absent(begun_us, missing_until_us))
+        return out
+
+    def skip_to(self, t_us: int) -> list[GridSamples]:
+        """Go on at ``t_us``, with no grid for the time before it: nothing at all was heard in it."""
+        out = self.flush()
+        self._next_us = t_us
         return out
 
     def flush(self) -> list[GridSamples]:

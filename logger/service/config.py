@@ -76,7 +76,7 @@ class GpsConfig:
 
 @dataclass(frozen=True)
 class PipelineConfig:
-    """``low_pass_hz`` None: no low-pass before the roughness relation."""
+    """``low_pass_hz`` None: no low-pass before the roughness relation; ``arithmetic`` is float or fixed."""
 
     window_m: float = WINDOW_M
     low_pass_hz: float | None = None
@@ -84,6 +84,7 @@ class PipelineConfig:
     stationary_mps: float = 0.5
     drive_end_s: float = 300.0
     blind_window_s: float = 5.0
+    arithmetic: str = "float"
 
 
 @dataclass(frozen=True)
@@ -265,6 +266,7 @@ _read_pipeline = _section(PipelineConfig, {
     "stationary_mps": _number(0.05, 5),
     "drive_end_s": _number(10, 86400),
     "blind_window_s": _number(1, 60),
+    "arithmetic": lambda node: node.choice("float", "fixed"),
 })
 
 _log = _section(LogConfig, {

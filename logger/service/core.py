@@ -19,6 +19,7 @@ from logger.service.pipeline import Pipeline
 from logger.store.rotation import ClockMap
 
 STEP_US = 500_000
+IDLE_US = 120_000_000
 log = logging.getLogger(__name__)
 
 
@@ -51,6 +52,7 @@ class Core:
         self._sink = sink
         self._fixes: list[Fix] = []
         self._next_step_us: int | None = None
+        self._last_event_us = 0
         self._drive = pipeline.drive
         self._offset_us: int | None = None
         self.rows = 0
@@ -68,6 +70,7 @@ class Core:
             self._next_step_us = t_us + STEP_US
         elif t_us >= self._next_step_us:
             self.advance(t_us)
+        self._last_event_us = t_us
         if source == "nmea":
             self._fixes += self._gps.feed(t_us, data)
             return
@@ -78,8 +81,14 @@ class Core:
             log.warning("event at %.6f s passed over: %s", t_us / 1e6, error)
 
     def advance(self, now_us: int) -> None:
-        """Make the steps that lie at or before ``now_us``; every event before that has been fed."""
+        """Make the steps that lie at or before ``now_us``; every event before that has been fed.
+
+        After two minutes without any event everything has settled, and the steps up to ``now_us`` are left out.
+        """
         while self._next_step_us is not None and self._next_step_us <= now_us:
+            if self._next_step_us > self._last_event_us + IDLE_US:
+                self._next_step_us += (now_us - self._next_step_us) // STEP_US * STEP_US
+                self._pipeline.skip_to(self._next_step_us)
             step_us = self._next_step_us
             self._next_step_us += STEP_US
             block = self._take_block()

@@ -26,6 +26,8 @@ LOOP_S = 0.25
 HOLD_BACK_US = 60_000
 GATHER_S = 0.03
 CLOSED_WAIT_S = 0.1
+STOP_WAIT_S = 2.0
+HANG_US = 10 * US_PER_S
 THREAD_SWITCH_S = 0.0005
 log = logging.getLogger(__name__)
 
@@ -66,11 +68,13 @@ class Listener(threading.Thread):
         self._pace = pace
         self._stop_asked = threading.Event()
         self.failure: BaseException | None = None
+        self.looked_us = monotonic_us()
 
     def run(self) -> None:
         """Until stopped. A fault that is not the device's ends the thread; the main loop sees it."""
         try:
             while not self._stop_asked.is_set():
+                self.looked_us = monotonic_us()
                 event = self._supervisor.step()
                 if event is not None:
                     self._events.append(event)
@@ -84,9 +88,15 @@ class Listener(threading.Thread):
             self._supervisor.close()
 
     def stop(self) -> None:
-        """Ask it to end and wait for it."""
+        """Ask it to end and wait for it, but not for one that hangs in its device."""
         self._stop_asked.set()
-        self.join()
+        self.join(STOP_WAIT_S)
+        if self.is_alive():
+            log.error("%s: its device does not return; stopping without it", self.name)
+
+    def hangs(self, now_us: int) -> bool:
+        """True when the device has not returned from a look for so long that only a restart can help."""
+        return now_us - self.looked_us > HANG_US
 
 
 def gather() -> None:
@@ -143,13 +153,16 @@ class LiveService:
     def _end(self) -> None:
         for listener in self._listeners:
             listener.stop()
-        self._move(monotonic_us(), step=False)
+        self._move(monotonic_us())
         self._core.finish()
-        if self._recorder is not None:
-            self._recorder.close()
+        self._record(lambda recorder: recorder.close())
 
-    def _move(self, until_us: int, step: bool = True) -> None:
-        """Take the events up to ``until_us``; later ones wait, for another source may still bring earlier ones."""
+    def _move(self, until_us: int) -> None:
+        """Take the events up to ``until_us``; later ones wait, for another source may still bring earlier ones.
+
+        Only events move the pipeline. Time that passes without any would leave no trace in a recording, and what it
+        did could not be played again.
+        """
         for listener in self._listeners:
             if listener.failure is not None:
                 raise listener.failure
@@ -159,22 +172,27 @@ class LiveService:
         self._events.extendleft(reversed(taken[len(ready) :]))
         for event in ready:
             self._take(event)
-        if step:
-            self._core.advance(until_us)
-            self._floor_us = max(self._floor_us, until_us)
 
     def _take(self, event: Event) -> None:
         if event.t_us < self._floor_us:
             event = event._replace(t_us=self._floor_us)
         self._floor_us = event.t_us
-        if self._recorder is not None:
-            self._recorder.write(event)
+        self._record(lambda recorder: recorder.write(event))
         self._core.feed(event)
 
     def _sync(self) -> None:
         self._log.sync()
-        if self._recorder is not None:
-            self._recorder.flush(sync=True)
+        self._record(lambda recorder: recorder.flush(sync=True))
+
+    def _record(self, act: Callable[[DumpWriter], None]) -> None:
+        """Do something with the recorder. A recording that cannot go on must not stop the log."""
+        if self._recorder is None:
+            return
+        try:
+            act(self._recorder)
+        except OSError as error:
+            log.error("recording stopped: %s", error)
+            self._recorder = None
 
 
 def _time_of(event: Event) -> int:

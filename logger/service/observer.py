@@ -6,10 +6,11 @@ import logging
 import os
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 
-from drivers.bma220 import gravity_warning
 from drivers.nmea import NmeaDecoder
+from logger.service.chain import Axis
 from logger.service.config import Config
 from logger.service.core import Core
 from logger.service.live import Deadlines, monotonic_us
@@ -18,10 +19,12 @@ from logger.service.status import SensorStatus, ServiceState, ServiceStatus, wri
 from logger.service.supervisor import Supervisor
 from logger.shipped import version
 from logger.store.rotation import SegmentLog
-from logger.units import US_PER_S
+from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 HEALTH_LINE_US = 60 * US_PER_S
 RECENT_US = 15 * US_PER_S
+GRAVITY_TOLERANCE_G = 0.4
+LOOKS_WITHOUT_GRAVITY = 5
 log = logging.getLogger(__name__)
 
 
@@ -53,7 +56,8 @@ class Observer:
         self._rows = 0
         self._row_us: int | None = None
         self._failed = False
-        self._warned_of_gravity = False
+        self._without_gravity = 0
+        self._gravity_advice: str | None = None
 
     def write(self, now_us: int) -> None:
         """Renew the status file; once a minute a line in the log."""
@@ -73,7 +77,8 @@ class Observer:
 
     def remove(self) -> None:
         """The service ends: its status goes with it."""
-        self._config.status_file.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._config.status_file.unlink(missing_ok=True)
 
     def line(self) -> str:
         """The state in one line."""
@@ -111,14 +116,21 @@ class Observer:
         )
 
     def _look_at_gravity(self) -> None:
-        """Tell, once, when the samples cannot be those of a car that stands on the earth."""
+        """Notice an accelerometer that does not feel the earth along the axis that is set to point up."""
         block = self._core.last_block
-        if block is None or self._config.accelerometer.driver != "bma220":
+        if block is None:
             return
-        warning = gravity_warning(block, self._config.accelerometer.bma220.range_g)
-        if warning is not None and not self._warned_of_gravity:
-            log.warning("%s", warning)
-        self._warned_of_gravity = warning is not None
+        felt_g = block.accel_mps2.mean(axis=0) / STANDARD_GRAVITY_MPS2
+        word = self._config.accelerometer.vertical_axis
+        up = Axis.from_word(word)
+        if abs(up.sign * felt_g[up.column] - 1.0) <= GRAVITY_TOLERANCE_G:
+            self._without_gravity, self._gravity_advice = 0, None
+            return
+        self._without_gravity += 1
+        if self._without_gravity == LOOKS_WITHOUT_GRAVITY:
+            axes = ", ".join(f"{name} {value:+.2f}" for name, value in zip("xyz", felt_g, strict=True))
+            self._gravity_advice = f"axis {word} does not feel 1 g ({axes} g): check vertical_axis, range and mounting"
+            log.warning("accelerometer: %s", self._gravity_advice)
 
     def _state(self, now_us: int) -> ServiceState:
         if not self._core.samples and not self._core.rows:
@@ -138,7 +150,7 @@ class Observer:
             place=place,
             state=state,
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
-            last_error=part.error or None,
+            last_error=part.error or (self._gravity_advice if name == "accelerometer" else None),
             readings=readings,
             counters={"faults": part.faults, "restarts": part.restarts, **(counters or {})},
         )

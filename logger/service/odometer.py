@@ -77,12 +77,13 @@ class Odometer:
         if self._t_us and timed.t_us <= self._t_us[-1]:
             return
         speed_mps = fix.speed_mps if fix.speed_mps >= self._stationary_mps else 0.0
-        if not self._plausible(timed.t_us, speed_mps, fix.lat_deg, fix.lon_deg):
+        plausible = self._plausible(timed.t_us, speed_mps, fix.lat_deg, fix.lon_deg)
+        if not plausible and self._rejected < REJECTED_IN_A_ROW:
             self._rejected += 1
             self.rejected_fixes += 1
             return
         self._rejected = 0
-        distance_m, leg = self._extend(timed.t_us, speed_mps)
+        distance_m, leg = self._extend(timed.t_us, speed_mps, plausible)
         self._t_us.append(timed.t_us)
         self._speed_mps.append(speed_mps)
         self._distance_m.append(distance_m)
@@ -134,19 +135,20 @@ class Odometer:
             for knots in (self._t_us, self._speed_mps, self._distance_m, self._lat_deg, self._lon_deg, self._leg):
                 del knots[:keep]
 
-    def _extend(self, t_us: int, speed_mps: float) -> tuple[float, int]:
+    def _extend(self, t_us: int, speed_mps: float, plausible: bool) -> tuple[float, int]:
+        """Distance at the next knot, and its leg: a new one after a long loss and where the knots contradict."""
         if not self._t_us:
             return 0.0, 0
         gap_us = t_us - self._t_us[-1]
-        if gap_us > self._bridge_us:
+        if gap_us > self._bridge_us or not plausible:
             return self._distance_m[-1], self._leg[-1] + 1
         mean_mps = 0.5 * (self._speed_mps[-1] + speed_mps)
         return self._distance_m[-1] + mean_mps * gap_us / US_PER_S, self._leg[-1]
 
     def _plausible(self, t_us: int, speed_mps: float, lat_deg: float, lon_deg: float) -> bool:
-        """False for a lone fix that no car can reach from the last one (a damaged line passes an 8-bit check
-        about once in 256); after some in a row the old knot is no longer believed."""
-        if not self._t_us or self._rejected >= REJECTED_IN_A_ROW:
+        """False for a fix that no car can reach from the last one: a damaged line passes an 8-bit check about once in
+        256. A lone one is passed over; after some in a row it is the old knot that is no longer believed."""
+        if not self._t_us:
             return True
         gap_s = (t_us - self._t_us[-1]) / US_PER_S
         if gap_s * US_PER_S > self._bridge_us:

@@ -82,6 +82,10 @@ class Pipeline:
         self._forget()
         return records
 
+    def skip_to(self, t_us: int) -> None:
+        """Nothing was heard since the last step and until ``t_us``; the next step comes then."""
+        self._pending += self._chain.skip_to(t_us)
+
     def finish(self) -> list[WindowRecord]:
         """The end of the stream: what waits is released, the window being filled is closed where it stands."""
         self._pending += self._chain.flush()

@@ -23,6 +23,7 @@ from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
 from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.supervisor import Supervisor
+from logger.store.folder_lock import FolderLock
 from logger.store.rotation import SegmentLog, next_session, repair
 from logger.units import US_PER_S
 
@@ -32,11 +33,16 @@ log = logging.getLogger(__name__)
 
 
 def serve(config: Config, stop: threading.Event) -> None:
-    """Run the service until ``stop`` is set."""
+    """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError for a failing card."""
+    _make(config.log.directory)
+    with FolderLock(config.log.directory):
+        _serve(config, stop)
+
+
+def _serve(config: Config, stop: threading.Event) -> None:
     sensor = assemble.instrument(config.accelerometer)
     relation, vehicle = assemble.relation(config)
     directory = config.log.directory
-    _make(directory)
     for repaired in repair(directory):
         log.info("repaired %s", repaired)
     session = next_session(directory)
@@ -56,7 +62,8 @@ def serve(config: Config, stop: threading.Event) -> None:
 
     def beat(now_us: int) -> None:
         observer.write(now_us)
-        notifier.watchdog()
+        if not any(listener.hangs(now_us) for listener in listeners):
+            notifier.watchdog()
         notifier.status(observer.line())
 
     notifier.ready()

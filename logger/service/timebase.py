@@ -21,7 +21,7 @@ from logger.units import US_PER_S
 DAY_US = 86_400 * US_PER_S
 FLOOR_FIXES = 120
 AGREEING_FIXES = 3
-JUMP_US = 1_500_000
+JUMP_US = 700_000  # below the one second of a leap second that the receiver learns late
 
 
 @dataclass(frozen=True)

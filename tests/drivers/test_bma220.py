@@ -12,9 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bma220 import Bma220, Bma220Decoder, Bma220Settings, gravity_warning, mps2_per_count
+from drivers.bma220 import Bma220, Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
-from drivers.readings import AccelerationBlock
 from drivers.replay import RecordedBus
 
 SUSPEND, SOFT_RESET = 0x30, 0x32
@@ -335,20 +334,3 @@ def test_a_decoder_of_an_unknown_range_is_refused() -> None:
     with pytest.raises(SettingsError):
         Bma220Decoder(6)
     assert mps2_per_count(2) == pytest.approx(0.6129, abs=5e-5)  # the data sheet's table, rounded there
-
-
-# ---- about 1 g
-
-def block_of(*accel_g: tuple[float, float, float]) -> AccelerationBlock:
-    accel_mps2 = np.array(accel_g, dtype=float).reshape(-1, 3) * 9.80665
-    return AccelerationBlock(np.arange(len(accel_g)), accel_mps2, np.zeros(len(accel_g), dtype=np.bool_))
-
-
-def test_gravity_is_missed_only_when_it_is_not_there() -> None:
-    assert gravity_warning(block_of((0, 0, 1)), 2) is None
-    assert gravity_warning(block_of((0.6, 0, 0.8)), 2) is None
-    assert gravity_warning(block_of((0, 0, 1.9), (0, 0, 0.1)), 2) is None
-    assert gravity_warning(block_of(), 2) is None
-    warning = gravity_warning(block_of((0, 0, 0.25)), 2)
-    assert warning is not None
-    assert "0.25 g" in warning

@@ -5,14 +5,18 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.dump import Event
-from logger.demo.simulated_drive import Drive
+from logger.demo.simulated_drive import Drive, simulate_drive
 from logger.errors import BadInput
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
 
+from drives import SHORT_PLAN
 from replaying import core_for, rows_of
 
 
@@ -97,3 +101,63 @@ def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) 
 def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
     with pytest.raises(BadInput, match="not known here"):
         core_for(replace(short_drive.header, vehicle="hovercraft"))
+
+
+def test_a_sensor_read_eight_times_as_fast_gives_the_same_road(expected: list[str]) -> None:
+    """Oversampled and thinned: the windows are the same ones, the figures close, and jitter alone is no hole."""
+    vehicle = read_vehicle(vehicle_file("rav4-2009"))
+    slow = simulate_drive(replace(SHORT_PLAN, noise_mps2=0.05), vehicle)
+    fast = simulate_drive(replace(SHORT_PLAN, noise_mps2=0.05, rate_hz=800), vehicle)
+    header = replace(fast.header, accelerometer=fast.header.accelerometer | {"oversample": 8})
+    records = {"slow": rows_of(slow.header, slow.events).records, "fast": rows_of(header, fast.events).records}
+    a_w = {}
+    for name, found in records.items():
+        kept = [record for record in found if record.distance_start_m is not None and record.a_w_mps2 is not None]
+        a_w[name] = {round(record.distance_start_m, 1): record.a_w_mps2 for record in kept}
+        assert sum("gap" in record.flags for record in kept) <= 1
+    common = sorted(a_w["slow"].keys() & a_w["fast"].keys())
+    assert len(common) > 60
+    ratio = [a_w["fast"][start] / a_w["slow"][start] for start in common]
+    assert abs(np.median(ratio) - 1) < 0.05
+
+
+def test_a_serial_sensor_gives_the_same_road(short_drive: Drive) -> None:
+    """Lines over a port, in bursts: as many windows, and the comfort of the noiseless record within a few per cent."""
+    plan = replace(SHORT_PLAN, sensor="lines", noise_mps2=0.03)
+    drive = simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
+    found = rows_of(drive.header, drive.events).records
+    kept = [record for record in found if record.distance_start_m is not None and record.a_w_mps2 is not None]
+    from_chip = rows_of(short_drive.header, short_drive.events).records
+    chip = [record for record in from_chip if record.distance_start_m is not None]
+    assert abs(len(kept) - len(chip)) <= 4
+    assert sum("gap" in record.flags for record in kept) <= 1
+    ours = np.sqrt(np.mean([record.a_w_mps2**2 for record in kept]))
+    theirs = np.sqrt(np.mean([record.a_w_mps2**2 for record in chip if record.a_w_mps2 is not None]))
+    assert abs(ours / theirs - 1) < 0.1
+
+
+def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Drive) -> None:
+    day_us = 86_400_000_000
+    half = len(short_drive.events) // 2
+    late = [event._replace(t_us=event.t_us + 300 * day_us) for event in short_drive.events[half:]]
+    rows = rows_of(short_drive.header, [*short_drive.events[:half], *late])
+    once = rows_of(short_drive.header, short_drive.events)
+    assert len(rows.records) <= len(once.records) + 4
+    assert "rotate" in rows.rows
+    assert any(record.t_us > 300 * day_us and record.distance_start_m is not None for record in rows.records)
+
+
+@pytest.mark.parametrize(
+    ("says", "word"),
+    [
+        ({"vertical_axis": "up"}, "vertical_axis"),
+        ({"vertical_axis": 5}, "vertical_axis"),
+        ({"oversample": 2.0}, "oversample"),
+        ({"range_g": "2"}, "range_g"),
+        ({"range_g": 3}, "range"),
+    ],
+)
+def test_a_header_that_cannot_be_is_refused(short_drive: Drive, says: dict[str, object], word: str) -> None:
+    header = replace(short_drive.header, accelerometer=short_drive.header.accelerometer | says)
+    with pytest.raises(BadInput, match=word):
+        core_for(header)

@@ -89,9 +89,13 @@ def test_a_lone_wild_fix_is_passed_over_and_a_lasting_one_believed() -> None:
     assert odometer.rejected_fixes == 2
     odometer.add(knot(7, 10, 70))
     assert isclose(odometer.total_m, 70.0)
-    for t in range(8, 13):
+    for t in range(8, 15):
         odometer.add(knot(t, 10, 5000 + 10 * t))
-    assert odometer.last_t_us == 12_000_000
+    assert odometer.last_t_us == 14_000_000
+    # Nothing is known between the old place and the new: no distance, no place along the jump.
+    travel = odometer.travel(seconds(6.5, 9.0, 13.5))
+    assert travel.known.tolist() == [True, False, True]
+    assert isclose(odometer.total_m, 100.0)
 
 
 def test_invalid_fixes_are_passed_over() -> None:

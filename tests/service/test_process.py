@@ -228,3 +228,31 @@ def test_wrong_settings_are_refused_with_their_line(
     assert done.stderr.count("\n") == 1
     assert f"{config}:{line}" in done.stderr
     assert word in done.stderr
+
+
+def test_an_axis_that_does_not_feel_the_earth_is_noticed(
+    gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+) -> None:
+    write_config(tmp_path, f"'dump:{short_dump}'")
+    config = tmp_path / "ridelog.yaml"
+    config.write_text(config.read_text().replace("{bma220:", "{vertical_axis: +x, bma220:"))
+    service = start()
+    status = service.wait_for(lambda status: status["accelerometer"]["last_error"])
+    assert "check vertical_axis" in status["accelerometer"]["last_error"]
+    assert service.terminate() == 0
+
+
+def test_a_second_service_on_the_same_folder_is_refused(
+    ridelog: Path, gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+) -> None:
+    write_config(tmp_path, f"'dump:{short_dump}'")
+    service = start()
+    service.wait_for(lambda status: True)
+    second = subprocess.run(
+        [ridelog, "run", "--config", tmp_path / "ridelog.yaml"], capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert second.returncode == 2
+    assert "another ridelog writes here" in second.stderr
+    again = [ridelog, "replay", short_dump, "--out", service.log]
+    assert subprocess.run(again, capture_output=True, timeout=PATIENCE_S).returncode == 2
+    assert service.terminate() == 0

@@ -87,3 +87,15 @@ def test_one_stray_time_is_placed_by_its_arrival() -> None:
     stray = timebase.place(fix_at(10, 100_000, shift_us=5_000_000))
     assert stray.t_us == BOOT_US + 10_000_000
     assert timebase.utc_offset_us() == NOON_US - BOOT_US
+
+
+def test_a_second_more_or_less_is_taken_over_after_three_fixes() -> None:
+    """A receiver learns the leap seconds late: UTC steps, the car does not."""
+    for leap_us in (-2_000_000, -1_000_000, 1_000_000, 2_000_000):
+        timebase = Timebase(0.1)
+        for second in range(10):
+            timebase.place(fix_at(second, 100_000))
+        for second in range(10, 20):
+            placed = timebase.place(fix_at(second, 100_000, shift_us=leap_us))
+            assert abs(placed.t_us - (BOOT_US + second * 1_000_000)) <= 1
+        assert timebase.utc_offset_us() == NOON_US - BOOT_US + leap_us
