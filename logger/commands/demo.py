@@ -12,7 +12,6 @@ from importlib import resources
 from pathlib import Path
 
 from logger.commands.replay import replay
-from logger.service.config import Config
 
 REPORT_NAME = "report.html"
 
@@ -30,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.commands.report import write_report
 
     with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump:
-        outcome = replay(dump, args.out, Config(), rate=0.0, vehicle=None, quiet=args.json)
+        outcome = replay(dump, args.out, None, rate=0.0, vehicle=None, quiet=args.json)
     report = args.out / REPORT_NAME
     write_report(outcome.files, report)
     if args.json:

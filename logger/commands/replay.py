@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the segment logs")
     parser.add_argument("--rate", metavar="N", type=float, default=0.0, help="1: real time; 0 (default): at full speed")
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings; the recording's sensor goes before them")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="settings of that drive")
     parser.add_argument("--vehicle", metavar="NAME|FILE", help="instead of the vehicle that the recording names")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog replay``."""
     if args.rate != 0 and not LOWEST_RATE <= args.rate <= HIGHEST_RATE:
         raise BadInput(f"--rate {args.rate:g}: expected 0, or a number from {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
-    config = load_config(args.config) if args.config else Config()
+    config = load_config(args.config) if args.config else None
     outcome = replay(args.dump, args.out, config, args.rate, args.vehicle, quiet=args.json)
     if args.json:
         print(json.dumps(outcome.as_json()))
@@ -81,7 +81,7 @@ class Outcome:
         return "\n".join(lines)
 
 
-def replay(dump: Path, out: Path, config: Config, rate: float, vehicle: str | None, quiet: bool) -> Outcome:
+def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: str | None, quiet: bool) -> Outcome:
     """Play ``dump`` into logs below ``out``. Progress goes to stderr unless ``quiet``."""
     from logger.service import assemble
     from logger.service.core import Core
@@ -90,7 +90,7 @@ def replay(dump: Path, out: Path, config: Config, rate: float, vehicle: str | No
     from logger.store.rotation import SegmentLog, next_session, repair
 
     with open_dump(dump) as reader:
-        config = assemble.config_for_dump(reader.header, config, vehicle, place=f"{dump}:1")
+        config = assemble.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         config = replace(config, log=replace(config.log, directory=out))
         sensor = assemble.instrument(config.accelerometer)
         relation, vehicle_facts = assemble.relation(config)

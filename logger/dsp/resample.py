@@ -289,9 +289,10 @@ class Decimator:
 
     def _run(self, values: Floats) -> GridRun:
         used = len(values) * self._factor
-        clipped, bridged = self._marks[:, :used].reshape(2, len(values), self._factor)
-        hole: Bools = np.asarray(bridged.mean(axis=1) >= BRIDGED_SHARE)
-        run = GridRun(self._next_us, SLOW_RATE_HZ, values, clipped.any(axis=1), hole, self._new_start)
+        shares = self._marks[:, :used].reshape(2, len(values), self._factor).mean(axis=2)
+        run = GridRun(
+            self._next_us, SLOW_RATE_HZ, values, shares[0] > 0.0, shares[1] >= BRIDGED_SHARE, self._new_start
+        )
         self._marks = self._marks[:, used:]
         self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
         self._new_start = False

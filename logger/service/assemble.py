@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from pathlib import Path
@@ -31,12 +32,14 @@ SERIAL_NOISE_MPS2 = 0.05
 
 @dataclass(frozen=True)
 class Instrument:
-    """What the settings say about the accelerometer: its decoder, its step, and a description for the logs."""
+    """What the settings say about the accelerometer: its decoder, its noise, a description for the logs, and a look at
+    what the decoder has counted."""
 
     decoder: AccelerationDecoder
     oversample: int
     noise_rms_mps2: float
     description: dict[str, Any]
+    counters: Callable[[], dict[str, int]]
 
 
 def bma220_settings(config: AccelerometerConfig) -> Bma220Settings:
@@ -59,7 +62,12 @@ def instrument(config: AccelerometerConfig) -> Instrument:
             "bandwidth_hz": chip.filter_hz,
             "oversample": chip.oversample,
         }
-        return Instrument(Bma220Decoder(chip.range_g), chip.oversample, noise_mps2, description)
+        bytes_decoder = Bma220Decoder(chip.range_g)
+
+        def counters() -> dict[str, int]:
+            return {"odd_bits": bytes_decoder.anomalies, "repeated_samples": bytes_decoder.repeats}
+
+        return Instrument(bytes_decoder, chip.oversample, noise_mps2, description, counters)
     profile = _mounted(load_profile(config.pasco.profile), Axis.from_word(config.vertical_axis))
     description = {
         "driver": "pasco",
@@ -69,7 +77,7 @@ def instrument(config: AccelerometerConfig) -> Instrument:
         "calibration": asdict(config.pasco.calibration) if config.pasco.calibration else None,
     }
     decoder = PascoDecoder(profile, config.pasco.calibration)
-    return Instrument(decoder, 1, SERIAL_NOISE_MPS2, description)
+    return Instrument(decoder, 1, SERIAL_NOISE_MPS2, description, lambda: asdict(decoder.counters))
 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
@@ -114,37 +122,40 @@ def sidecar(config: Config, sensor: Instrument, vehicle: dict[str, Any]) -> dict
     }
 
 
-def dump_header(config: Config, sensor: Instrument) -> DumpHeader:
+def dump_header(config: Config) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
-    keep = ("driver", "range_g", "oversample", "profile")
-    accelerometer = {key: sensor.description[key] for key in keep if key in sensor.description}
-    accelerometer["vertical_axis"] = config.accelerometer.vertical_axis
-    return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, config.vehicle.stem)
+    sensor = config.accelerometer
+    accelerometer: dict[str, Any] = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis}
+    if sensor.driver == "bma220":
+        accelerometer |= {"range_g": sensor.bma220.range_g, "oversample": sensor.bma220.oversample}
+    else:
+        accelerometer |= {"profile": sensor.pasco.profile, "calibrated": sensor.pasco.calibration is not None}
+    stem = config.vehicle.stem
+    is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
+    return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, stem if is_shipped else str(config.vehicle))
 
 
-def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None, place: str = "header") -> Config:
-    """Settings for a replay: those given, with what the recording says about its sensor and its vehicle.
+def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
+    """Settings for a replay. What is in the bytes (driver, range, oversampling) is always the recording's; the rest is
+    that of the settings ``given``, or without them the defaults with what the recording's header says.
 
     Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """
     says = header.accelerometer
+    config = given or Config()
     chip, serial = config.accelerometer.bma220, config.accelerometer.pasco
-    axis = says.get("vertical_axis", config.accelerometer.vertical_axis)
+    axis, profile = config.accelerometer.vertical_axis, serial.profile
+    if given is None:
+        axis, profile = says.get("vertical_axis", axis), says.get("profile", profile)
+        if says.get("calibrated"):
+            raise BadInput(f"{place}: recorded with a calibration of its own; expected its settings, --config FILE")
+    range_g, oversample = (says.get(key, getattr(chip, key)) for key in ("range_g", "oversample"))
     if axis not in AXES:
         raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {axis!r}")
-    range_g, oversample = (says.get(key, getattr(chip, key)) for key in ("range_g", "oversample"))
     if type(range_g) is not int or type(oversample) is not int:
         raise BadInput(f"{place}: expected whole numbers for 'range_g' and 'oversample'")
-    profile = says.get("profile", serial.profile)
     if not isinstance(profile, str):
         raise BadInput(f"{place}: expected 'profile' as a name")
-    name = vehicle or header.vehicle
-    path = vehicle_file(name) if name in vehicle_names() else Path(name)
-    if not path.is_file():
-        raise BadInput(
-            f"{place}: the recording's vehicle {name!r} is not known here; expected --vehicle FILE.yaml or one of: "
-            f"{', '.join(vehicle_names())}"
-        )
     sensor = AccelerometerConfig(
         driver=says["driver"],
         vertical_axis=axis,
@@ -155,7 +166,19 @@ def config_for_dump(header: DumpHeader, config: Config, vehicle: str | None, pla
         instrument(sensor)
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
-    return replace(config, accelerometer=sensor, vehicle=path)
+    if given is None or vehicle is not None:
+        config = replace(config, vehicle=_vehicle_file(vehicle or header.vehicle, place))
+    return replace(config, accelerometer=sensor)
+
+
+def _vehicle_file(name: str, place: str) -> Path:
+    path = vehicle_file(name) if name in vehicle_names() else Path(name)
+    if not path.is_file():
+        raise BadInput(
+            f"{place}: the recording's vehicle {name!r} is not known here; expected --vehicle FILE.yaml or one of: "
+            f"{', '.join(vehicle_names())}"
+        )
+    return path
 
 
 def _mounted(profile: Profile, up: Axis) -> Profile:

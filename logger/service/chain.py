@@ -75,6 +75,11 @@ class SignalChain:
         self._since_start = 0
         self.late_samples = 0
 
+    @property
+    def crowded_samples(self) -> int:
+        """Samples left out because they came less than half a step after another: a sensor that is too fast."""
+        return self._resampler.dropped
+
     def push(self, block: AccelerationBlock) -> list[GridSamples]:
         """More samples of the sensor; gives what is ready on the grid."""
         if not len(block):

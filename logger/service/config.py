@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from drivers.bma220 import Bma220Settings
 from drivers.errors import SettingsError
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file
@@ -237,12 +238,22 @@ _read_pasco = _section(PascoConfig, {
     "calibration": _or_none("null", _calibration),
 })
 
-_bma220 = _section(Bma220Config, {
+_read_bma220 = _section(Bma220Config, {
     "i2c_bus": _i2c_bus,
     "range_g": _number_out_of(_RANGES_G),
     "bandwidth_hz": _or_none("auto", _number_out_of(_BANDWIDTHS_HZ)),
-    "oversample": _whole(1, 10),
+    "oversample": _whole(1, 8),
 })
+
+
+def _bma220(node: Node) -> Bma220Config:
+    config = _read_bma220(node)
+    try:
+        Bma220Settings(range_g=config.range_g, bandwidth_hz=config.bandwidth_hz, oversample=config.oversample)
+    except SettingsError as error:
+        raise BadInput(f"{node.file}:{node.line}: {error}") from None
+    return config
+
 
 _read_accelerometer = _section(AccelerometerConfig, {
     "driver": lambda node: node.choice("bma220", "pasco"),

@@ -5,11 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 
-from drivers.nmea import NmeaDecoder
 from logger.service.chain import Axis
 from logger.service.config import Config
 from logger.service.core import Core
@@ -39,7 +37,7 @@ class Observer:
         pipeline: Pipeline,
         accelerometer: Supervisor,
         gps: Supervisor,
-        decoder: NmeaDecoder,
+        counters: Mapping[str, Callable[[], dict[str, int]]],
         deadlines: Deadlines,
     ) -> None:
         self._config = config
@@ -47,7 +45,7 @@ class Observer:
         self._log = segment_log
         self._pipeline = pipeline
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
-        self._decoder = decoder
+        self._counters = counters
         self._deadlines = deadlines
         self._began_us = monotonic_us()
         self._told_us = self._began_us
@@ -96,7 +94,7 @@ class Observer:
             uptime_s=(now_us - self._began_us) / US_PER_S,
             updated_t_us=now_us,
             accelerometer=self._sensor("accelerometer", now_us, self._accelerometer_place(), self._core.samples),
-            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes, asdict(self._decoder.counters)),
+            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes),
             fix_valid=fix.valid if fix else None,
             satellites=fix.satellites if fix else None,
             utc_known=self._core.utc_known,
@@ -109,6 +107,7 @@ class Observer:
             counters={
                 "missed_samples": self._deadlines.missed,
                 "late_samples": self._pipeline.late_samples,
+                "crowded_samples": self._pipeline.crowded_samples,
                 "bad_events": self._core.bad_events,
                 "time_jumps": self._pipeline.timebase.time_jumps,
                 "rejected_fixes": self._pipeline.odometer.rejected_fixes,
@@ -138,9 +137,7 @@ class Observer:
         recent = self._row_us is not None and now_us - self._row_us < RECENT_US
         return "recording" if recent else "standing"
 
-    def _sensor(
-        self, name: str, now_us: int, place: str, readings: int, counters: Mapping[str, int] | None = None
-    ) -> SensorStatus:
+    def _sensor(self, name: str, now_us: int, place: str, readings: int) -> SensorStatus:
         part = self._sensors[name]
         state = part.state()
         if self._state_since.get(name, ("", 0))[0] != state:
@@ -152,7 +149,7 @@ class Observer:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=part.error or (self._gravity_advice if name == "accelerometer" else None),
             readings=readings,
-            counters={"faults": part.faults, "restarts": part.restarts, **(counters or {})},
+            counters={"faults": part.faults, "restarts": part.restarts, **self._counters[name]()},
         )
 
     def _accelerometer_place(self) -> str:

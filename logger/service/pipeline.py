@@ -87,14 +87,25 @@ class Pipeline:
         self._pending += self._chain.skip_to(t_us)
 
     def finish(self) -> list[WindowRecord]:
-        """The end of the stream: what waits is released, the window being filled is closed where it stands."""
+        """The end of the stream: what waits is released, the window being filled is closed where it stands.
+
+        The last second or two, for which the fix that would have told the motion can come no more, are left out.
+        """
         self._pending += self._chain.flush()
-        return self._recorded(self._release(None) + self._cutter.break_off())
+        end_us = int(self._pending[-1].t_us[-1]) if self._pending else 0
+        last_us = self.odometer.last_t_us
+        until_us = last_us if last_us is not None and end_us - last_us <= FIX_DELAY_US else None
+        return self._recorded(self._release(until_us) + self._cutter.break_off())
 
     @property
     def late_samples(self) -> int:
         """Samples that came after their time had been given up as missing."""
         return self._chain.late_samples
+
+    @property
+    def crowded_samples(self) -> int:
+        """Samples left out because they came too soon after another."""
+        return self._chain.crowded_samples
 
     def _settled_until_us(self, now_us: int) -> int:
         """Samples before this instant will not learn more about their motion."""

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 from drivers.dump import DumpWriter, Event, open_dump
@@ -47,7 +48,7 @@ def _serve(config: Config, stop: threading.Event) -> None:
         log.info("repaired %s", repaired)
     session = next_session(directory)
     segment_log = SegmentLog(directory, session, assemble.sidecar(config, sensor, vehicle), config.log.max_file_bytes)
-    recorder = _recorder(config, sensor, session)
+    recorder = _recorder(config, session)
     decoder = assemble.gps_decoder(config)
     pipeline = assemble.pipeline(config, sensor, relation)
     core = Core(sensor.decoder, decoder, pipeline, segment_log)
@@ -57,7 +58,8 @@ def _serve(config: Config, stop: threading.Event) -> None:
     gps = Supervisor(_serial("nmea", config.gps.port, config.gps.baud), monotonic_us)
     pace = deadlines.wait if config.accelerometer.driver == "bma220" else gather
     listeners = [Listener(accelerometer, events, pace), Listener(gps, events, gather)]
-    observer = Observer(config, core, segment_log, pipeline, accelerometer, gps, decoder, deadlines)
+    counters = {"accelerometer": sensor.counters, "gps": lambda: asdict(decoder.counters)}
+    observer = Observer(config, core, segment_log, pipeline, accelerometer, gps, counters, deadlines)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
@@ -85,10 +87,10 @@ def _make(directory: Path) -> None:
         raise BadInput(f"{directory}: expected a folder that the service may write to")
 
 
-def _recorder(config: Config, sensor: assemble.Instrument, session: int) -> DumpWriter | None:
+def _recorder(config: Config, session: int) -> DumpWriter | None:
     if not config.log.record_dump:
         return None
-    return DumpWriter(config.log.directory / f"{session:05d}.dump.gz", assemble.dump_header(config, sensor))
+    return DumpWriter(config.log.directory / f"{session:05d}.dump.gz", assemble.dump_header(config))
 
 
 def _accelerometer(config: Config) -> Source:

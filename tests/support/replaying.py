@@ -35,7 +35,7 @@ class Rows:
 
 
 def core_for(header: DumpHeader, config: Config | None = None) -> tuple[Core, Rows]:
-    config = assemble.config_for_dump(header, config or Config(), None)
+    config = assemble.config_for_dump(header, config, None)
     sensor = assemble.instrument(config.accelerometer)
     relation, _ = assemble.relation(config)
     rows = Rows()
