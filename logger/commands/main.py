@@ -1,4 +1,4 @@
-"""The ``ridelog`` command: one verb per file of this folder, imported only when it is asked for.
+"""The ``ridelog`` command: one verb per file of this folder (- is _ there), imported only when it is asked for.
 
 A fault that is expected, whatever the verb, becomes one line on stderr and an exit status: 1 the check that was
 asked for failed, 2 wrong use or bad input, 130 and 141 as shells name an interrupt and a closed pipe.
@@ -24,6 +24,7 @@ VERBS = {
     "report": "make one web page of logs: map, plots, table",
     "iri": "exact IRI of a measured profile",
     "road": "make a random road, or tell the class of a measured one",
+    "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
 }
 EXIT_INTERRUPTED = 130
@@ -42,7 +43,7 @@ def main(arguments: list[str]) -> int:
     if not arguments or arguments[0] not in VERBS:
         return _without_verb(arguments)
     verb = arguments[0]
-    module = importlib.import_module(f"logger.commands.{verb}")
+    module = importlib.import_module(f"logger.commands.{verb.replace('-', '_')}")
     parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__,
                      formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
     module.add_arguments(parser)
