@@ -12,8 +12,8 @@ Solution, in two steps that each take a moment:
 2. The order with the least noise is found exactly. The scale after some sections depends only on which they are, and
    so does what the others make of the rounding there; so the best order is the shortest way through the subsets.
 
-Sections that are blind to a steady input stand first, though last would be 1.5 dB better: all others then see nothing of
-gravity, and a car at rest gives zeros.
+Sections that are blind to a steady input stand first, though last would be 1.5 dB better: all others then see nothing
+of gravity, and a car at rest gives zeros.
 
 Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, 6.9.3 (pairing and ordering).
 """
