@@ -60,3 +60,12 @@ def test_what_runs_on_board_never_loads_what_belongs_to_the_desk() -> None:
 def test_only_commands_print(module: str) -> None:
     calls = [node for node in ast.walk(TREES[module]) if isinstance(node, ast.Name) and node.id == "print"]
     assert module.startswith("logger.commands.") or not calls
+
+
+@pytest.mark.parametrize("module", TREES)
+def test_nothing_asks_the_system_for_the_date(module: str) -> None:
+    """A Pi boots without a date and its clock may jump; time comes from the monotonic clock and the GPS."""
+    forbidden = {("time", "time"), ("time", "time_ns"), ("datetime", "now"), ("datetime", "utcnow"), ("date", "today")}
+    attributes = [node for node in ast.walk(TREES[module]) if isinstance(node, ast.Attribute)]
+    asked = {(node.value.id, node.attr) for node in attributes if isinstance(node.value, ast.Name)}
+    assert not asked & forbidden

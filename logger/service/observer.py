@@ -111,6 +111,7 @@ class Observer:
                 "bad_events": self._core.bad_events,
                 "time_jumps": self._pipeline.timebase.time_jumps,
                 "rejected_fixes": self._pipeline.odometer.rejected_fixes,
+                "fixes_without_speed": self._pipeline.odometer.fixes_without_speed,
             },
         )
 

@@ -58,6 +58,7 @@ class Odometer:
         self._leg: list[int] = []
         self._rejected = 0
         self.rejected_fixes = 0
+        self.fixes_without_speed = 0
 
     @property
     def last_t_us(self) -> int | None:
@@ -72,7 +73,10 @@ class Odometer:
     def add(self, timed: TimedFix) -> None:
         """Take a fix. Invalid ones, ones without a speed and wild ones are passed over."""
         fix = timed.fix
-        if not fix.valid or fix.speed_mps is None or fix.lat_deg is None or fix.lon_deg is None:
+        if not fix.valid or fix.lat_deg is None or fix.lon_deg is None:
+            return
+        if fix.speed_mps is None:
+            self.fixes_without_speed += 1
             return
         if self._t_us and timed.t_us <= self._t_us[-1]:
             return

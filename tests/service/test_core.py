@@ -25,6 +25,26 @@ def expected(short_drive: Drive) -> list[str]:
     return rows_of(short_drive.header, short_drive.events).rows
 
 
+@pytest.fixture(scope="module")
+def lines_drive() -> Drive:
+    plan = replace(SHORT_PLAN, sensor="lines", noise_mps2=0.03)
+    return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
+
+
+def cut_anywhere(events: list[Event], seed: int) -> list[Event]:
+    """The same bytes at the same times, the serial ones in smaller pieces."""
+    rng = random.Random(seed)
+    pieces = []
+    for event in events:
+        data = event.data
+        while event.source != "bma220" and len(data) > 1 and rng.random() < 0.7:
+            cut = rng.randrange(1, len(data))
+            pieces.append(Event(event.t_us, event.source, data[:cut]))
+            data = data[cut:]
+        pieces.append(Event(event.t_us, event.source, data))
+    return pieces
+
+
 def test_the_drive_makes_rows(expected: list[str]) -> None:
     assert len(expected) > 60
     assert expected[-1] == "close"
@@ -33,16 +53,14 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
 @settings(deadline=None, max_examples=8)
 @given(seed=st.integers(0, 1000))
 def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
-    rng = random.Random(seed)
-    events = []
-    for event in short_drive.events:
-        data = event.data
-        while event.source == "nmea" and len(data) > 1 and rng.random() < 0.7:
-            cut = rng.randrange(1, len(data))
-            events.append(Event(event.t_us, event.source, data[:cut]))
-            data = data[cut:]
-        events.append(Event(event.t_us, event.source, data))
-    assert rows_of(short_drive.header, events).rows == expected
+    assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
+
+
+@settings(deadline=None, max_examples=4)
+@given(seed=st.integers(0, 1000))
+def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(lines_drive: Drive, seed: int) -> None:
+    whole = rows_of(lines_drive.header, lines_drive.events).rows
+    assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == whole
 
 
 @settings(deadline=None, max_examples=8)
@@ -121,11 +139,9 @@ def test_a_sensor_read_eight_times_as_fast_gives_the_same_road(expected: list[st
     assert abs(np.median(ratio) - 1) < 0.05
 
 
-def test_a_serial_sensor_gives_the_same_road(short_drive: Drive) -> None:
+def test_a_serial_sensor_gives_the_same_road(short_drive: Drive, lines_drive: Drive) -> None:
     """Lines over a port, in bursts: as many windows, and the comfort of the noiseless record within a few per cent."""
-    plan = replace(SHORT_PLAN, sensor="lines", noise_mps2=0.03)
-    drive = simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
-    found = rows_of(drive.header, drive.events).records
+    found = rows_of(lines_drive.header, lines_drive.events).records
     kept = [record for record in found if record.distance_start_m is not None and record.a_w_mps2 is not None]
     from_chip = rows_of(short_drive.header, short_drive.events).records
     chip = [record for record in from_chip if record.distance_start_m is not None]

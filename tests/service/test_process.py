@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import threading
 import time
@@ -19,8 +20,8 @@ from drivers.dump import Event, open_dump
 PATIENCE_S = 20.0
 
 
-class Gps:
-    """A receiver at the other end of a pseudo-terminal, which sends recorded sentences in real time."""
+class SerialDevice:
+    """A device at the other end of a pseudo-terminal, which sends what was recorded in real time."""
 
     def __init__(self, link: Path, events: list[Event]) -> None:
         self.link = link
@@ -92,11 +93,11 @@ class Service:
 
 
 @pytest.fixture
-def gps(short_dump: Path, tmp_path: Path) -> Iterator[Gps]:
+def gps(short_dump: Path, tmp_path: Path) -> Iterator[SerialDevice]:
     with open_dump(short_dump) as reader:
         sentences = [event for event in reader if event.source == "nmea"]
     moving = [event for event in sentences if event.t_us - sentences[0].t_us > 7_000_000]
-    receiver = Gps(tmp_path / "gps", moving)
+    receiver = SerialDevice(tmp_path / "gps", moving)
     yield receiver
     if not receiver._stop.is_set():
         receiver.pull()
@@ -130,7 +131,7 @@ def rows_in(folder: Path, pattern: str) -> list[str]:
 
 
 def test_recorded_live_and_replayed_gives_the_same_bytes(
-    ridelog: Path, gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+    ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'", record_dump=True)
     service = start()
@@ -148,7 +149,7 @@ def test_recorded_live_and_replayed_gives_the_same_bytes(
 
 
 def test_kill_loses_no_finished_row_and_the_next_start_repairs(
-    ridelog: Path, gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+    ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
     service = start()
@@ -168,7 +169,9 @@ def test_kill_loses_no_finished_row_and_the_next_start_repairs(
     subprocess.run([ridelog, "verify", service.log], check=True, capture_output=True)
 
 
-def test_gps_pulled_and_put_back(gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path) -> None:
+def test_gps_pulled_and_put_back(
+    gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
     service = start()
     before = service.wait_for(lambda status: status["gps"]["state"] == "ok" and status["rows_written"] > 2)
@@ -182,7 +185,7 @@ def test_gps_pulled_and_put_back(gps: Gps, start: Callable[[], Service], short_d
 
 
 def test_accelerometer_missing_at_start_while_the_rest_goes_on(
-    gps: Gps, start: Callable[[], Service], tmp_path: Path
+    gps: SerialDevice, start: Callable[[], Service], tmp_path: Path
 ) -> None:
     write_config(tmp_path, "250")
     service = start()
@@ -195,7 +198,7 @@ def test_accelerometer_missing_at_start_while_the_rest_goes_on(
 
 
 def test_status_for_a_person_and_for_a_program(
-    ridelog: Path, gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+    ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
     service = start()
@@ -231,7 +234,7 @@ def test_wrong_settings_are_refused_with_their_line(
 
 
 def test_an_axis_that_does_not_feel_the_earth_is_noticed(
-    gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+    gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
     config = tmp_path / "ridelog.yaml"
@@ -243,7 +246,7 @@ def test_an_axis_that_does_not_feel_the_earth_is_noticed(
 
 
 def test_a_second_service_on_the_same_folder_is_refused(
-    ridelog: Path, gps: Gps, start: Callable[[], Service], short_dump: Path, tmp_path: Path
+    ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
     write_config(tmp_path, f"'dump:{short_dump}'")
     service = start()
@@ -256,3 +259,47 @@ def test_a_second_service_on_the_same_folder_is_refused(
     again = [ridelog, "replay", short_dump, "--out", service.log]
     assert subprocess.run(again, capture_output=True, timeout=PATIENCE_S).returncode == 2
     assert service.terminate() == 0
+
+
+def test_a_serial_accelerometer_pulled_and_put_back(
+    gps: SerialDevice, start: Callable[[], Service], tmp_path: Path
+) -> None:
+    lines = [Event(10_000 * count, "pasco", b"0.01,0.02,%.3f\n" % (1 + 0.05 * (count % 7))) for count in range(6000)]
+    sensor = SerialDevice(tmp_path / "accelerometer", lines)
+    (tmp_path / "ridelog.yaml").write_text(
+        f"accelerometer: {{driver: pasco, pasco: {{port: {sensor.link}, profile: lines}}}}\n"
+        f"gps: {{port: {gps.link}}}\n"
+        f"log: {{directory: {tmp_path / 'log'}}}\n"
+        f"status_file: {tmp_path / 'status.json'}\n"
+    )
+    service = start()
+    service.wait_for(lambda status: status["accelerometer"]["state"] == "ok" and status["rows_written"] > 2)
+    sensor.pull()
+    lost = service.wait_for(lambda status: status["accelerometer"]["state"] == "retrying")
+    sensor.plug()
+    back = service.wait_for(lambda status: status["accelerometer"]["state"] == "ok")
+    service.wait_for(lambda status: status["accelerometer"]["readings"] > back["accelerometer"]["readings"] + 100)
+    assert lost["gps"]["state"] == "ok"
+    sensor.pull()
+    assert service.terminate() == 0
+    flags = [row.split(",")[17] for row in rows_in(service.log, "*.csv")]
+    assert any("gap" in words for words in flags)
+
+
+def test_systemd_is_told(
+    ridelog: Path, gps: SerialDevice, short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_config(tmp_path, f"'dump:{short_dump}'")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.settimeout(PATIENCE_S)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "1000000")
+        service = Service(ridelog, tmp_path)
+        told = [manager.recv(1000).decode() for _ in range(6)]
+        assert told[0] == "READY=1"
+        assert told.count("WATCHDOG=1") >= 2
+        assert any(text.startswith("STATUS=accelerometer ok") for text in told)
+        assert service.terminate() == 0
+        while (text := manager.recv(1000).decode()) != "STOPPING=1":
+            assert text.startswith(("WATCHDOG", "STATUS"))
