@@ -23,6 +23,7 @@ VERBS = {
     "verify": "check logs and dumps for damage and gaps",
     "report": "make one web page of logs: map, plots, table",
     "iri": "exact IRI of a measured profile",
+    "comfort": "ISO 2631 comfort and health values of an acceleration record",
     "road": "make a random road, or tell the class of a measured one",
     "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
