@@ -3,39 +3,33 @@
 Problem: a profile is long (400,000 lines for 10 km at 25 mm), comes from many hands, and everything computed from it
 takes for granted that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
 
-Solution: NumPy reads the table at once, and only when that fails, or a value is not finite, are the lines looked at one
-by one to name the one at fault. Distances must then lie on an even grid, but for the rounding of their digits;
-anything else is refused with its line. Straight lines between the samples are laid through an uneven profile only
+Solution: distances must lie on an even grid, but for the rounding of their digits; anything else is refused with its
+line. Straight lines between the samples are laid through an uneven profile only
 when ``resample_m`` asks for it, and the profile says so.
 """
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
+from logger.store.bounded import read_bounded
 from logger.store.erd_file import ErdFile, is_erd, parse_erd
+from logger.store.number_table import parse_columns
 
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 MAX_BYTES = 512 * 1024 * 1024
-SHOWN = 40
 # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
 # is taken for rounding.
 _ROUNDING_M = 0.0006
 _ROUNDING_STEPS = 0.05
-
-_NUMBER = re.compile(rb"[ \t]*[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?[ \t]*")
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 @dataclass(frozen=True)
@@ -61,13 +55,7 @@ def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     Raises BadInput ("file:line: expected ...") for a file that is neither, for values that are missing or not finite,
     and for distances that do not grow or, without ``resample_m``, are not evenly spaced.
     """
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
-    if len(data) > MAX_BYTES:
-        raise BadInput(f"{path}: expected at most {MAX_BYTES} bytes")
+    data = read_bounded(path, MAX_BYTES)
     if is_erd(data):
         return _from_erd(parse_erd(data, path), str(path), resample_m)
     return _from_table(parse_table(data, str(path)), str(path), resample_m)
@@ -75,37 +63,11 @@ def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
 
 def parse_table(data: bytes, file: str) -> Array:
     """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]."""
-    data = data.removeprefix(_BYTE_ORDER_MARK)
-    header = data[: _end_of_line(data, 0)].decode("ascii", "replace")
-    names = tuple(name.strip() for name in header.split(","))
-    if names not in (COLUMNS[:2], COLUMNS):
-        wanted = f"{','.join(COLUMNS[:2])}[,{COLUMNS[2]}]"
-        raise BadInput(f"{file}:1: expected the header {wanted}, found {_shown(header)}")
-    rows = data.rstrip().count(b"\n")
-    if rows == 0:
-        raise BadInput(f"{file}:2: expected numbers below the header, found nothing")
-    try:
-        table = np.loadtxt(io.BytesIO(data), delimiter=",", comments=None, skiprows=1, ndmin=2)
-    except ValueError:
-        table = np.empty((0, 0))
-    if table.shape == (rows, len(names)) and np.isfinite(table).all():
-        return table
-    return _table_by_line(data, names, file)
 
+    def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+        return names if names in (COLUMNS[:2], COLUMNS) else None
 
-def _table_by_line(data: bytes, names: tuple[str, ...], file: str) -> Array:
-    rows = []
-    for line, text in enumerate(data.rstrip().split(b"\n")[1:], start=2):
-        fields = text.split(b",")
-        if len(fields) != len(names):
-            found = _shown(text.decode("ascii", "replace").strip())
-            raise BadInput(f"{file}:{line}: expected {len(names)} numbers ({','.join(names)}), found {found}")
-        for name, field in zip(names, fields, strict=True):
-            if not _NUMBER.fullmatch(field.rstrip(b"\r")) or not isfinite(float(field)):
-                found = _shown(field.decode("ascii", "replace").strip())
-                raise BadInput(f"{file}:{line}: expected a number for {name}, found {found}")
-        rows.append([float(field) for field in fields])
-    return np.array(rows)
+    return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1]
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
@@ -173,12 +135,3 @@ def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
         distance = erd.spacing_m * np.arange(len(tracks[0]), dtype=float)
         return _resampled(distance.astype(np.float64), tracks, resample_m, file)
     return Profile(0.0, erd.spacing_m, *_pair(tracks))
-
-
-def _end_of_line(data: bytes, start: int) -> int:
-    end = data.find(b"\n", start)
-    return end if end >= 0 else len(data)
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...") if text else "nothing"

@@ -17,6 +17,7 @@ from pathlib import Path
 import yaml
 
 from logger.errors import BadInput
+from logger.store.bounded import read_bounded
 
 MAX_BYTES = 256 * 1024
 MAX_DEPTH = 12
@@ -127,13 +128,7 @@ def _limits(low: float | None, high: float | None) -> str:
 
 def load_mapping(path: Path | str) -> Node:
     """Read a YAML file whose top is a mapping. Raises BadInput, which names file and line, for anything else."""
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
-    if len(data) > MAX_BYTES:
-        raise BadInput(f"{path}: expected at most {MAX_BYTES} bytes of YAML")
+    data = read_bounded(path, MAX_BYTES)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

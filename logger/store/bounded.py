@@ -1,0 +1,19 @@
+"""Reading a whole file that somebody else made, up to a size that fits the machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from logger.errors import BadInput
+
+
+def read_bounded(path: Path | str, max_bytes: int) -> bytes:
+    """All bytes of a file. Raises BadInput for one that cannot be read or is longer than ``max_bytes``."""
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise BadInput(f"{path}: expected a readable file ({error.strerror})") from None
+    if len(data) > max_bytes:
+        raise BadInput(f"{path}: expected at most {max_bytes} bytes")
+    return data
