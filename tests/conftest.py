@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+
+# Small matrices: a second thread in the algebra library only waits for the first, badly so where tests run in parallel.
+# Set before NumPy is imported, here and in every command that a test starts.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 

@@ -39,6 +39,10 @@ class _Parser(argparse.ArgumentParser):
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message} (try '{self.prog} --help')\n")
 
 
+# All matrices here are small: more threads in the algebra library would only wait for each other.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
 def main(arguments: list[str]) -> int:
     """Carry out one command line; give its exit status. Help and wrong use leave by SystemExit, as argparse does."""
     if not arguments or arguments[0] not in VERBS:
@@ -54,6 +58,8 @@ def main(arguments: list[str]) -> int:
 
 def run() -> NoReturn:
     """The console script."""
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
     try:
         status = main(sys.argv[1:])
         sys.stdout.flush()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+ONE_THREAD = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
 NOT_BENCHMARKS = ("all.py", "figures.py")
 
 
@@ -16,7 +18,7 @@ def main() -> int:
     for script in sorted(folder.glob("*.py")):
         if script.name not in NOT_BENCHMARKS:
             print(f"== {script.stem}", flush=True)
-            missed += subprocess.run([sys.executable, script], check=False).returncode != 0
+            missed += subprocess.run([sys.executable, script], check=False, env=ONE_THREAD).returncode != 0
     return 1 if missed else 0
 
 
