@@ -123,7 +123,18 @@ def test_gravity_and_the_end_of_a_record_leave_its_beginning_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "rate_hz"), [("wd", 80.0), ("wb", 500.0), ("wb", 1000.0), ("wb", 1250.0), ("wc", 256.0), ("we", 2000.0), ("wj", 1000.0), ("wk", 128.0)])
+    ("name", "rate_hz"),
+    [
+        ("wd", 80.0),
+        ("wb", 500.0),
+        ("wb", 1000.0),
+        ("wb", 1250.0),
+        ("wc", 256.0),
+        ("we", 2000.0),
+        ("wj", 1000.0),
+        ("wk", 128.0),
+    ],
+)
 def test_sections_for_other_rates_are_within_0_02_db(name: str, rate_hz: float) -> None:
     weighting = WEIGHTINGS[name]
     band_hz = np.geomspace(0.1, 0.4 * rate_hz, 1000)
