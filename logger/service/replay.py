@@ -46,10 +46,7 @@ class Player:
         bus = RecordedBus()
         ports = {name: RecordedPort() for name in ("pasco", "nmea")}
         sources: list[Source] = [Bma220Source(lambda: bus, bma220, self._now_us, _no_wait)]
-        sources += [
-            SerialSource(name, lambda port=port: port, self._now_us, wait_s=0.0)  # type: ignore[misc]
-            for name, port in ports.items()
-        ]
+        sources += [SerialSource(name, _opener(port), self._now_us, wait_s=0.0) for name, port in ports.items()]
         self._load = {"bma220": bus.load, **{name: port.load for name, port in ports.items()}}
         self._step = {source.name: Supervisor(source, self._now_us).step for source in sources}
 
@@ -86,6 +83,10 @@ class Player:
 
     def _now_us(self) -> int:
         return self._clock_us
+
+
+def _opener(port: RecordedPort) -> Callable[[], RecordedPort]:
+    return lambda: port
 
 
 def _no_wait(_seconds: float) -> None:

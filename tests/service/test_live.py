@@ -6,6 +6,8 @@ import threading
 import time
 from collections import deque
 
+import pytest
+
 from drivers.dump import Event
 from drivers.errors import NotPresent
 from logger.service import live
@@ -32,7 +34,7 @@ class Stuck:
         """Nothing to let go of."""
 
 
-def test_a_device_that_never_returns_is_told_from_a_silent_one_and_does_not_hold_up_the_end(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_a_device_that_never_returns_is_noticed_and_does_not_hold_up_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "STOP_WAIT_S", 0.05)
     device = Stuck()
     listener = Listener(Supervisor(device, monotonic_us), deque(), lambda: None)
