@@ -4,7 +4,8 @@
   ridelog fixed-point --weighting wd --data-bits 16 --full-scale-g 2 --spacing 0.25 --out firmware/
 
 Two headers: ridelog_<weighting>.h takes accelerations and ridelog_golden_car.h road slopes. Each holds its coefficients
-and a short loop in C99 that gives the same bits as `arithmetic: fixed` does here.
+and a short loop in C99 that gives the same bits as logger/dsp/fixed_point.py; with the defaults, those that the service
+runs with `arithmetic: fixed`.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def _weighting(args: argparse.Namespace) -> _Header:
     cascade = _cascade(f"--rate {args.rate}", sections, args.full_scale_g * STANDARD_GRAVITY_MPS2, args.data_bits)
     return _Header(
         f"ridelog_{args.weighting}",
-        f"{args.weighting.capitalize()} of ISO 2631-1 at {args.rate} Hz for inputs within +-{args.full_scale_g:g} g",
+        f"{args.weighting.capitalize()} of ISO 2631 at {args.rate} Hz for inputs within +-{args.full_scale_g:g} g",
         "m/s2",
         (f"The output runs {DELAY_SAMPLES} samples behind the standard's formula: output k + {DELAY_SAMPLES} belongs",
          "to the instant of input k."),

@@ -22,7 +22,9 @@ WINDOW_M = 100.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("profile", type=Path, metavar="PROFILE", help="CSV or ERD file")
+    parser.add_argument("profile", type=Path, metavar="PROFILE", nargs="?", help="CSV or ERD file")
+    parser.add_argument("--response", action="store_true",
+                        help="without a profile: what the IRI hears of each wavelength, as a table")
     parser.add_argument("--window", type=float, default=WINDOW_M, metavar="M",
                         help="length of a window [m] (default: 100, as road agencies report; a tenth of a mile is "
                              "160.9344, the service's 25 ft are 7.62)")
@@ -34,15 +36,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog iri``."""
+    if args.response:
+        table = response()
+        print(json.dumps({"response": table}) if args.json else "\n".join(response_screen(table)))
+        return EXIT_DONE
+    if args.profile is None:
+        raise BadInput("expected a PROFILE, or --response")
     from logger.store.profile_file import read_profile
 
+    if not args.window > 0:
+        raise BadInput(f"--window {args.window:g}: expected a length above 0 m")
     profile = read_profile(args.profile, args.resample)
     try:
         result = measure(profile, args.window)
     except ValueError as error:
         raise BadInput(f"{args.profile}: {error}") from None
-    print(json.dumps(as_json(result, profile)) if args.json else "\n".join(screen(result, profile, args.profile.name)))
+    if args.json:
+        print(json.dumps(as_json(result, profile), allow_nan=False))
+    else:
+        print("\n".join(screen(result, profile, args.profile.name)))
     return EXIT_DONE
+
+
+def response() -> list[dict[str, float]]:
+    """Fig 2.13: gain for slope, and IRI of a sine of 1 mm amplitude, at third-octave wavelengths, 100 m to 0.3 m."""
+    import numpy as np
+
+    from logger.roads.wavelength import sinusoid_iri, slope_gain
+
+    wavelengths_m = 100.0 / 2.0 ** (np.arange(26) / 3.0)
+    gain, iri_1_mm = slope_gain(1.0 / wavelengths_m), sinusoid_iri(0.001, 1.0 / wavelengths_m)
+    columns = {"wavelength_m": wavelengths_m, "slope_gain": gain, "iri_of_1_mm_m_per_km": iri_1_mm}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
+
+
+def response_screen(table: list[dict[str, float]]) -> list[str]:
+    """The same for a person, with bars."""
+    lines = ["What the IRI hears of a sinusoidal road (80 km/h, 250 mm moving average)", "",
+             "wavelength  slope gain  IRI of 1 mm"]
+    for row in table:
+        bar = "#" * round(20 * row["slope_gain"])
+        heard = f"{row['slope_gain']:11.3f} {row['iri_of_1_mm_m_per_km']:12.3f}"
+        lines.append(f"{row['wavelength_m']:8.2f} m {heard}  {bar}")
+    return lines
 
 
 @dataclass(frozen=True)
@@ -98,7 +134,7 @@ def screen(result: Measured, profile: Profile, name: str) -> list[str]:
 
     whole = result.row(0)
     roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
-    length_m = result.windows[-1].distance_end_m
+    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
     lines = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
     if profile.widest_step_m is not None:
         lines.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")

@@ -78,6 +78,10 @@ def _generate(args: argparse.Namespace) -> int:
     if args.length / args.spacing > _MOST_SAMPLES:
         raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected at most {_MOST_SAMPLES} samples")
     gd_n0_cm3 = _wanted_gd(args)
+    last_m = int(args.length / args.spacing + 1e-9) * args.spacing
+    if last_m < _LENGTHS_M[0]:
+        raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected the last sample at "
+                       f"{_LENGTHS_M[0]:g} m or more, it lies at {last_m:g} m")
     elevation = generate(gd_n0_cm3, args.length, args.spacing, args.seed, args.waviness)
     made = {
         "class": road_class(gd_n0_cm3), "gd_n0_cm3": gd_n0_cm3, "waviness": args.waviness, "seed": args.seed,
@@ -135,6 +139,8 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 def _classify(args: argparse.Namespace) -> int:
     from logger.store.profile_file import read_profile
 
+    if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
+        raise BadInput(f"--psd {args.psd}: expected another file than the profile")
     profile = read_profile(args.profile, args.resample)
     tracks = [profile.elevation_m] + ([profile.elevation_right_m] if profile.elevation_right_m is not None else [])
     try:

@@ -117,7 +117,7 @@ def fixed_cascade(sos: SectionRows, full_scale: float, data_bits: int = 32) -> F
         raise ValueError(f"expected sections that 32-bit coefficients can hold; rounded, their response is off by "
                          f"{error_db:.0f} dB. A lower sampling rate (a wider spacing) moves the poles away from 1")
     input_step = full_scale / largest_word(data_bits)
-    return FixedCascade(tuple(sections), data_bits, input_step, input_step / total_gain, error_db)
+    return FixedCascade(tuple(sections), data_bits, float(input_step), float(input_step / total_gain), float(error_db))
 
 
 def _samples_until_forgotten(rows: Floats) -> int:

@@ -16,9 +16,12 @@ do not. At rest on a constant slope is the start that ASTM E1926 asks for (state
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.units import KMH_MPS
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
@@ -56,14 +59,17 @@ def sections(spacing_m: float) -> Array:
 class GoldenCarFilter:
     """Elevations in, rectified slopes |z_s' - z_u'| out; any split of a profile gives the same bits.
 
-    spacing_m    distance between elevations [m], above 0 and at most 300 mm (else ValueError)
+    spacing_m      distance between elevations [m], above 0 and at most 300 mm (else ValueError)
+    make_filter    what runs the sections: floating point, or the integers of ``logger.dsp.fixed_point``
 
     Value i belongs to the end of the step from elevation i to i + 1. The tire's average takes the slope to the
     elevation 250 mm ahead, so values come that much later; the first ones come once 11 m are known.
     """
 
-    def __init__(self, spacing_m: float) -> None:
-        self._filter = BlockFilter(sections(spacing_m))
+    def __init__(
+        self, spacing_m: float, make_filter: Callable[[Array], BlockFilter | FixedFilter] = BlockFilter
+    ) -> None:
+        self._filter = make_filter(sections(spacing_m))
         self._spacing_m = spacing_m
         self._base = max(1, int(TIRE_BASE_M / spacing_m + 0.5))
         self._start = int(START_M / spacing_m + 0.5)

@@ -37,7 +37,7 @@ MAX_CHANNELS = 1000
 MAX_SAMPLES = 50_000_000
 MAX_HEADER_LINES = 10_000
 MAX_LINE = 64 * 1024
-_HIGHEST_M = 10_000.0
+HIGHEST_M = 10_000.0
 
 _BINARY = {0: "<i2", 1: "<f4", 2: "<f8"}
 _TEXT = 5
@@ -74,8 +74,8 @@ class ErdFile:
         """
         chosen = self._sides()
         tracks = tuple(self.values[:, channel] * self._unit_m(channel) for channel in chosen)
-        if any(np.abs(track).max(initial=0.0) > _HIGHEST_M for track in tracks):
-            raise BadInput(f"{self.place}: expected elevations within {_HIGHEST_M:g} m, found "
+        if any(np.abs(track).max(initial=0.0) > HIGHEST_M for track in tracks):
+            raise BadInput(f"{self.place}: expected elevations within {HIGHEST_M:g} m, found "
                            f"{max(np.abs(track).max() for track in tracks):.3g} (another byte order?)")
         return tracks
 

@@ -19,13 +19,15 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.store.bounded import read_bounded
-from logger.store.erd_file import ErdFile, is_erd, parse_erd
+from logger.store.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
 from logger.store.number_table import parse_columns
 
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 MAX_BYTES = 512 * 1024 * 1024
+WIDEST_BRIDGED_M = 1.0
+"""A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
 # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
 # is taken for rounding.
 _ROUNDING_M = 0.0006
@@ -76,6 +78,10 @@ def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
     def place(sample: int) -> str:
         return f"{file}:{sample + 2}"
 
+    for track in tracks:
+        if (wild := np.abs(track) > HIGHEST_M).any():
+            sample = int(np.argmax(wild))
+            raise BadInput(f"{place(sample)}: expected elevations within {HIGHEST_M:g} m, found {track[sample]:g}")
     if len(distance) < 2:
         raise BadInput(f"{place(1)}: expected at least two samples, found the end of the file")
     steps = np.diff(distance)
@@ -84,6 +90,10 @@ def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
         raise BadInput(f"{place(sample)}: expected a distance above {distance[sample - 1]:.10g} m, "
                        f"found {distance[sample]:.10g}")
     if resample_m is not None:
+        if steps.max() > WIDEST_BRIDGED_M:
+            sample = int(np.argmax(steps)) + 1
+            raise BadInput(f"{place(sample)}: expected no gap above {WIDEST_BRIDGED_M:g} m, found one of "
+                           f"{steps[sample - 1]:.6g} m: cut the profile there")
         return _resampled(distance, tracks, resample_m, file)
     return Profile(float(distance[0]), _even_spacing(distance, steps, place), *_pair(tracks))
 
@@ -98,6 +108,8 @@ def _even_spacing(distance: Array, steps: Array, place: Callable[[int], str]) ->
         return spacing_m
     usual_m = float(np.median(steps))
     hint = f"(--resample {usual_m:.4g} would lay straight lines between the samples)"
+    if steps.max() > WIDEST_BRIDGED_M:
+        hint = "(cut the profile there)"
     odd = np.abs(steps - usual_m) > 2 * _rounding_m(usual_m)
     if odd.any():
         step = int(np.argmax(odd))

@@ -6,6 +6,7 @@ from math import inf
 
 import pytest
 
+from logger.comfort import exposure
 from logger.comfort.exposure import (
     A8_MPS2,
     CAUTION_ZONE_VDV_MPS175,
@@ -67,3 +68,9 @@ def test_where_a_value_stands() -> None:
     assert CAUTION_ZONE_VDV_MPS175.verdict(8.4) == "below_zone"
     with pytest.raises(ValueError, match="2 and 4"):
         caution_zone(8.0, 3)
+
+
+def test_the_limits_are_those_of_the_directive() -> None:
+    """Directive 2002/44/EC, Article 3(2)."""
+    assert (exposure.A8_MPS2.action, exposure.A8_MPS2.limit) == (0.5, 1.15)
+    assert (exposure.VDV_MPS175.action, exposure.VDV_MPS175.limit) == (9.1, 21.0)

@@ -29,7 +29,10 @@ PROGRAM = """
 int main(void)
 {
     static NAME_state state;
+    const double steps[2] = {MACRO_INPUT_STEP, MACRO_OUTPUT_STEP};
     int32_t word;
+    if (!(steps[0] > 0.0 && steps[1] > 0.0))
+        return 1;
     if (fread(&word, sizeof word, 1, stdin) == 1)
         NAME_reset(&state, word);
     while (fread(&word, sizeof word, 1, stdin) == 1) {
@@ -47,7 +50,7 @@ def program(folder: Path, name: str, *options: str) -> Path:
     """The program of a header; skips where it cannot be compiled for lack of a compiler or sanitizer."""
     if COMPILER is None:
         pytest.skip("no C compiler (cc, gcc or clang) on this machine")
-    (folder / "main.c").write_text(PROGRAM.replace("NAME", name), encoding="ascii")
+    (folder / "main.c").write_text(PROGRAM.replace("MACRO", name.upper()).replace("NAME", name), encoding="ascii")
     built = subprocess.run([COMPILER, *STRICT, *options, "main.c", "-o", name], cwd=folder, capture_output=True,
                            text=True, check=False)
     if built.returncode and "ubsan" in built.stderr:
@@ -91,7 +94,8 @@ def test_the_headers_stand_side_by_side(tmp_path: Path) -> None:
     assert main(["fixed-point", "--weighting", "wd", "--data-bits", "16", "--out", str(tmp_path)]) == 0
     headers = sorted(path.name for path in tmp_path.iterdir())
     assert headers == ["ridelog_golden_car.h", "ridelog_wd.h", "ridelog_wk.h"]
-    main_c = "".join(f'#include "{header}"\n' for header in headers) + PROGRAM.replace("NAME", "ridelog_wd")
+    program_c = PROGRAM.replace("MACRO", "RIDELOG_WD").replace("NAME", "ridelog_wd")
+    main_c = "".join(f'#include "{header}"\n' for header in headers) + program_c
     program(tmp_path, "ridelog_wd")
     (tmp_path / "main.c").write_text(main_c, encoding="ascii")
     assert COMPILER is not None

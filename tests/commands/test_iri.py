@@ -82,7 +82,7 @@ def test_a_person_sees_a_table_and_words(
 ) -> None:
     assert main(["iri", str(road[0])]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "road.csv: 249.80 m, one sample every 50 mm"
+    assert lines[0] == "road.csv: 250.00 m, one sample every 50 mm"
     assert lines[2].startswith("IRI ")
     assert lines[3].startswith("Roads like this: ")
     assert lines[4].startswith("Ride: comfortable")
@@ -117,8 +117,7 @@ def test_uneven_spacing_is_refused_or_resampled_on_request(
     (44, 0.25, [], "expected a profile of at least 11 m, found 10.75 m"),
     (400, 0.5, [], "expected samples at most 0.3 m apart, found 0.5 m"),
     (400, 0.25, ["--resample", "0.31"], "expected samples at most 0.3 m apart, found 0.31 m"),
-    (400, 0.25, ["--window", "0"], "expected a window of at least the 0.25 m between samples, found 0 m"),
-    (400, 0.25, ["--window", "nan"], "expected a window of at least"),
+    (400, 0.25, ["--window", "0.1"], "expected a window of at least the 0.25 m between samples, found 0.1 m"),
 ])
 def test_what_has_no_iri_is_refused_by_name(
     tmp_path: Path, count: int, spacing_m: float, arguments: list[str], message: str
@@ -146,3 +145,25 @@ def test_an_erd_file_is_told_by_its_first_line(
     path.write_text(text + "\n".join(repr(height / 0.0254) for height in road[1].tolist()))
     assert as_json(capsys, path)["iri_m_per_km"] == pytest.approx(iri(road[1], SPACING_M), rel=1e-9)
     assert as_json(capsys, path, "--resample", "0.1")["resampled_to_m"] == 0.1
+
+
+def test_the_response_to_wavelengths_peaks_where_body_and_wheel_do(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fig 2.13: gain peaks near 0.065 and 0.42 cycle/m, that is 15 m and 2.4 m."""
+    assert main(["iri", "--response", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["response"]
+    gain = {row["wavelength_m"]: row["slope_gain"] for row in rows}
+    peaks = [b for a, b, c in zip(gain, list(gain)[1:], list(gain)[2:], strict=False) if gain[a] < gain[b] > gain[c]]
+    assert [round(peak, 1) for peak in peaks] == pytest.approx([15.4, 2.4], rel=0.15)
+    assert main(["iri", "--response"]) == 0
+    assert "wavelength" in capsys.readouterr().out
+
+
+def test_neither_profile_nor_response_is_refused() -> None:
+    with pytest.raises(BadInput, match="expected a PROFILE"):
+        main(["iri"])
+
+
+@pytest.mark.parametrize("length", ["0", "-1", "nan"])
+def test_a_window_that_has_no_length_is_refused_by_its_name(road: tuple[Path, np.ndarray], length: str) -> None:
+    with pytest.raises(BadInput, match=r"^--window .*: expected a length above 0 m"):
+        main(["iri", str(road[0]), "--window", length])

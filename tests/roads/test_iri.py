@@ -160,14 +160,6 @@ def test_scipy_agrees_on_a_long_road(spacing_m: float) -> None:
     assert iri(elevation, spacing_m) == pytest.approx(expected, rel=1e-9)
 
 
-def test_gain_peaks_where_the_literature_says() -> None:
-    n = np.linspace(0.02, 1.0, 2000)
-    gains = np.abs(golden_response(n))
-    body, wheel = n[n < 0.2], n[n >= 0.2]
-    assert body[gains[n < 0.2].argmax()] == pytest.approx(0.065, abs=0.005)
-    assert wheel[gains[n >= 0.2].argmax()] == pytest.approx(0.42, abs=0.03)
-
-
 def test_the_tire_average_is_used_below_167_mm_only() -> None:
     rough = np.cumsum(np.random.default_rng(1).standard_normal(4001)) * 1e-4
     assert len(rectified_slope(rough, 0.1)) == 4001 - 3

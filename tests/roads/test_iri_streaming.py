@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from logger.dsp.fixed_point import FULL_SCALE_SLOPE, FixedFilter
+from logger.dsp.fixed_scaling import fixed_cascade
 from logger.dsp.sections import frequency_response
 from logger.roads import iso8608
 from logger.roads.golden_car import GoldenCarFilter, sections
@@ -82,3 +84,15 @@ def test_sections_are_stable_and_blind_to_a_steady_slope(spacing_m: float) -> No
     gain = np.abs(frequency_response(sos, [0.001, peak_cpm], 1 / spacing_m))
     assert gain[0] < 0.001
     assert gain[1] > 1.0
+
+
+def test_the_quarter_car_runs_in_integers_as_well() -> None:
+    """IRI in 32-bit arithmetic beside floating point, on the service's kind of grid."""
+    elevation = iso8608.generate(120.0, 500.0, 0.25, 6)
+
+    def in_integers(rows: np.ndarray) -> FixedFilter:
+        return FixedFilter(fixed_cascade(rows, FULL_SCALE_SLOPE))
+
+    exact = GoldenCarFilter(0.25).push(elevation)
+    fixed = GoldenCarFilter(0.25, in_integers).push(elevation)
+    assert abs(fixed.mean() / exact.mean() - 1) < 1e-6

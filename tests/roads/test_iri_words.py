@@ -2,6 +2,7 @@
 
 import pytest
 
+from logger.roads import roughness_words
 from logger.roads.roughness_words import RIDES, ride_words, road_kinds
 
 
@@ -26,3 +27,8 @@ def test_a_ride_holds_up_to_the_next_mark() -> None:
     for wrong in (-0.1, float("nan")):
         with pytest.raises(ValueError, match="0 or more"):
             ride_words(wrong)
+
+
+def test_the_ranges_are_those_of_table_2_3() -> None:
+    bounds = [(lowest, highest) for lowest, highest, _ in roughness_words.ROAD_RANGES]
+    assert bounds == [(0.25, 1.75), (1.5, 3.25), (2.25, 5.75), (3.25, 10.0), (4.0, 10.75), (8.0, 20.0)]

@@ -103,7 +103,8 @@ def test_an_uneven_step_is_refused_with_its_line(path: Path) -> None:
     late[40:] += 0.1
     assert refusal(path, rows(late)).startswith(":42: expected even steps of 0.25 m, found a step of 0.35 m (--res")
     hole = np.delete(even, slice(40, 44))
-    assert refusal(path, rows(hole)).startswith(":42: expected even steps of 0.25 m, found a gap of 1.25 m (--res")
+    found = refusal(path, rows(hole))
+    assert found.startswith(":42: expected even steps of 0.25 m, found a gap of 1.25 m (cut the profile there)")
     jitter = even + 0.01 * np.random.default_rng(1).standard_normal(100)
     assert re.match(r":\d+: expected even steps of 0\.2[45]\d* m, found a step of", refusal(path, rows(jitter)))
 
@@ -126,3 +127,10 @@ def test_resampling_cannot_mend_everything(path: Path) -> None:
     assert refusal(path, HEADER + "\n0,1\n1,1\n1,2\n", 0.25).startswith(":4: expected a distance above")
     for spacing_m in (0.0, -1.0, 5.0, 1e-12, float("nan"), float("inf")):
         assert "to resample to, found" in refusal(path, HEADER + "\n0,1\n1,1\n2,2\n", spacing_m)
+
+
+def test_a_wide_gap_is_not_bridged_and_wild_heights_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "road.csv"
+    holed = HEADER + "".join(f"\n{0.25 * i},0" for i in range(60)) + "".join(f"\n{60 + 0.25 * i},0" for i in range(60))
+    assert ":62: expected no gap above 1 m, found one of 45.25 m" in refusal(path, holed, 0.25)
+    assert ":3: expected elevations within 10000 m" in refusal(path, HEADER + "\n0,1\n0.25,1.7e308\n0.5,1")
