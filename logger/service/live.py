@@ -1,7 +1,7 @@
 """The live service: threads that listen, one loop that thinks.
 
 Each source has a thread of its own that does nothing but look at its device at the right moment and put what it
-got, with the time, into a queue. The main loop empties the queue four times a second, brings the events into
+got, with the time, into a queue. The main loop empties the queue twice a second, brings the events into
 order of time, records them if asked to, feeds the core, and tells systemd and the status file how things stand.
 So a slow card or a slow window never delays a sample, and a pipeline that hangs stops feeding the watchdog.
 """
@@ -22,9 +22,9 @@ from logger.service.supervisor import Supervisor
 from logger.store.rotation import SegmentLog
 from logger.units import US_PER_S
 
-LOOP_S = 0.25
+LOOP_S = 0.5
 HOLD_BACK_US = 60_000
-GATHER_S = 0.03
+GATHER_S = 0.05
 CLOSED_WAIT_S = 0.1
 STOP_WAIT_S = 2.0
 HANG_US = 10 * US_PER_S
