@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from logger.roads import iso8608
 from logger.units import WINDOW_M
-from logger.vehicle import half_car, quarter_car
+from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
 
@@ -34,7 +34,6 @@ Array = npt.NDArray[np.float64]
 
 SPEEDS_MPS = (*np.arange(3.0, 6.0, 0.25).tolist(), *np.arange(6.0, 46.0).tolist())
 
-_STRUCTURES = {"half_car": half_car.structure, "quarter_car": quarter_car.structure}
 _WAVE_NUMBERS = 400  # log-spaced; 5000 of them change no ratio by more than 0.01 %
 
 # Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
@@ -124,11 +123,11 @@ def rms_relation(
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
     speeds_mps       where to compute it, increasing [m/s]; between them a straight line is taken
     """
-    structure = _STRUCTURES[vehicle.model](vehicle)
+    structure = structure_of(vehicle)
     speeds = np.asarray(speeds_mps, dtype=float)
     wave_number = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, _WAVE_NUMBERS)
     f_hz = speeds[:, None] * wave_number
-    gain = np.abs(body_acceleration_response(structure, f_hz, speeds[:, None]))
+    gain = np.abs(body_acceleration_response(structure, f_hz, speeds[:, None], vehicle.sensor))
     if recorder_gain is not None:
         gain = gain * recorder_gain(f_hz)
     trapezoid = wave_number * np.log(wave_number[1] / wave_number[0])  # dn of a log-spaced grid

@@ -1,12 +1,15 @@
-"""A car as linear equations of motion, and what a road does to it in frequency and in time.
+"""A car as linear equations of motion, and what can be asked of them.
 
-Every linear model of a car is the same problem with other matrices, so each model file states only its
-matrices and this one asks the questions. Conventions, stated once for all models:
+Every linear model of a car is the same problem with other matrices, so each model file states only its masses and
+where its wheels stand, and this one builds the matrices and asks the questions. Conventions, stated once for all
+models:
 
     M q'' + C q' + K q = R z
 
-- q[0] is the body at its centre of gravity, up positive, from rest under gravity; a pitch is nose up positive;
-- z holds the road's elevation under each wheel, up positive, the front wheel first;
+- q[0] is the body at its centre of gravity, up positive, from rest under gravity; a pitch is nose up positive, a roll
+  left side up positive; the wheels come last;
+- places are counted from the centre of gravity of the body, ahead and to the left positive;
+- z holds the road's elevation under each wheel, up positive, the front wheel first, left before right;
 - tires are springs only, so R holds tire stiffnesses;
 - the car drives forward: a wheel that stands ``behind_m`` behind the front wheel meets the road ``behind_m / speed``
   later (Eq 4.10 and 4.11 of Blum 2015), and each tire averages the road over the contact patch.
@@ -14,22 +17,49 @@ matrices and this one asks the questions. Conventions, stated once for all model
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace
+
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Output:
+    """A motion that can be read off a car: a weighted sum of its coordinates, or a time derivative of that.
+
+    row         (n,) weights of the coordinates q
+    road_row    (w,) weights of the elevations under the wheels, added to it; all zero unless order is 0
+    order       0 displacement [m], 1 velocity [m/s], 2 acceleration [m/s2]
+    """
+
+    row: Array
+    road_row: Array
+    order: int
+
+    def __post_init__(self) -> None:
+        if self.order not in (0, 1, 2):
+            raise ValueError(f"order of an output: expected 0, 1 or 2, found {self.order}")
+        if self.order and self.road_row.any():
+            raise ValueError("the road has no velocity or acceleration here: only an output of order 0 may contain it")
 
 
 @dataclass(frozen=True)
 class Structure:
     """Matrices of one car. n degrees of freedom, w wheels.
 
-    mass, damping, stiffness    (n, n) [kg, N s/m, N/m; with lengths where a row or column is a pitch]
+    mass, damping, stiffness    (n, n) [kg, N s/m, N/m; with lengths where a row or column is an angle]
     road                        (n, w) force per elevation under each wheel [N/m]
     behind_m                    (w,) how far behind the front wheel each wheel stands [m]
+    left_m                      (w,) how far left of the middle each wheel stands [m]; 0 in a car of one track
     contact_patch_m             [m]
+    body                        (n, 3) a point of the body moves up by ``(1, ahead_m, left_m) @ body.T @ q``
+    wheels                      (w, n) each wheel's height is ``wheels @ q``
+    travel                      (w, n) each suspension's extension, body end minus wheel, is ``travel @ q``
     """
 
     mass: Array
@@ -37,7 +67,11 @@ class Structure:
     stiffness: Array
     road: Array
     behind_m: Array
+    left_m: Array
     contact_patch_m: float
+    body: Array
+    wheels: Array
+    travel: Array
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""
@@ -47,20 +81,115 @@ class Structure:
         b = np.vstack([np.zeros_like(self.road), inverse @ self.road])
         return a, b
 
+    def output_matrices(self, outputs: Sequence[Output]) -> tuple[Array, Array]:
+        """C (p, 2n) and D (p, w) of y = C x + D z, for p outputs and the state of ``state_space``."""
+        n = len(self.mass)
+        a, b = self.state_space()
+        c_rows = np.zeros((len(outputs), 2 * n))
+        d_rows = np.zeros((len(outputs), self.road.shape[1]))
+        for index, output in enumerate(outputs):
+            if output.order == 2:
+                c_rows[index], d_rows[index] = output.row @ a[n:], output.row @ b[n:]
+            else:
+                c_rows[index, output.order * n:(output.order + 1) * n] = output.row
+                d_rows[index] = output.road_row
+        return c_rows, d_rows
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A wheel with its spring, damper and tire, and where they stand from the centre of gravity [m]."""
+
+    axle: Axle
+    ahead_m: float
+    left_m: float
+
+
+def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_patch_m: float) -> Structure:
+    """The structure of a rigid body on independent wheels.
+
+    body_inertias    mass [kg], then, of a body that pitches, its pitch inertia, and of one that also rolls its roll
+                     inertia [kg m2]: the body's degrees of freedom, in this order
+    corners          the wheels, a front one first; each adds one degree of freedom, its height
+
+    M is diagonal. Springs and dampers act on the suspensions' extension J q, so by virtual work K = J' k J plus the
+    tires, and C = J' c J.
+    """
+    motions, w = len(body_inertias), len(corners)
+    body = np.eye(motions + w, 3)
+    body[motions:] = 0.0
+    wheels = np.eye(motions + w)[motions:]
+    places = np.array([[1.0, corner.ahead_m, corner.left_m] for corner in corners])
+    travel = places @ body.T - wheels
+    axles = [corner.axle for corner in corners]
+    springs = np.diag([axle.suspension_stiffness_n_per_m for axle in axles])
+    dampers = np.diag([axle.suspension_damping_n_s_per_m for axle in axles])
+    road = wheels.T @ np.diag([axle.tire_stiffness_n_per_m for axle in axles])
+    return Structure(
+        mass=np.diag([*body_inertias, *(axle.unsprung_mass_kg for axle in axles)]),
+        damping=travel.T @ dampers @ travel,
+        stiffness=travel.T @ springs @ travel + road @ wheels,
+        road=road,
+        behind_m=places[0, 1] - places[:, 1],
+        left_m=places[:, 2],
+        contact_patch_m=contact_patch_m,
+        body=body,
+        wheels=wheels,
+        travel=travel,
+    )
+
+
+def body_point(structure: Structure, ahead_m: float = 0.0, left_m: float = 0.0, order: int = 2) -> Output:
+    """Vertical motion of a point of the body, up positive; its acceleration unless ``order`` says otherwise.
+
+    ValueError for a point away from the centre of gravity of a body that cannot pitch, or cannot roll.
+    """
+    for offset, motion, column in ((ahead_m, "pitch", 1), (left_m, "roll", 2)):
+        if offset and not structure.body[:, column].any():
+            raise ValueError(f"this body does not {motion}: expected a point at its centre of gravity")
+    return Output(structure.body @ np.array([1.0, ahead_m, left_m]), np.zeros(len(structure.wheels)), order)
+
+
+def wheel(structure: Structure, index: int, order: int = 2) -> Output:
+    """Vertical motion of a wheel, up positive; its acceleration unless ``order`` says otherwise."""
+    return Output(structure.wheels[index], np.zeros(len(structure.wheels)), order)
+
+
+def suspension_travel(structure: Structure, index: int, order: int = 0) -> Output:
+    """Extension of the suspension over a wheel, body end minus wheel: negative when it is compressed."""
+    return Output(structure.travel[index], np.zeros(len(structure.wheels)), order)
+
+
+def tire_deflection(structure: Structure, index: int) -> Output:
+    """A wheel's height over the road under it, from rest [m]: negative when the tire is pressed."""
+    return Output(structure.wheels[index], -np.eye(len(structure.wheels))[index], 0)
+
+
+def frequency_response(
+    structure: Structure, outputs: Sequence[Output], f_hz: npt.ArrayLike
+) -> npt.NDArray[np.complex128]:
+    """Outputs per elevation under each wheel separately, for waves exp(2 pi i f t); no delay, no contact patch.
+
+    f_hz (...) [Hz]; returns (..., p, w).
+    """
+    omega = 2 * np.pi * np.asarray(f_hz, float)[..., None, None]
+    dynamic_stiffness = structure.stiffness + 1j * omega * structure.damping - omega**2 * structure.mass
+    coordinates = np.linalg.solve(dynamic_stiffness, structure.road.astype(complex))
+    rows = np.array([output.row for output in outputs])
+    orders = np.array([[output.order] for output in outputs])
+    return (1j * omega) ** orders * (rows @ coordinates) + np.array([output.road_row for output in outputs])
+
 
 def body_acceleration_response(
-    structure: Structure, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike
+    structure: Structure, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike, sensor: SensorPlace = AT_CENTRE_OF_GRAVITY
 ) -> npt.NDArray[np.complex128]:
-    """Body acceleration at the centre of gravity per elevation under the front wheel [1/s2], at constant speed.
+    """Body acceleration at the sensor per elevation under the front wheel [1/s2], at constant speed.
 
     ``f_hz`` [Hz] and ``speed_mps`` [m/s], greater than 0, are broadcast against each other. A moving average over the
-    contact patch is a sinc in the road's wave number f / speed.
+    contact patch is a sinc in the road's wave number f / speed. Left and right wheels see the same road.
     """
     f, speed = np.broadcast_arrays(np.asarray(f_hz, float), np.asarray(speed_mps, float))
-    omega = 2 * np.pi * f[..., None, None]
-    dynamic_stiffness = structure.stiffness + 1j * omega * structure.damping - omega**2 * structure.mass
+    per_wheel = frequency_response(structure, [body_point(structure, sensor.ahead_m, sensor.left_m)], f)[..., 0, :]
     wave_number = f / speed
     delays = np.exp(-2j * np.pi * wave_number[..., None] * structure.behind_m)
-    force = (delays @ structure.road.T)[..., None]
-    body = np.linalg.solve(dynamic_stiffness, force)[..., 0, 0]
-    return -((2 * np.pi * f) ** 2) * body * np.sinc(wave_number * structure.contact_patch_m)
+    return (per_wheel * delays).sum(axis=-1) * np.sinc(wave_number * structure.contact_patch_m)

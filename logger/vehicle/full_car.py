@@ -1,0 +1,37 @@
+"""The full car: the whole body on four wheels, with seven degrees of freedom.
+
+A half car sees one track and knows nothing of the other, but the two tracks of a road differ and tilt the car. The
+full car adds roll: the half car's equations (Eq 4.12 of Blum 2015) with a second side, and an anti-roll bar on each
+axle, which resists only what the two suspensions of the axle do against each other. With x the extension of a
+suspension and b the track width, the axle rolls against the body by (x_left - x_right) / b, and the bar stores
+1/2 k ((x_left - x_right) / b)^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from logger.vehicle.structure import Corner, Structure, assemble
+from logger.vehicle.vehicle import Vehicle
+
+
+def structure(vehicle: Vehicle) -> Structure:
+    """Matrices of a full car.
+
+    Degrees of freedom: body, pitch (nose up), roll (left side up), wheels front left, front right, rear left, rear
+    right. ValueError if the vehicle has no rear axle, inertia of pitch or roll, or track width.
+    """
+    front, rear, track_m = vehicle.front, vehicle.rear, vehicle.track_width_m
+    if rear is None or track_m is None or vehicle.pitch_inertia_kg_m2 is None or vehicle.roll_inertia_kg_m2 is None:
+        raise ValueError(f"{vehicle.name}: a full car needs a rear axle, pitch and roll inertias and a track width")
+    ends = ((front, front.cg_distance_m), (rear, -rear.cg_distance_m))
+    independent = assemble(
+        [vehicle.sprung_mass_kg, vehicle.pitch_inertia_kg_m2, vehicle.roll_inertia_kg_m2],
+        [Corner(axle, ahead_m, side * track_m / 2) for axle, ahead_m in ends for side in (1, -1)],
+        vehicle.contact_patch_m,
+    )
+    axle_roll = (independent.travel[[0, 2]] - independent.travel[[1, 3]]) / track_m
+    bars = np.diag([front.anti_roll_stiffness_n_m_per_rad, rear.anti_roll_stiffness_n_m_per_rad])
+    return replace(independent, stiffness=independent.stiffness + axle_roll.T @ bars @ axle_roll)
