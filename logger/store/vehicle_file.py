@@ -1,51 +1,114 @@
-"""Vehicle files (YAML) to vehicles, with complaints that name the line."""
+"""Vehicle files (YAML) to vehicles and back, with complaints that name the line."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+
+import yaml
 
 from logger.errors import BadInput
 from logger.store.yaml_lines import Node, load_mapping
-from logger.vehicle.vehicle import Axle, Vehicle
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
+# What each model needs beyond the keys that all have.
+_MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
+    "quarter_car": (),
+    "half_car": ("pitch_inertia_kg_m2", "rear"),
+    "full_car": ("pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
+}
+_COMMON_KEYS = ("name", "model", "sprung_mass_kg", "front", "contact_patch_m")
 _AXLE_KEYS = (
     "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m",
 )
-_COMMON_KEYS = ("name", "model", "sprung_mass_kg", "front", "contact_patch_m")
-_HALF_CAR_KEYS = ("pitch_inertia_kg_m2", "rear")
+_ANTI_ROLL_KEY = "anti_roll_stiffness_n_m_per_rad"
+_FARTHEST_M = 10.0  # no sensor is bolted farther from its car's centre of gravity
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
     """Read a vehicle file. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown or wrong.
 
-    A half car needs every key; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and has neither
-    ``rear`` nor ``pitch_inertia_kg_m2``.
+    A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
+    has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
+    an axle that has an anti-roll bar, ``anti_roll_stiffness_n_m_per_rad``. Any car may say where its accelerometer
+    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference.
     """
     top = load_mapping(path)
     model_node = top.mapping().get("model")
     if model_node is None:
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
-    half = model_node.choice("half_car", "quarter_car") == "half_car"
-    keys = top.mapping(required=_COMMON_KEYS + (_HALF_CAR_KEYS if half else ()), optional=("effects",))
+    model = model_node.choice(*_MODEL_KEYS)
+    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects"))
     if "effects" in keys and keys["effects"].items():
         raise keys["effects"].wrong("an empty list (effects are not supported yet)")
     return Vehicle(
         name=keys["name"].text(),
-        model=model_node.text(),
+        model=model,
         sprung_mass_kg=keys["sprung_mass_kg"].number(above=0),
-        pitch_inertia_kg_m2=keys["pitch_inertia_kg_m2"].number(above=0) if half else None,
-        front=_read_axle(keys["front"], half),
-        rear=_read_axle(keys["rear"], half) if half else None,
+        pitch_inertia_kg_m2=_optional_number(keys, "pitch_inertia_kg_m2"),
+        front=_read_axle(keys["front"], model),
+        rear=_read_axle(keys["rear"], model) if "rear" in keys else None,
         contact_patch_m=keys["contact_patch_m"].number(low=0, high=1),
+        roll_inertia_kg_m2=_optional_number(keys, "roll_inertia_kg_m2"),
+        track_width_m=_optional_number(keys, "track_width_m"),
+        sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
     )
 
 
-def _read_axle(node: Node, half: bool) -> Axle:
-    keys = node.mapping(required=("cg_distance_m", *_AXLE_KEYS) if half else _AXLE_KEYS)
+def _optional_number(keys: Mapping[str, Node], key: str) -> float | None:
+    return keys[key].number(above=0) if key in keys else None
+
+
+def _read_axle(node: Node, model: str) -> Axle:
+    keys = node.mapping(
+        required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
+        optional=(_ANTI_ROLL_KEY,) if model == "full_car" else (),
+    )
     return Axle(
-        cg_distance_m=keys["cg_distance_m"].number(low=0) if half else 0.0,
+        cg_distance_m=keys["cg_distance_m"].number(low=0) if "cg_distance_m" in keys else 0.0,
         unsprung_mass_kg=keys["unsprung_mass_kg"].number(above=0),
         suspension_stiffness_n_per_m=keys["suspension_stiffness_n_per_m"].number(above=0),
         suspension_damping_n_s_per_m=keys["suspension_damping_n_s_per_m"].number(low=0),
         tire_stiffness_n_per_m=keys["tire_stiffness_n_per_m"].number(above=0),
+        anti_roll_stiffness_n_m_per_rad=keys[_ANTI_ROLL_KEY].number(low=0) if _ANTI_ROLL_KEY in keys else 0.0,
     )
+
+
+def _read_sensor(node: Node, model: str) -> SensorPlace:
+    keys = node.mapping(optional=("ahead_m", "left_m"))
+    place = {key: value.number(low=-_FARTHEST_M, high=_FARTHEST_M) for key, value in keys.items()}
+    for key, motion, models in (("ahead_m", "pitch", ("half_car", "full_car")), ("left_m", "roll", ("full_car",))):
+        if place.get(key) and model not in models:
+            raise keys[key].wrong(f"0, because a {model} does not {motion}")
+    return SensorPlace(**place)
+
+
+def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
+    """Write a vehicle as a file that ``read_vehicle`` reads back equal, to the last bit. OSError if that fails."""
+    keys: dict[str, object] = {"name": vehicle.name, "model": vehicle.model}
+    for key in ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m"):
+        value = getattr(vehicle, key)
+        if value is not None:
+            keys[key] = _number(value)
+    keys["front"] = _axle_keys(vehicle.front, vehicle.model)
+    if vehicle.rear is not None:
+        keys["rear"] = _axle_keys(vehicle.rear, vehicle.model)
+    keys["contact_patch_m"] = _number(vehicle.contact_patch_m)
+    if vehicle.sensor != AT_CENTRE_OF_GRAVITY:
+        keys["sensor"] = {"ahead_m": _number(vehicle.sensor.ahead_m), "left_m": _number(vehicle.sensor.left_m)}
+    keys["effects"] = []
+    text = yaml.safe_dump(keys, sort_keys=False, allow_unicode=True, width=float("inf"))
+    Path(path).write_text(text, "utf-8")
+
+
+def _axle_keys(axle: Axle, model: str) -> dict[str, float]:
+    names = _AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS)
+    if axle.anti_roll_stiffness_n_m_per_rad:
+        names = (*names, _ANTI_ROLL_KEY)
+    return {name: _number(getattr(axle, name)) for name in names}
+
+
+def _number(value: float) -> float:
+    """The same number, whole where it can be: 875, not 875.0."""
+    plain = float(value)
+    return int(plain) if plain.is_integer() else plain

@@ -1,16 +1,21 @@
 """Vehicle files: what is read, and what is said about files that cannot be."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
-from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.shipped import vehicle_file, vehicle_names
+from logger.store.vehicle_file import read_vehicle, write_vehicle
 from logger.store.yaml_lines import MAX_BYTES, parse_mapping
-from logger.vehicle.vehicle import Axle, Vehicle
+from logger.vehicle.models import MODELS, structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle
 
 TEXT = vehicle_file("rav4-2009").read_text("utf-8")
 QUARTER = """\
@@ -24,6 +29,10 @@ front:
   tire_stiffness_n_per_m: 1.8e5
 contact_patch_m: 0.25
 """
+FULL = (
+    TEXT.replace("half_car", "full_car").replace("1100", "2200\nroll_inertia_kg_m2: 550\ntrack_width_m: 1.56")
+    .replace("front:", "front:\n  anti_roll_stiffness_n_m_per_rad: 9000") + "sensor: {ahead_m: -0.4, left_m: 0.35}\n"
+)
 
 
 def line_of(text: str, start: str) -> int:
@@ -51,6 +60,87 @@ def test_a_quarter_car_stands_on_its_front_axle(tmp_path: Path) -> None:
     assert car == Vehicle("one-wheel", "quarter_car", 300.0, None, Axle(0.0, 40.0, 20000.0, 1500.0, 1.8e5), None, 0.25)
 
 
+def test_a_full_car_has_a_roll_inertia_a_track_width_and_perhaps_anti_roll_bars(tmp_path: Path) -> None:
+    (tmp_path / "f.yaml").write_text(FULL)
+    front, rear = (Axle(1.47, 55.0, 23088.0, 1776.0, 238180.0, bar) for bar in (9000.0, 0.0))
+    assert read_vehicle(tmp_path / "f.yaml") == Vehicle(
+        "rav4-2009", "full_car", 875.0, 2200.0, front, rear, 0.25, 550.0, 1.56, SensorPlace(-0.4, 0.35),
+    )
+
+
+def test_what_the_other_models_do_not_know_is_refused(tmp_path: Path) -> None:
+    for key in ("roll_inertia_kg_m2", "track_width_m"):
+        text = "".join(line for line in FULL.splitlines(True) if not line.startswith(key))
+        assert complaint(tmp_path, text) == f"1: expected the key '{key}' here, it is missing"
+    half = TEXT.replace("front:", "front:\n  anti_roll_stiffness_n_m_per_rad: 9000")
+    assert "expected one of the keys" in complaint(tmp_path, half)
+    bar = FULL.replace("9000", "-9000")
+    assert complaint(tmp_path, bar) == (
+        f"{line_of(bar, '  anti_roll')}: expected a number of at least 0, found '-9000'"
+    )
+    quarter = QUARTER + "sensor:\n  left_m: 0\n  ahead_m: 0.2\n"
+    assert complaint(tmp_path, quarter) == "12: expected 0, because a quarter_car does not pitch, found '0.2'"
+
+
+def test_a_sensor_at_the_centre_of_gravity_may_be_written_out(tmp_path: Path) -> None:
+    (tmp_path / "q.yaml").write_text(QUARTER + "sensor: {ahead_m: 0, left_m: 0}\n")
+    assert read_vehicle(tmp_path / "q.yaml").sensor == SensorPlace(0.0, 0.0)
+
+
+positive = st.floats(1e-300, 1e300)
+axles = st.builds(Axle, st.just(0.0), positive, positive, st.floats(0, 1e300), positive)
+names = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), min_size=1)
+cars = st.builds(
+    Vehicle, names, st.sampled_from(list(MODELS)), positive, axles, axles, st.floats(0, 1), positive, positive,
+    st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10)),
+)
+
+
+def as_its_model_knows_it(car: Vehicle) -> Vehicle:
+    """Leave out what a quarter or a half car cannot have, and give the axles what only the others have."""
+    if car.model == "quarter_car":
+        return replace(car, pitch_inertia_kg_m2=None, rear=None, roll_inertia_kg_m2=None, track_width_m=None,
+                       sensor=SensorPlace())
+    assert car.rear is not None
+    car = replace(car, front=replace(car.front, cg_distance_m=1.1), rear=replace(car.rear, cg_distance_m=1 / 3))
+    if car.model == "half_car":
+        return replace(car, roll_inertia_kg_m2=None, track_width_m=None, sensor=replace(car.sensor, left_m=0.0))
+    return replace(car, front=replace(car.front, anti_roll_stiffness_n_m_per_rad=1e4 / 7))
+
+
+@given(cars)
+@settings(deadline=None, max_examples=60)
+def test_a_written_vehicle_is_read_back_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, car: Vehicle) -> None:
+    path = tmp_path_factory.getbasetemp() / "written.yaml"
+    car = as_its_model_knows_it(car)
+    write_vehicle(path, car)
+    assert read_vehicle(path) == car
+
+
+def test_a_written_vehicle_looks_like_those_that_people_write(tmp_path: Path) -> None:
+    path = tmp_path / "rav4.yaml"
+    write_vehicle(path, read_vehicle(vehicle_file("rav4-2009")))
+    by_hand = [line.split("#")[0].rstrip() for line in TEXT.splitlines()]
+    assert path.read_text("utf-8").splitlines() == [line for line in by_hand if line]
+    fitted = replace(read_vehicle(path), sprung_mass_kg=np.float64(881.25))
+    write_vehicle(path, fitted)
+    assert "\nsprung_mass_kg: 881.25\n" in path.read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_shipped_vehicle_names_itself_its_sources_and_its_frequencies(name: str) -> None:
+    path = vehicle_file(name)
+    car = read_vehicle(path)
+    assert car.name == name
+    lines = path.read_text("utf-8").splitlines()
+    stated = next(line for line in lines if line.startswith("# Undamped frequencies [Hz]: "))
+    computed = undamped_frequencies_hz(structure_of(car))
+    assert stated.split(": ")[1].split() == [f"{frequency:.2f}" for frequency in computed]
+    if "Source of every value not marked otherwise" not in path.read_text("utf-8"):
+        bare = [line for line in lines if re.search(r": [0-9]", line) and not line.startswith("#") and "#" not in line]
+        assert not bare
+
+
 @pytest.mark.parametrize(("old", "new", "at", "words"), [
     ("sprung_mass_kg: 875", "sprung_mass_kg: heavy", "sprung_mass_kg", "a number greater than 0, found 'heavy'"),
     ("sprung_mass_kg: 875", "sprung_mass_kg: '875'", "sprung_mass_kg", "expected a number"),
@@ -60,9 +150,14 @@ def test_a_quarter_car_stands_on_its_front_axle(tmp_path: Path) -> None:
     ("sprung_mass_kg: 875", "sprung_mass_kg: [875]", "sprung_mass_kg", "found a list"),
     ("sprung_mass_kg: 875", "sprung_mas_kg: 875", "sprung_mas_kg", "expected one of the keys"),
     ("sprung_mass_kg: 875", "name: again", "name: again", "each key once"),
-    ("model: half_car", "model: full_car", "model", "expected one of half_car, quarter_car, found 'full_car'"),
+    ("model: half_car", "model: tank", "model", "expected one of quarter_car, half_car, full_car, found 'tank'"),
     ("model: half_car", "model: {a: 1}", "model", "found a mapping"),
     ("contact_patch_m: 0.25", "contact_patch_m: 25", "contact_patch_m", "from 0 to 1"),
+    ("effects: []", "track_width_m: 1.5", "track_width_m", "expected one of the keys"),
+    ("effects: []", "sensor: {left_m: 0.1}", "sensor", "expected 0, because a half_car does not roll, found '0.1'"),
+    ("effects: []", "sensor: {ahead_m: 300}", "sensor", "from -10 to 10"),
+    ("effects: []", "sensor: {ahead_mm: 3}", "sensor", "expected one of the keys ahead_m, left_m"),
+    ("effects: []", "sensor: 0.3", "sensor", "expected a mapping"),
     ("effects: []", "effects: [{name: roll}]", "effects", "not supported yet"),
     ("effects: []", "effects: ", "effects", "expected a list, found nothing"),
     ("name: rav4-2009", "name: !!python/name:os.system x", "name", "plain value"),
