@@ -91,8 +91,8 @@ positive = st.floats(1e-300, 1e300)
 axles = st.builds(Axle, st.just(0.0), positive, positive, st.floats(0, 1e300), positive)
 names = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), min_size=1)
 cars = st.builds(
-    Vehicle, names, st.sampled_from(list(MODELS)), positive, axles, axles, st.floats(0, 1), positive, positive,
-    st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10)),
+    Vehicle, names, st.sampled_from(list(MODELS)), positive, positive, axles, axles, st.floats(0, 1), positive,
+    positive, st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10)),
 )
 
 
