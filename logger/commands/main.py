@@ -25,6 +25,7 @@ VERBS = {
     "iri": "exact IRI of a measured profile",
     "comfort": "ISO 2631 comfort and health values of an acceleration record",
     "road": "make a random road, or tell the class of a measured one",
+    "simulate": "what a vehicle's accelerometer would record on a road",
     "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
 }

@@ -61,7 +61,7 @@ def read_record(path: Path | str) -> AccelerationRecord:
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
     t_s = table[:, 0]
-    rate_hz = _even_rate_hz(t_s, file)
+    rate_hz = even_rate_hz(t_s, file)
     accel = dict(zip(wanted[1:], table.T[1:].copy(), strict=True))
     for name, samples in accel.items():
         if (wild := np.abs(samples) > MAX_MPS2).any():
@@ -76,7 +76,7 @@ def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 
 
-def _even_rate_hz(t_s: Array, file: str) -> float:
+def even_rate_hz(t_s: Array, file: str) -> float:
     """The rate of the times; BadInput with the line where they leave an even grid."""
     steps = np.diff(t_s)
     if (steps <= 0).any():

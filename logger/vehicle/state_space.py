@@ -1,8 +1,8 @@
 """Linear equations in time, stepped exactly and in blocks.
 
-A car on a road is x' = A x + B u. Between two samples the input is known (held, or a straight line), so the step
-can be taken without error through the matrix exponential. Stepping sample by sample in Python is slow; a block of
-L steps is one matrix product, and only the state at the block's end has to be carried on.
+A car on a road is x' = A x + B u. Between two samples the input is known (a straight line), so the step can be taken
+without error through the matrix exponential. Stepping sample by sample in Python is slow; but a stretch of steps can be
+taken for all stretches of a drive at once, and only the state at the end of each has to be carried on.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-_BLOCK = 32
+_BLOCK = 16
 
 
 def matrix_exponential(a: Array) -> Array:
@@ -28,15 +28,11 @@ def matrix_exponential(a: Array) -> Array:
     return result
 
 
-def held_step(a: Array, b: Array, step_s: float) -> tuple[Array, Array]:
-    """F and G of x[k+1] = F x[k] + G u[k], exact for an input that is constant over the step."""
-    n, m = b.shape
-    whole = matrix_exponential(np.block([[a, b], [np.zeros((m, n + m))]]) * step_s)
-    return whole[:n, :n], whole[:n, n:]
-
-
 def straight_step(a: Array, b: Array, step_s: float) -> tuple[Array, Array, Array]:
-    """F, G0, G1 of x[k+1] = F x[k] + G0 u[k] + G1 u[k+1], exact for an input that is a straight line over the step."""
+    """F, G0, G1 of x[k+1] = F x[k] + G0 u[k] + G1 u[k+1], exact for an input that is a straight line over the step.
+
+    For an input that is held over the step both ends are the same: F and G0 + G1.
+    """
     n, m = b.shape
     bottom = np.block([[np.zeros((m, n + m)), np.eye(m) / step_s], [np.zeros((m, n + 2 * m))]])
     whole = matrix_exponential(np.vstack([np.block([a, b, np.zeros((n, m))]), bottom]) * step_s)
@@ -48,23 +44,57 @@ def recursion(transition: Array, drive: Array, start: Array) -> Array:
     """States x[1] ... x[N] of x[k+1] = F x[k] + drive[k] from x[0] = start.
 
     transition (n, n), drive (N, n), start (n,); returns (N, n).
+
+    The steps are cut into about sqrt(N) stretches of as many steps. What the drive alone does within a stretch is
+    stepped through for all stretches at once; then the state is carried from stretch to stretch.
     """
     count, n = drive.shape
-    powers = [np.eye(n)]
-    for _ in range(_BLOCK):
-        powers.append(powers[-1] @ transition)
-    spread = np.zeros((_BLOCK, n, _BLOCK, n))  # [output step, state, input step, state]
-    for late in range(_BLOCK):
-        for early in range(late + 1):
-            spread[late, :, early, :] = powers[late - early]
-    blocks = -(-count // _BLOCK)
-    padded = np.zeros((blocks * _BLOCK, n))
+    length = max(1, int(np.sqrt(count)))
+    stretches = -(-count // length)
+    padded = np.zeros((stretches * length, n))
     padded[:count] = drive
-    forced = (padded.reshape(blocks, -1) @ spread.reshape(_BLOCK * n, _BLOCK * n).T).reshape(blocks, _BLOCK, n)
-    carried = np.empty((blocks, n))
+    states = padded.reshape(stretches, length, n).swapaxes(0, 1).copy()  # (step, stretch, n)
+    powers = np.empty((length, n, n))  # of the transition, transposed as rows are states
+    powers[0] = transition.T
+    for step in range(1, length):
+        states[step] += states[step - 1] @ transition.T
+        powers[step] = powers[step - 1] @ transition.T
+    carried = np.empty((stretches, n))
     state = start
-    for block in range(blocks):
-        carried[block] = state
-        state = forced[block, -1] + powers[_BLOCK] @ state
-    free = (carried @ np.vstack(powers[1:]).T).reshape(blocks, _BLOCK, n)
-    return (forced + free).reshape(-1, n)[:count]
+    for stretch in range(stretches):
+        carried[stretch] = state
+        state = states[-1, stretch] + state @ powers[-1]
+    states += carried @ powers
+    return states.swapaxes(0, 1).reshape(-1, n)[:count]
+
+
+def driven_outputs(transition: Array, gain: Array, observe: Array, inputs: Array, start: Array) -> Array:
+    """y[0] ... y[N] of x[k+1] = F x[k] + G v[k], y[k] = C x[k] from x[0] = start.
+
+    transition (n, n), gain (n, m), observe (p, n), inputs v (N, m), start (n,); returns (N + 1, p).
+
+    A block of L steps is one step of a bigger system with L times the inputs and outputs: one state in L is computed,
+    and nearly all the work is three matrix products.
+    """
+    n, m = gain.shape
+    p, count = len(observe), len(inputs)
+    blocks = count // _BLOCK + 1
+    padded = np.zeros((blocks * _BLOCK, m))
+    padded[:count] = inputs
+    rows = padded.reshape(blocks, _BLOCK * m)
+    to_end = np.empty((_BLOCK, m, n))
+    seen = np.empty((n, _BLOCK, p))
+    through = np.zeros((_BLOCK, m, _BLOCK, p))
+    power = np.eye(n)
+    for steps in range(_BLOCK):  # power is F^steps
+        to_end[_BLOCK - 1 - steps] = (power @ gain).T
+        seen[:, steps] = (observe @ power).T
+        answer = (observe @ power @ gain).T
+        for early in range(_BLOCK - 1 - steps):
+            through[early, :, early + steps + 1] = answer
+        power = power @ transition
+    states = np.empty((blocks, n))
+    states[0] = start
+    states[1:] = recursion(power, rows[:-1] @ to_end.reshape(-1, n), start)
+    result = states @ seen.reshape(n, -1) + rows @ through.reshape(_BLOCK * m, -1)
+    return result.reshape(-1, p)[: count + 1]

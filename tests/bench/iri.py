@@ -18,7 +18,7 @@ from logger.roads import iso8608
 from logger.roads.golden_car import GoldenCarFilter, sections
 from logger.store.profile_file import read_profile
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
-from logger.vehicle.state_space import held_step
+from logger.vehicle.state_space import straight_step
 
 from figures import Figures
 
@@ -63,7 +63,8 @@ def plain_loop(elevation_m: np.ndarray) -> float:
     """IRI [m/km] as published programs take it: one matrix product per sample."""
     base = round(0.25 / SPACING_M)
     slope = (elevation_m[base:] - elevation_m[:-base]) / (base * SPACING_M)
-    transition, gain = held_step(*structure(GOLDEN_CAR).state_space(), SPACING_M * 3.6 / 80)
+    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), SPACING_M * 3.6 / 80)
+    gain = ends[0] + ends[1]  # held over the step
     state, column, total = np.zeros(4), gain[:, 0], 0.0
     for value in slope:
         state = transition @ state + column * value

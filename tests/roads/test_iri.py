@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from logger.roads import iso8608
 from logger.roads.iri import iri, rectified_slope, window_iri
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
-from logger.vehicle.state_space import held_step
+from logger.vehicle.state_space import straight_step
 
 # World Bank Technical Paper 46 (Sayers, Gillespie, Paterson 1986), pages 41-42: the IRI from 0 to 0.25, 0.5, ... 30 m
 # of a triangular pulse of 20 mm.
@@ -35,7 +35,8 @@ def pulse(spacing_m: float, length_m: float = 30.0) -> np.ndarray:
 def drive(elevation: np.ndarray, spacing_m: float, base: int, start_m: float = 11.0) -> np.ndarray:
     """Rectified slopes by the textbook: the state-transition matrix, step after step."""
     slope = (elevation[base:] - elevation[:-base]) / (base * spacing_m)
-    transition, gain = held_step(*structure(GOLDEN_CAR).state_space(), spacing_m / SPEED_MPS)
+    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), spacing_m / SPEED_MPS)
+    gain = ends[0] + ends[1]  # held over the step
     first = int(start_m / spacing_m + 0.5)
     state = np.array([1.0, 1.0, 0.0, 0.0]) * (elevation[first] - elevation[0]) / (first * spacing_m)
     rectified = np.empty(len(slope))
@@ -62,7 +63,8 @@ def test_all_values_of_the_world_bank_check_pulse() -> None:
 
 def test_state_transition_has_the_printed_coefficients() -> None:
     """World Bank Technical Paper 46, table of coefficients at 0.25 m, for states (z_s', z_s'', z_u', z_u'')."""
-    transition, gain = held_step(*structure(GOLDEN_CAR).state_space(), 0.25 / SPEED_MPS)
+    transition, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), 0.25 / SPEED_MPS)
+    gain = ends[0] + ends[1]  # held over the step
     order = [0, 2, 1, 3]
     printed = np.array([
         [0.9966071, 0.01091514, -0.002083274, 0.0003190145],

@@ -7,7 +7,7 @@ from scipy import linalg, signal
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle import half_car, quarter_car
-from logger.vehicle.state_space import held_step, matrix_exponential, recursion, straight_step
+from logger.vehicle.state_space import driven_outputs, matrix_exponential, recursion, straight_step
 
 A, B = half_car.structure(read_vehicle(vehicle_file("rav4-2009"))).state_space()
 
@@ -21,19 +21,19 @@ def test_matrix_exponential_agrees_with_scipy(step_s: float) -> None:
 def test_steps_agree_with_scipy() -> None:
     none = np.zeros((1, 8)), np.zeros((1, 2))
     f, g, *_ = signal.cont2discrete((A, B, *none), 0.01, method="zoh")
-    assert held_step(A, B, 0.01)[0] == pytest.approx(f, abs=1e-9)
-    assert held_step(A, B, 0.01)[1] == pytest.approx(g, abs=1e-9)
     time = np.arange(300) * 0.01
     road = np.cumsum(np.random.default_rng(5).standard_normal((300, 2)), axis=0) * 1e-3
     _, _, expected = signal.lsim((A, B, np.eye(8), np.zeros((8, 2))), road, time, interp=True)
     transition, at_start, at_end = straight_step(A, B, 0.01)
+    assert transition == pytest.approx(f, abs=1e-9)
+    assert at_start + at_end == pytest.approx(g, abs=1e-9)
     states = recursion(transition, road[:-1] @ at_start.T + road[1:] @ at_end.T, np.zeros(8))
     assert states == pytest.approx(expected[1:], abs=1e-9)
 
 
-@pytest.mark.parametrize("count", [1, 31, 32, 33, 200])
-def test_blocks_equal_single_steps(count: int) -> None:
-    transition, _ = held_step(*quarter_car.structure(quarter_car.GOLDEN_CAR).state_space(), 0.01)
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 31, 35, 36, 37, 200])
+def test_stretches_equal_single_steps(count: int) -> None:
+    transition, *_ = straight_step(*quarter_car.structure(quarter_car.GOLDEN_CAR).state_space(), 0.01)
     rng = np.random.default_rng(count)
     drive, state = rng.standard_normal((count, 4)), rng.standard_normal(4)
     states = recursion(transition, drive, state)
@@ -41,3 +41,16 @@ def test_blocks_equal_single_steps(count: int) -> None:
     for row, force in zip(states, drive, strict=True):
         state = transition @ state + force
         assert row == pytest.approx(state, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 300])
+def test_outputs_equal_those_of_single_steps(count: int) -> None:
+    transition, at_start, at_end = straight_step(A, B, 0.003)
+    rng = np.random.default_rng(count)
+    gain, observe = np.hstack([at_start, at_end]), rng.standard_normal((3, 8))
+    inputs, state = rng.standard_normal((count, 4)), rng.standard_normal(8)
+    found = driven_outputs(transition, gain, observe, inputs, state)
+    assert found.shape == (count + 1, 3)
+    for row, force in zip(found, [*inputs, np.zeros(4)], strict=True):
+        assert row == pytest.approx(observe @ state, rel=1e-9, abs=1e-9)
+        state = transition @ state + gain @ force

@@ -1,0 +1,289 @@
+"""What a vehicle's accelerometer would record on a road: a drive, simulated.
+
+  ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
+  ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
+      --out run/drive.csv --profile-out run/profile.csv
+
+The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires at
+the start of the profile, after a flat road, and is sampled as a recorder does it, behind a filter that is flat up to
+0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.roads.track import Array, Track
+    from logger.vehicle.structure import Output, Structure
+    from logger.vehicle.vehicle import Vehicle
+
+_SPEEDS_MPS = (0.1, 100.0)
+_RATES_HZ = (10.0, 10_000.0)
+_FLAT_M = (1.0, 10_000.0)
+_MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
+_MOST_SAMPLES = 5_000_000
+AFTER_S = 1.0
+"""How long a drive at one speed goes on after the last wheel has left the profile."""
+OBSTACLE_SPACING_M = 0.01
+WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
+OUTPUTS = ("wheels", "travel", "tires", "body")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--vehicle", required=True, metavar="VEHICLE",
+                        help="vehicle file, or the name of one that comes with ridelog")
+    road = parser.add_mutually_exclusive_group(required=True)
+    road.add_argument("--profile", type=Path, metavar="FILE",
+                      help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
+                           "both, other cars the left one")
+    road.add_argument("--flat", type=float, metavar="M", help="a flat road of this length instead [m]")
+    parser.add_argument("--obstacle", action="append", default=[], metavar="NAME:PARAM=VALUE,...",
+                        help="add one to the road; may repeat. bump (Eq 4.41): start_m, height_m, width_m; step: "
+                             "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; "
+                             "pothole: start_m, depth_m, length_m[, edge_m]")
+    speed = parser.add_mutually_exclusive_group(required=True)
+    speed.add_argument("--speed", type=float, metavar="MPS", help="the same all the way [m/s]")
+    speed.add_argument("--speed-file", type=Path, metavar="FILE",
+                       help="CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE",
+                        help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run")
+    parser.add_argument("--profile-out", type=Path, metavar="FILE",
+                        help="write the road that was driven as well, with its obstacles")
+    parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="samples a second (default: 100)")
+    parser.add_argument("--noise", type=float, default=0.0, metavar="MPS2", help="r.m.s. of the sensor's noise [m/s2]")
+    parser.add_argument("--step", type=float, default=0.0, metavar="MPS2",
+                        help="the sensor gives whole multiples of this only [m/s2]")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="another number, another noise (default: 1)")
+    parser.add_argument("--output", action="append", default=[], metavar="WHAT",
+                        help="further columns; may repeat. wheels: their acceleration; travel: extension of the "
+                             "suspensions; tires: height of the wheels over the road; body:ahead_m=X,left_m=Y: "
+                             "acceleration of another point of the body, from the centre of gravity")
+    parser.add_argument("--json", action="store_true", help="print what was made as one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog simulate``."""
+    import numpy as np
+
+    from logger.store.drive_file import write_drive, write_profile
+
+    _check_numbers(args)
+    vehicle, structure = _vehicle(args.vehicle)
+    outputs = _outputs(args.output, vehicle, structure)
+    track = _with_obstacles(_road(args), args.obstacle)
+    motion = _motion(args, track, float(structure.behind_m.max()))
+    responses = _respond(structure, list(outputs.values()), track, motion, args.rate)
+    columns = dict(zip(outputs, responses.T, strict=True))
+    accel = _as_sensed(columns.pop("accel_z_mps2"), args.noise, args.step, args.seed)
+    write_drive(args.out, {"t_s": motion.time_s, "accel_z_mps2": accel, "speed_mps": motion.speed_mps,
+                           "distance_m": motion.distance_m, **columns})
+    if args.profile_out is not None:
+        write_profile(args.profile_out, track)
+    made: dict[str, Any] = {
+        "vehicle": vehicle.name, "model": vehicle.model, "file": str(args.out), "samples": len(accel),
+        "rate_hz": args.rate, "duration_s": len(accel) / args.rate,
+        "distance_start_m": float(motion.distance_m[0]), "distance_end_m": float(motion.distance_m[-1]),
+        "speed_mean_mps": float(motion.speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
+        "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
+        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed, "more_columns": list(columns),
+    }
+    print(json.dumps(made) if args.json else _in_words(made))
+    return EXIT_DONE
+
+
+def _in_words(made: dict[str, Any]) -> str:
+    more = f"; also {', '.join(made['more_columns'])}" if made["more_columns"] else ""
+    return (f"{made['file']}: {made['vehicle']} ({made['model'].replace('_', ' ')}), {made['duration_s']:.2f} s in "
+            f"{made['samples']} samples, {made['distance_start_m']:.2f} to {made['distance_end_m']:.2f} m at "
+            f"{made['speed_mean_mps']:.2f} m/s on average, acceleration {made['accel_rms_mps2']:.3f} m/s2 r.m.s., "
+            f"{made['accel_min_mps2']:.2f} to {made['accel_max_mps2']:.2f}{more}")
+
+
+# --- what was asked for ---
+
+
+def _check_numbers(args: argparse.Namespace) -> None:
+    _check_range("--rate", args.rate, *_RATES_HZ, "Hz")
+    _check_range("--noise", args.noise, 0.0, 100.0, "m/s2")
+    _check_range("--step", args.step, 0.0, 100.0, "m/s2")
+    if args.seed < 0:
+        raise BadInput(f"--seed {args.seed}: expected 0 or more")
+    if args.speed is not None:
+        _check_range("--speed", args.speed, *_SPEEDS_MPS, "m/s")
+    if args.flat is not None:
+        _check_range("--flat", args.flat, *_FLAT_M, "m")
+    files = [path.resolve() for path in (args.out, args.profile_out, args.profile, args.speed_file) if path is not None]
+    if len(set(files)) < len(files):
+        raise BadInput(f"--out {args.out}: expected every file to be another one")
+
+
+def _check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
+    if not lowest <= value <= highest:
+        raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}")
+
+
+def _vehicle(name: str) -> tuple[Vehicle, Structure]:
+    from logger.shipped import vehicle_file, vehicle_names
+    from logger.store.vehicle_file import read_vehicle
+    from logger.vehicle.models import structure_of
+
+    is_path = name not in vehicle_names() and Path(name).exists()
+    vehicle = read_vehicle(name if is_path else vehicle_file(name))
+    return vehicle, structure_of(vehicle)
+
+
+def _parameters(text: str, option: str) -> tuple[str, dict[str, float]]:
+    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
+    from math import isfinite
+
+    name, _, rest = text.partition(":")
+    found: dict[str, float] = {}
+    for piece in rest.split(",") if rest else ():
+        parameter, _, value = piece.partition("=")
+        try:
+            found[parameter] = float(value)
+        except ValueError:
+            found[parameter] = float("nan")
+        if not isfinite(found[parameter]):
+            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
+    return name, found
+
+
+def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
+    """Outputs by the names of their columns, the sensor's first."""
+    from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
+
+    try:
+        found = {"accel_z_mps2": body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)}
+    except ValueError as error:
+        raise BadInput(f"{vehicle.name}: the sensor's place: {error}") from None
+    each = {"wheels": ("wheel_{}_mps2", wheel), "travel": ("travel_{}_m", suspension_travel),
+            "tires": ("tire_{}_m", tire_deflection)}
+    for text in wanted:
+        name, place = _parameters(text, "--output")
+        if name in each and not place:
+            column, output = each[name]
+            found |= {column.format(side): output(structure, index)
+                      for index, side in enumerate(WHEELS[len(structure.wheels)])}
+        elif name == "body" and set(place) <= {"ahead_m", "left_m"}:
+            ahead_m, left_m = place.get("ahead_m", 0.0), place.get("left_m", 0.0)
+            try:
+                found[f"body_{ahead_m:g}_{left_m:g}_mps2"] = body_point(structure, ahead_m, left_m)
+            except ValueError as error:
+                raise BadInput(f"--output {text}: {error}") from None
+        else:
+            raise BadInput(f"--output {text}: expected one of {', '.join(OUTPUTS[:-1])}, body:ahead_m=X,left_m=Y")
+    return found
+
+
+# --- the road ---
+
+
+def _road(args: argparse.Namespace) -> Track:
+    import numpy as np
+
+    from logger.roads.track import Track
+    from logger.store.drive_file import track_of
+    from logger.store.profile_file import read_profile
+
+    return Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
+
+
+def _with_obstacles(track: Track, wanted: list[str]) -> Track:
+    """The road with its obstacles; sampled more densely, with straight lines, where they would fall between samples."""
+    import numpy as np
+
+    from logger.roads.obstacles import OBSTACLES
+    from logger.roads.track import Track
+
+    if not wanted:
+        return track
+    parts = int(np.ceil(track.spacing_m / OBSTACLE_SPACING_M - 1e-9))
+    count = (len(track.elevation_m) - 1) * parts + 1
+    if count > _MOST_SAMPLES:
+        raise BadInput(f"--obstacle: expected a road of at most {_MOST_SAMPLES * OBSTACLE_SPACING_M / 1000:g} km")
+    number = np.arange(count) / parts
+    columns = track.elevation_m.reshape(len(track.elevation_m), -1).T
+    dense = np.stack([np.interp(number, np.arange(len(column)), column) for column in columns], axis=1)
+    distance = track.start_m + track.spacing_m * number
+    for text in wanted:
+        name, parameters = _parameters(text, "--obstacle")
+        if name not in OBSTACLES:
+            raise BadInput(f"--obstacle {text}: expected one of {', '.join(OBSTACLES)}")
+        known = list(inspect.signature(OBSTACLES[name]).parameters.values())[1:]
+        needed = {one.name for one in known if one.default is inspect.Parameter.empty}
+        if not needed <= set(parameters) <= {one.name for one in known}:
+            raise BadInput(f"--obstacle {text}: expected {name}:{','.join(f'{one.name}=M' for one in known)}")
+        try:
+            dense += OBSTACLES[name](distance, **parameters)[:, None]
+        except ValueError as error:
+            raise BadInput(f"--obstacle {text}: {error}") from None
+    return Track(track.spacing_m / parts, dense.reshape(count, *track.elevation_m.shape[1:]), track.start_m)
+
+
+# --- the drive ---
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the front tires are, at the recorder's instants: arrays (n,) [s, m/s, m]."""
+
+    time_s: Array
+    speed_mps: Array
+    distance_m: Array
+
+
+def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motion:
+    import numpy as np
+
+    from logger.store.drive_file import read_speeds
+    from logger.vehicle.simulate import FINE_RATE_HZ
+
+    if args.speed is not None:
+        length_m = track.end_m - track.start_m + wheelbase_m
+        knots_s, knots_mps = np.array([0.0, length_m / args.speed + AFTER_S]), np.full(2, args.speed)
+    else:
+        knots_s, knots_mps = read_speeds(args.speed_file)
+    duration_s = float(knots_s[-1] - knots_s[0])
+    count = int(duration_s * args.rate + 1e-6) + 1
+    longest_s = _MOST_STEPS / max(args.rate, FINE_RATE_HZ)
+    if count < 2 or duration_s > longest_s:
+        raise BadInput(f"expected a drive of {1 / args.rate:g} to {longest_s:g} s, found {duration_s:g} s")
+    time_s = knots_s[0] + np.arange(count) / args.rate
+    at_knots = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots_s) * (knots_mps[:-1] + knots_mps[1:]))])
+    last = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
+    speed_mps = np.interp(time_s, knots_s, knots_mps)
+    driven = at_knots[last] + 0.5 * (time_s - knots_s[last]) * (knots_mps[last] + speed_mps)
+    return Motion(time_s, speed_mps, track.start_m + driven)
+
+
+def _respond(structure: Structure, outputs: list[Output], track: Track, motion: Motion, rate_hz: float) -> Array:
+    """The outputs (n, p), the car having come to the start on a flat road as fast as it goes there."""
+    import numpy as np
+
+    from logger.vehicle.simulate import drive
+
+    pace_m = float(motion.distance_m[1] - motion.distance_m[0])
+    lead = int(np.ceil(structure.contact_patch_m / pace_m)) if pace_m > 0 else 0
+    lead = min(lead, int(rate_hz))
+    before = np.arange(-lead, 0)
+    time_s = np.concatenate([motion.time_s[0] + before / rate_hz, motion.time_s])
+    distance_m = np.concatenate([motion.distance_m[0] + pace_m * before, motion.distance_m])
+    return drive(structure, outputs, track, time_s, distance_m)[lead:]
+
+
+def _as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int) -> Array:
+    """With the sensor's noise, then rounded to its steps."""
+    import numpy as np
+
+    if noise_mps2:
+        accel_mps2 = accel_mps2 + noise_mps2 * np.random.default_rng(seed).standard_normal(len(accel_mps2))
+    return step_mps2 * np.round(accel_mps2 / step_mps2) if step_mps2 else accel_mps2

@@ -1,0 +1,59 @@
+"""Single obstacles on a road, as elevations that are added to it.
+
+All are functions of distance, so that they can be laid on any profile and on each other. A track lays straight lines
+between its samples: an edge that is steep here is as steep there as one step of the track allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.bumps import speed_bump
+
+Array = npt.NDArray[np.float64]
+
+
+def step(distance_m: npt.ArrayLike, start_m: float, height_m: float) -> Array:
+    """A kerb: from ``start_m`` on the road lies higher, or with a negative height lower [m]."""
+    return np.where(np.asarray(distance_m, dtype=float) >= start_m, height_m, 0.0)
+
+
+def ramp(distance_m: npt.ArrayLike, start_m: float, height_m: float, length_m: float) -> Array:
+    """A straight rise over ``length_m``, after which the road stays up; down with a negative height [m].
+
+    ValueError unless the length is above 0.
+    """
+    if not length_m > 0:
+        raise ValueError(f"expected a length above 0 m, found {length_m:g} m")
+    return height_m * np.clip((np.asarray(distance_m, dtype=float) - start_m) / length_m, 0.0, 1.0)
+
+
+def plate(
+    distance_m: npt.ArrayLike, start_m: float, height_m: float, length_m: float, edge_m: float = 0.0
+) -> Array:
+    """Something flat that lies on the road: a cleat, a steel plate, a speed table with ramps of ``edge_m`` [m].
+
+    The length counts from foot to foot. ValueError unless it is above 0 and holds both edges.
+    """
+    if not (length_m > 0 and 0 <= edge_m <= length_m / 2):
+        raise ValueError(f"expected a length above 0 m with two edges in it, found {length_m:g} m with {edge_m:g} m")
+    if edge_m == 0:
+        return step(distance_m, start_m, height_m) - step(distance_m, start_m + length_m, height_m)
+    end_m = start_m + length_m
+    return ramp(distance_m, start_m, height_m, edge_m) - ramp(distance_m, end_m - edge_m, height_m, edge_m)
+
+
+def pothole(
+    distance_m: npt.ArrayLike, start_m: float, depth_m: float, length_m: float, edge_m: float = 0.0
+) -> Array:
+    """A hole with a flat bottom and edges that slope over ``edge_m`` [m]. ValueError as ``plate``."""
+    return plate(distance_m, start_m, -depth_m, length_m, edge_m)
+
+
+OBSTACLES: dict[str, Callable[..., Array]] = {
+    "bump": speed_bump, "plate": plate, "pothole": pothole, "ramp": ramp, "step": step,
+}
+"""By the names that users call them."""

@@ -1,0 +1,162 @@
+"""A road as a car's tires meet it.
+
+Problem: a profile is samples, and a tire does not read samples. It averages the road over its contact patch, each
+wheel at a place of its own, and a simulation in steps of time also wants to know what passed under it between two
+instants: at 30 m/s that is several samples and all their corners.
+
+Solution: between samples the road is a straight line, and before and after them it is flat at its end elevations.
+Then the average over the patch is made of parabolas, and the integral of that along the road is made of cubics.
+``TirePath`` holds them, so that every average, over a patch or over a patch and a step of the way, is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+# A patch shorter than this is a point: averages over less would drown in rounding, and no profile is so fine.
+_POINT_M = 1e-4
+# The mean over a step shorter than this is that of its two ends, for the same reason.
+_SHORT_STEP_M = 1e-4
+# Knots nearer to each other than this share of a spacing are one.
+_SAME_KNOT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One or two wheel tracks along a road.
+
+    spacing_m      between samples, above 0 [m]
+    elevation_m    (n,), or (n, 2) for the left and the right track [m]
+    start_m        where the first sample lies [m]
+
+    ValueError for a spacing or an elevation that is not finite, or of another shape, or no sample at all.
+    """
+
+    spacing_m: float
+    elevation_m: Array
+    start_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.spacing_m < np.inf or not np.isfinite(self.start_m):
+            raise ValueError(f"track: expected a spacing above 0 m and a start, found {self.spacing_m}, {self.start_m}")
+        shape = self.elevation_m.shape
+        if len(shape) not in (1, 2) or shape[0] == 0 or shape[1:] not in ((), (2,)):
+            raise ValueError(f"track: expected elevations of shape (n,) or (n, 2), found {shape}")
+        if not np.isfinite(self.elevation_m).all():
+            raise ValueError("track: expected finite elevations")
+
+    @property
+    def end_m(self) -> float:
+        """Where the last sample lies [m]."""
+        return self.start_m + self.spacing_m * (len(self.elevation_m) - 1)
+
+    def tire_paths(self, patch_m: float) -> tuple[TirePath, ...]:
+        """What tires of this patch [m, 0 or more] meet on each track: one path, or the left and the right one."""
+        columns = self.elevation_m.reshape(len(self.elevation_m), -1).T
+        return tuple(TirePath(self.start_m, self.spacing_m, column, patch_m) for column in columns)
+
+    def averaged(self, distance_m: npt.ArrayLike, patch_m: float) -> Array:
+        """Mean elevation over a patch centred at each distance (m,), exact: (m,), or (m, 2) for two tracks [m]."""
+        means = [path.elevation(np.asarray(distance_m, dtype=float)) for path in self.tire_paths(patch_m)]
+        return means[0] if self.elevation_m.ndim == 1 else np.stack(means, axis=-1)
+
+
+class TirePath:
+    """Elevations (n,) at start_m, start_m + spacing_m, ..., averaged over a contact patch [m].
+
+    ValueError for a patch below 0. The pieces are [knot, next knot) of the average. A patch that is no whole number of
+    spacings puts two knots in each spacing, one where its front edge and one where its rear edge passes a sample.
+    """
+
+    def __init__(self, start_m: float, spacing_m: float, elevation_m: Array, patch_m: float) -> None:
+        if not 0 <= patch_m < np.inf:
+            raise ValueError(f"expected a contact patch of 0 m or more, found {patch_m}")
+        self._spacing_m = spacing_m
+        self._base_m = float(elevation_m.mean())
+        heights = elevation_m - self._base_m
+        if patch_m < _POINT_M:
+            heights = np.concatenate([heights[:1], heights, heights[-1:]])
+            self._origin_m, self._second = start_m - spacing_m, 0.0
+            slope = np.append(np.diff(heights), 0.0) / spacing_m
+            self._pieces = _pieces(heights, slope, np.zeros_like(slope), np.full(len(heights), spacing_m))
+            self._cells = len(heights)
+            return
+        whole = int(patch_m / spacing_m + _SAME_KNOT)
+        part = max(patch_m / spacing_m - whole, 0.0)
+        self._second = part if part > _SAME_KNOT else 0.0
+        # Cell 0 lies before the first knot that matters, the last cell after the last one: both are flat.
+        self._origin_m = start_m - patch_m / 2 - spacing_m
+        self._cells = len(heights) + whole + 3
+        height, slope = _averages(heights, spacing_m, patch_m, whole, self._second, self._cells)
+        widths = np.array([self._second, 1.0 - self._second] if self._second else [1.0]) * spacing_m
+        width = np.tile(widths, self._cells)
+        bend = np.append(np.diff(slope) / width[:-1], 0.0)
+        self._pieces = _pieces(height, slope, bend, width)
+
+    def elevation(self, distance_m: Array) -> Array:
+        """Mean over the patch centred at each distance [m], any shape."""
+        along, (_, height, slope, bend) = self._locate(distance_m)
+        return self._base_m + height + along * (slope + along * (0.5 * bend))
+
+    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
+        """Elevation (N,) at the distances (N,) and its mean (N - 1,) over the way from each to the next [m]."""
+        along, (integral, height, slope, bend) = self._locate(distance_m)
+        elevation = height + along * (slope + along * (0.5 * bend))
+        integral = integral + along * (height + along * (0.5 * slope + along * (bend / 6)))
+        step = np.diff(distance_m)
+        short = np.abs(step) < _SHORT_STEP_M
+        mean = np.diff(integral) / np.where(short, 1.0, step)
+        if short.any():
+            mean[short] = 0.5 * (elevation[:-1] + elevation[1:])[short]
+        return self._base_m + elevation, self._base_m + mean
+
+    def _locate(self, distance_m: Array) -> tuple[Array, Array]:
+        """How far into its piece each distance lies [m], and the piece's coefficients, (4, ...)."""
+        place = (distance_m - self._origin_m) / self._spacing_m
+        cell = np.clip(np.floor(place), 0, self._cells - 1)
+        along = place - cell
+        piece = cell.astype(np.intp)
+        if self._second:
+            beyond = along >= self._second
+            piece = 2 * piece + beyond
+            along = along - self._second * beyond
+        return along * self._spacing_m, self._pieces[:, piece]
+
+
+def _pieces(height: Array, slope: Array, bend: Array, width: Array) -> Array:
+    """Integral up to each knot, and elevation, its slope and the slope's slope there: (4, pieces)."""
+    gain = width * (height + width * (0.5 * slope + width * (bend / 6)))
+    return np.stack([np.concatenate([[0.0], np.cumsum(gain[:-1])]), height, slope, bend])
+
+
+def _averages(
+    heights: Array, spacing_m: float, patch_m: float, whole: int, second: float, cells: int
+) -> tuple[Array, Array]:
+    """Elevation averaged over the patch, and its slope, at the knots in order.
+
+    The patch is ``whole`` and ``second`` spacings long. At the first knot of a cell its front edge passes a sample, at
+    the second one its rear edge.
+    """
+    before = whole + 3
+    padded = np.concatenate([np.full(before, heights[0]), heights, np.full(whole + 4, heights[-1])])
+    rise = np.diff(padded)
+    area = spacing_m * np.concatenate([[0.0], np.cumsum(0.5 * (padded[:-1] + padded[1:]))])[:-1]
+    padded = padded[:-1]
+
+    def edge(sample: int, share: float) -> tuple[Array, Array]:
+        """Elevation, and area up to there, ``share`` of a spacing beyond sample + 0, 1, 2, ... of the road."""
+        part = slice(before + sample, before + sample + cells)
+        z, dz = padded[part], rise[part]
+        return z + share * dz, area[part] + spacing_m * share * (z + 0.5 * share * dz)
+
+    edges = [(edge(-1, 0.0), edge(-2 - whole, 1.0 - second) if second else edge(-1 - whole, 0.0))]
+    if second:
+        edges.append((edge(-1, second), edge(-1 - whole, 0.0)))
+    height = np.stack([(front[1] - rear[1]) / patch_m for front, rear in edges], axis=1)
+    slope = np.stack([(front[0] - rear[0]) / patch_m for front, rear in edges], axis=1)
+    return height.ravel(), slope.ravel()
