@@ -1,0 +1,226 @@
+"""A vehicle's relations between roughness and vibration, found by driving its model over many random roads.
+
+Problem: what a road of a given roughness does to a car depends on the car and on its speed, and one road of a class is
+not like the next. The dissertation drives a half car over generated roads at 10 to 70 mph and lays lines through the
+results (Fig 6.3 to 6.8, 6.16, 6.17 of Blum 2015): IRI against r.m.s. acceleration, r.m.s. against Gd(n0), comfort
+against IRI. ``rms_relation`` computes the first of them as an integral; how far one road, or one window of it, lies off
+the line takes many roads.
+
+Solution: a road that repeats after its own length is a sum of waves, and a linear car at steady speed answers each wave
+with a factor. So a drive is one multiplication and one Fourier transform, exact, with no time steps and no start. The
+Golden Car of the IRI is a factor too, for the profile as it is sampled. The roads are Gaussian: Eq 4.2 gives the mean
+square of a wave, and its two parts are drawn from a normal distribution. With the amplitudes of Eq 4.2 to the last
+bit every road of a class would shake the car alike, and the scatter would come out too small.
+
+A linear car makes every relation a line through the origin: r.m.s. and IRI both grow with the root of Gd(n0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.dsp.sections import frequency_response
+from logger.dsp.weightings.wk import WEIGHTING
+from logger.roads import golden_car, iso8608
+from logger.units import MPH_MPS, WINDOW_M
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_acceleration_response
+from logger.vehicle.vehicle import Vehicle, with_load
+
+Array = npt.NDArray[np.float64]
+
+SPEEDS_MPS = tuple(mph * MPH_MPS for mph in range(10, 71, 10))
+LEVELS_IRI = tuple(float(iri) for iri in range(1, 11))  # the roads of 6.4 [m/km]
+ROADS = 120
+PASSENGER_KG = 75.0
+LEAST_WINDOW_M, MOST_WINDOW_M = 2.0, 200.0
+
+METHOD = 1  # another number whenever the same settings give other results
+
+_ROAD_M = 1000.0
+_SPACING_M = 0.05  # nearly: a window is a whole number of steps
+_TIRE_SAMPLES = 5  # the 250 mm of the IRI
+_PER_KM = 1000.0
+_WITHIN = 68.0  # percentage of roads within one standard error
+# A quarter car has one of four wheels under it, a half car one side of the body.
+_SHARE_OF_LOAD = {"quarter_car": 0.25, "half_car": 0.5, "full_car": 1.0}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a calibration depends on beside vehicle and recorder.
+
+    speeds_mps    steady speeds (10, 20 ... 70 mph as in 6.3) [m/s]
+    window_m      length of a window [m], 2 to 200
+    roads         number of roads, each about 1 km long
+    seed          another number, other roads
+    """
+
+    speeds_mps: tuple[float, ...] = SPEEDS_MPS
+    window_m: float = WINDOW_M
+    roads: int = ROADS
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if not LEAST_WINDOW_M <= self.window_m <= MOST_WINDOW_M:
+            raise ValueError(f"window of {self.window_m:g} m: expected {LEAST_WINDOW_M:g} to {MOST_WINDOW_M:g} m")
+
+    @property
+    def road_m(self) -> float:
+        """Length of a road [m]: the number of whole windows nearest to 1 km."""
+        return self.window_m * round(_ROAD_M / self.window_m)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through the origin, y = slope x, for points whose scatter grows with the roughness of their road.
+
+    standard_error    of the slope, from how the roads differ among themselves
+    spread            68 of 100 points lie within this share of the line
+    r2                share of the variance of y, over all points of all roads, that the line explains
+    """
+
+    slope: float
+    standard_error: float
+    spread: float
+    r2: float
+
+
+@dataclass(frozen=True)
+class SpeedCalibration:
+    """The lines of one speed.
+
+    iri_per_accel_rms           whole roads: IRI per r.m.s. acceleration [m/km per m/s2] (Fig 6.3, 6.6)
+    window_iri_per_accel_rms    the same for windows: their own IRI and their own r.m.s.
+    accel_rms_per_root_gd       whole roads: r.m.s. per root of Gd(n0) [m/s2 per cm^1.5] (Fig 6.4, 6.5)
+    a_w_per_iri                 whole roads: Wk-weighted r.m.s. per IRI [m/s2 per m/km] (Fig 6.16, 6.17)
+    """
+
+    speed_mps: float
+    iri_per_accel_rms: Line
+    window_iri_per_accel_rms: Line
+    accel_rms_per_root_gd: Line
+    a_w_per_iri: Line
+
+
+def loaded(vehicle: Vehicle, passengers: int = 0, sprung_mass_factor: float = 1.0) -> Vehicle:
+    """The car with people of 75 kg in it, its body being so many times as heavy as it was (Fig 6.7, 6.8).
+
+    The mass is added at the centre of gravity; inertias, springs and dampers stay. A model of one side of the car gets
+    half of the people's mass, that of one wheel a quarter.
+    """
+    people_kg = passengers * PASSENGER_KG * _SHARE_OF_LOAD[vehicle.model]
+    return with_load(vehicle, people_kg + (sprung_mass_factor - 1.0) * vehicle.sprung_mass_kg)
+
+
+def calibrate(
+    vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None = None, settings: Settings | None = None
+) -> tuple[SpeedCalibration, ...]:
+    """Drive the vehicle over random ISO 8608 roads of IRI 1 to 10 m/km; the lines of each speed.
+
+    recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
+
+    The acceleration belongs to the stretch under the front wheel, as in the logs. IRI is the exact one of each road,
+    on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``. ValueError if the vehicle lacks what
+    its model needs.
+    """
+    settings = settings or Settings()
+    roads = _Roads(settings)
+    responses = _responses(vehicle, recorder_gain, roads.wave_number, settings.speeds_mps)
+    iri, accel, weighted = (
+        np.array(values) for values in zip(*(roads.drive(number, responses) for number in range(settings.roads)),
+                                           strict=True))
+    root_gd = roads.root_gd
+    whole_iri = iri.mean(axis=-1)
+    rms, a_w = (np.sqrt(squares.mean(axis=-1)) for squares in (accel, weighted))
+    return tuple(
+        SpeedCalibration(
+            speed_mps,
+            fit(rms[:, i], whole_iri, root_gd),
+            fit(np.sqrt(accel[:, i]), iri, root_gd),
+            fit(root_gd, rms[:, i], root_gd),
+            fit(whole_iri, a_w[:, i], root_gd),
+        )
+        for i, speed_mps in enumerate(settings.speeds_mps)
+    )
+
+
+def fit(x: Array, y: Array, level: Array) -> Line:
+    """The line through the origin of points (roads,) or (roads, windows) on roads of a ``level`` (roads,).
+
+    Scatter is taken as proportional to the level, so the slope is the ratio of the sums of y and x per level: no bias
+    from scatter in x, and a smooth road counts as much as a rough one. Its standard error is that of a ratio estimator
+    with whole roads as its independent parts, for windows of one road are alike (Cochran, Sampling Techniques,
+    Eq 6.13).
+    """
+    roads = len(level)
+    x_relative, y_relative = (values.reshape(roads, -1) / level[:, None] for values in (x, y))
+    slope = float(y_relative.sum() / x_relative.sum())
+    off = y_relative - slope * x_relative
+    standard_error = np.sqrt(roads / (roads - 1) * np.sum(off.sum(axis=1) ** 2)) / x_relative.sum()
+    spread = np.percentile(np.abs(off) / (slope * x_relative), _WITHIN)
+    r2 = 1 - np.sum((y - slope * x) ** 2) / np.sum((y - y.mean()) ** 2)
+    return Line(slope, float(standard_error), float(spread), float(r2))
+
+
+def _responses(
+    vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, wave_number: Array, speeds_mps: tuple[float, ...]
+) -> npt.NDArray[np.complex128]:
+    """Recorded acceleration, and the same weighted with Wk, per elevation (2, speeds, waves). No delay of filters."""
+    speeds = np.array(speeds_mps)[:, None]
+    f_hz = speeds * wave_number
+    body = body_acceleration_response(structure_of(vehicle), f_hz, speeds, vehicle.sensor)
+    if recorder_gain is not None:
+        body = body * recorder_gain(f_hz)
+    return np.stack([body, body * np.abs(WEIGHTING.response(f_hz))])
+
+
+class _Roads:
+    """Random roads, each the same number of windows long and repeating after that, and drives over them.
+
+    root_gd        (roads,) root of the degree of roughness of each road [cm^1.5]
+    wave_number    (waves,) of all roads [cycle/m]
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        per_window = round(settings.window_m / _SPACING_M)
+        self._windows = round(settings.road_m / settings.window_m)
+        self._samples = self._windows * per_window
+        spacing_m = settings.window_m / per_window
+        step_cpm = 1 / settings.road_m
+        self._waves = np.arange(int(np.ceil(iso8608.LOWEST_CPM / step_cpm)), int(iso8608.HIGHEST_CPM / step_cpm) + 1)
+        self.wave_number = np.asarray(step_cpm * self._waves, dtype=float)
+        levels = np.resize(LEVELS_IRI, settings.roads)
+        self.root_gd = np.sqrt([iso8608.gd_n0_from_iri(level) for level in levels])
+        self._amplitude_m = np.sqrt(step_cpm * iso8608.displacement_psd(self.wave_number, 1.0))
+        self._slope = _golden_car_response(self.wave_number, spacing_m)
+        self._random = np.random.default_rng(settings.seed)
+
+    def drive(self, number: int, responses: npt.NDArray[np.complex128]) -> tuple[Array, Array, Array]:
+        """Of the next road, per window: IRI (windows,) [m/km], mean square acceleration and mean square weighted
+        acceleration (speeds, windows) [m2/s4]."""
+        parts = self._random.standard_normal((2, len(self._waves)))
+        road = self.root_gd[number] * self._amplitude_m * (parts[0] + 1j * parts[1])
+        iri = _PER_KM * self._in_windows(np.abs(self._along(road * self._slope)))
+        accel, weighted = self._in_windows(np.square(self._along(road * responses)))
+        return iri, accel, weighted
+
+    def _along(self, waves: npt.NDArray[np.complex128]) -> Array:
+        """Sum of waves (..., waves) at every sample of the road (..., samples)."""
+        spectrum = np.zeros((*waves.shape[:-1], self._samples // 2 + 1), dtype=complex)
+        spectrum[..., self._waves] = waves * (self._samples / 2)
+        return np.fft.irfft(spectrum, self._samples)
+
+    def _in_windows(self, values: Array) -> Array:
+        return values.reshape(*values.shape[:-1], self._windows, -1).mean(axis=-1)
+
+
+def _golden_car_response(wave_number: Array, spacing_m: float) -> npt.NDArray[np.complex128]:
+    """Slope of the suspension per elevation [1/m] of the IRI's car on a profile of samples: see ``rectified_slope``."""
+    base_m = _TIRE_SAMPLES * spacing_m
+    slope = (np.exp(2j * np.pi * wave_number * base_m) - 1) / base_m
+    return slope * frequency_response(golden_car.sections(spacing_m), wave_number, 1 / spacing_m)
