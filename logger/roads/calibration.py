@@ -125,8 +125,8 @@ def calibrate(
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
 
     The acceleration belongs to the stretch under the front wheel, as in the logs. IRI is the exact one of each road,
-    on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``. ValueError if the vehicle lacks what
-    its model needs.
+    on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``.
+    ValueError if the vehicle lacks what its model needs.
     """
     settings = settings or Settings()
     roads = _Roads(settings)
