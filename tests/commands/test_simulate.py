@@ -1,0 +1,176 @@
+"""``ridelog simulate``: the drive it writes is a run that can be read, and what it cannot do is one line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.roads import iso8608
+from logger.roads.bumps import speed_bump
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.drive_file import Run, read_run, write_profile
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.simulate import drive
+from logger.vehicle.structure import body_point
+
+BUMP = "bump:start_m=20,height_m=0.08,width_m=3.6"
+ROAD = Track(0.05, iso8608.generate(256, 100, 0.05, 3), 30.0)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_profile(tmp_path / "profile.csv", ROAD)
+    return tmp_path
+
+
+def simulated(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> Run:
+    assert main(["simulate", "--vehicle", vehicle, "--profile", str(folder / "profile.csv"),
+                 "--out", str(folder / "drive.csv"), *arguments]) == 0
+    return read_run(folder)
+
+
+def test_a_drive_at_one_speed_is_that_of_the_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(folder, "--speed", "20", "--json")
+    made = json.loads(capsys.readouterr().out)
+    assert run.time_s == pytest.approx(np.arange(len(run.time_s)) / 100)
+    assert run.speed_mps == pytest.approx(20.0)
+    assert run.distance_m == pytest.approx(30 + 20 * run.time_s)
+    assert run.distance_m[-1] > 130 + 2.94 + 19
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    before_s = np.arange(-20, len(run.time_s)) / 100
+    expected = drive(car, [body_point(car)], run.track, before_s, 30 + 20 * before_s)[20:, 0]
+    assert run.accel_z_mps2 == pytest.approx(expected, abs=1e-8)
+    assert made["samples"] == len(run.time_s)
+    assert made["accel_rms_mps2"] == pytest.approx(np.sqrt(np.mean(run.accel_z_mps2**2)))
+    assert (made["vehicle"], made["duration_s"]) == ("rav4-2009", pytest.approx(len(run.time_s) / 100))
+
+
+def test_the_installed_command(folder: Path, ridelog: Path) -> None:
+    done = subprocess.run(
+        [ridelog, "simulate", "--vehicle", vehicle_file("rav4-2009"), "--profile", folder / "profile.csv", "--speed",
+         "12", "--out", folder / "drive.csv"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "drive.csv: rav4-2009 (half car)" in done.stdout
+    failed = subprocess.run([ridelog, "simulate", "--vehicle", "rav5", "--flat", "9", "--speed", "1", "--out", "x.csv"],
+                            capture_output=True, text=True, check=False, cwd=folder)
+    assert failed.returncode == 2
+    assert failed.stderr.startswith("ridelog: no vehicle 'rav5'")
+    assert failed.stderr.count("\n") == 1
+    assert not (folder / "x.csv").exists()
+
+
+def test_a_speed_file_starts_stands_and_stops(folder: Path) -> None:
+    speeds = folder / "speeds.csv"
+    speeds.write_text("t_s,speed_mps\n0,0\n1,0\n5,12\n8,12\n10,0\n12,0\n")
+    run = simulated(folder, "--speed-file", str(speeds))
+    assert len(run.time_s) == 1201
+    assert run.speed_mps[[0, 100, 300, 700, 900, 1200]] == pytest.approx([0, 0, 6, 12, 6, 0])
+    assert run.distance_m[[100, 300, 500, 800, 1000, 1200]] == pytest.approx(30 + np.array([0, 6, 24, 60, 72, 72]))
+    assert run.accel_z_mps2[:90] == pytest.approx(0, abs=1e-3)
+    assert np.abs(run.accel_z_mps2[1150:]).max() < 0.1 * np.abs(run.accel_z_mps2).max()
+
+
+def test_noise_and_steps_of_the_sensor(folder: Path) -> None:
+    clean = simulated(folder, "--speed", "20").accel_z_mps2
+    noisy = simulated(folder, "--speed", "20", "--noise", "0.1").accel_z_mps2
+    other = simulated(folder, "--speed", "20", "--noise", "0.1", "--seed", "2").accel_z_mps2
+    stepped = simulated(folder, "--speed", "20", "--step", "0.25").accel_z_mps2
+    assert np.std(noisy - clean) == pytest.approx(0.1, rel=0.1)
+    assert np.corrcoef(noisy - clean, other - clean)[0, 1] == pytest.approx(0, abs=0.2)
+    assert np.array_equal(noisy, simulated(folder, "--speed", "20", "--noise", "0.1").accel_z_mps2)
+    assert stepped / 0.25 == pytest.approx(np.round(stepped / 0.25))
+    assert np.abs(stepped - clean).max() <= 0.125 + 1e-6
+
+
+def test_an_obstacle_on_a_flat_road_and_the_road_as_driven(tmp_path: Path) -> None:
+    arguments = ["simulate", "--vehicle", "rav4-2009", "--flat", "60", "--obstacle", BUMP, "--obstacle",
+                 "pothole:start_m=40,depth_m=0.05,length_m=0.6,edge_m=0.1", "--speed", "5"]
+    assert main([*arguments, "--out", str(tmp_path / "drive.csv"), "--profile-out", str(tmp_path / "profile.csv")]) == 0
+    run = read_run(tmp_path)
+    x = 0.01 * np.arange(6001)
+    assert run.track.spacing_m == pytest.approx(0.01)
+    assert run.track.elevation_m[:3900] == pytest.approx(speed_bump(x, 20, 0.08, 3.6)[:3900], abs=1e-7)
+    assert run.track.elevation_m.min() == pytest.approx(-0.05)
+    assert run.accel_z_mps2[:395] == pytest.approx(0, abs=1e-3)
+    assert np.abs(run.accel_z_mps2[400:700]).max() > 1
+
+
+def test_an_obstacle_leaves_the_road_around_it_as_it_was(folder: Path) -> None:
+    path = folder / "with.csv"
+    simulated(folder, "--speed", "9", "--obstacle", "step:start_m=200,height_m=1", "--profile-out", str(path))
+    distance, elevation = np.loadtxt(path, delimiter=",", skiprows=1).T
+    x = 30 + 0.05 * np.arange(len(ROAD.elevation_m))
+    assert elevation == pytest.approx(np.interp(distance, x, ROAD.elevation_m), abs=2e-7)
+
+
+def test_other_points_as_further_columns(folder: Path) -> None:
+    simulated(folder, "--speed", "20", "--output", "wheels", "--output", "travel", "--output", "tires", "--output",
+              "body:ahead_m=1.47", "--output", "body:ahead_m=-0.5")
+    names = (folder / "drive.csv").read_text().split("\n", 1)[0].split(",")
+    assert names == ["t_s", "accel_z_mps2", "speed_mps", "distance_m", "wheel_front_mps2", "wheel_rear_mps2",
+                     "travel_front_m", "travel_rear_m", "tire_front_m", "tire_rear_m", "body_1.47_0_mps2",
+                     "body_-0.5_0_mps2"]
+    table = dict(zip(names, np.loadtxt(folder / "drive.csv", delimiter=",", skiprows=1).T, strict=True))
+    pitch = (table["body_1.47_0_mps2"] - table["accel_z_mps2"]) / 1.47
+    assert table["body_-0.5_0_mps2"] == pytest.approx(table["accel_z_mps2"] - 0.5 * pitch, abs=1e-7)
+    second_difference = np.diff(table["travel_front_m"], 2) * 1e4
+    expected = (table["body_1.47_0_mps2"] - table["wheel_front_mps2"])[1:-1]
+    assert np.corrcoef(second_difference, expected)[0, 1] > 0.9
+    simulated(folder, "--speed", "20", "--output", "wheels", vehicle="rav4-2009-full")
+    assert "wheel_front_left_mps2,wheel_front_right_mps2" in (folder / "drive.csv").read_text()
+
+
+def test_a_slower_and_a_faster_recorder(folder: Path) -> None:
+    slow = simulated(folder, "--speed", "10", "--rate", "50")
+    fast = simulated(folder, "--speed", "10", "--rate", "2000")
+    assert len(fast.time_s) == pytest.approx(40 * len(slow.time_s), abs=40)
+    assert np.std(fast.accel_z_mps2) == pytest.approx(np.std(slow.accel_z_mps2), rel=0.05)
+
+
+def refusal(folder: Path, *arguments: str) -> str:
+    with pytest.raises(BadInput) as refused:
+        simulated(folder, *arguments)
+    assert not (folder / "drive.csv").exists()
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(("arguments", "complaint"), [
+    (("--speed", "0"), "--speed 0: expected 0.1 to 100 m/s"),
+    (("--speed", "nan"), "--speed nan: expected 0.1 to 100 m/s"),
+    (("--speed", "20", "--rate", "1"), "--rate 1: expected 10 to 10000 Hz"),
+    (("--speed", "20", "--noise", "-1"), "--noise -1: expected 0 to 100 m/s2"),
+    (("--speed", "20", "--step", "inf"), "--step inf: expected 0 to 100 m/s2"),
+    (("--speed", "20", "--seed", "-1"), "--seed -1: expected 0 or more"),
+    (("--speed", "20", "--output", "wheel"), "--output wheel: expected one of wheels, travel, tires, body:ahead_m=X"),
+    (("--speed", "20", "--output", "body:up_m=1"), "--output body:up_m=1: expected one of"),
+    (("--speed", "20", "--output", "body:left_m=1"), "--output body:left_m=1: this body does not roll"),
+    (("--speed", "20", "--output", "body:ahead_m=x"), "--output body:ahead_m=x: expected PARAM=NUMBER, found 'ahead"),
+    (("--speed", "20", "--obstacle", "wall"), "--obstacle wall: expected one of bump, plate, pothole, ramp, step"),
+    (("--speed", "20", "--obstacle", "step:start_m=1"), "--obstacle step:start_m=1: expected step:start_m=M,height_m"),
+    (("--speed", "20", "--obstacle", BUMP.replace("3.6", "0")), f"--obstacle {BUMP.replace('3.6', '0')}: expected a"),
+    (("--speed", "20", "--obstacle", "ramp:start_m=1,height_m=1,length_m=0"), "--obstacle ramp:start_m=1,height_m=1,"),
+])
+def test_wrong_use_is_one_line(folder: Path, arguments: tuple[str, ...], complaint: str) -> None:
+    assert refusal(folder, *arguments).startswith(complaint)
+
+
+def test_files_that_will_not_do(folder: Path) -> None:
+    speeds = folder / "speeds.csv"
+    speeds.write_text("t_s,speed_mps\n0,1\n0,1\n")
+    assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:3: expected a time after 0 s")
+    speeds.write_text("t_s,speed_mps\n0,1\n1e9,1\n")
+    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 1e+09 s")
+    speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
+    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
+    assert "expected every file to be another one" in refusal(
+        folder, "--speed", "20", "--profile-out", str(folder / "profile.csv"))
+    (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
+    assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")
