@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from newton import Told, judge, road_under
 
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
@@ -20,6 +19,8 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive, recorder_taps, simulate
 from logger.vehicle.structure import body_acceleration_response, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
+
+from newton import Told, judge, road_under
 
 RMS_GOAL = 1e-4
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

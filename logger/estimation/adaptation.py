@@ -1,0 +1,99 @@
+"""Learning the road's spectrum and the noise from the solution of a stretch.
+
+The evidence (marginal likelihood) of a Gaussian model is largest where each wave's estimated power equals the share
+of its prior variance that the readings tell: sum |u|^2 = sum g / (1 + g) (MacKay 1992). Its slope and curvature in the
+level and the waviness are such sums, so one scoring step per stretch follows both. The noise follows from the
+residuals over the degrees of freedom that the road left them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.block import Solution
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
+
+Array = npt.NDArray[np.float64]
+
+# What roads are like: half of them between 1.1 and 5.7 m/km; wavinesses of 1.8 to 2.5 are common (ISO 8608, annex C).
+COMMON_ROAD = RoadSpectrum.of_iri(2.5)
+_LEVEL_DEVIATION = 1.8
+_WAVINESS_DEVIATION = 0.3
+_WAVINESS_RANGE = (1.2, 3.2)
+# How far both may have wandered since the last stretch.
+_LEVEL_STEP = 0.3
+_WAVINESS_STEP = 0.1
+_NOISE_DEVIATION = 0.5
+_LARGEST_STEP = 0.7
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What has been learnt: the spectrum, the standard error of its log level, and log (noise over sensor's variance)."""
+
+    spectrum: RoadSpectrum
+    log_noise: float = 0.0
+    log_level_std: float = _LEVEL_DEVIATION
+
+
+def learnt(
+    belief: Belief,
+    solution: Solution,
+    wave_number_cpm: Array,
+    seen_share: float,
+    count: int,
+    before: RoadSpectrum | None,
+) -> Belief:
+    """One scoring step for level and waviness.
+
+    solution      of a stretch, solved with ``belief``
+    seen_share    of the distance grid, where the car was read
+    count         of points of the distance grid
+    before        the spectrum of the stretch before; None: there was none
+    """
+    used = solution.gain > 0
+    told = (solution.gain / (1 + solution.gain))[used]
+    power = np.abs(solution.waves[used]) ** 2 / count
+    tilt = -np.log(np.maximum(wave_number_cpm[used], FLATTENED_BELOW_CPM) / PIVOT_CPM)
+    slopes = np.stack([np.ones(len(tilt)), tilt])
+    gradient = slopes @ (power - seen_share * told)
+    curvature = (slopes * (seen_share * told**2)) @ slopes.T
+    now = np.array([belief.spectrum.log_level, belief.spectrum.waviness])
+    for centre, deviations in _priors(before):
+        precision = np.array(deviations) ** -2.0
+        gradient -= precision * (now - [centre.log_level, centre.waviness])
+        curvature += np.diag(precision)
+    step = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
+    level, waviness = now + step
+    return Belief(
+        RoadSpectrum(float(level), float(np.clip(waviness, *_WAVINESS_RANGE))),
+        belief.log_noise,
+        float(np.sqrt(np.linalg.inv(curvature)[0, 0])),
+    )
+
+
+def _priors(before: RoadSpectrum | None) -> list[tuple[RoadSpectrum, tuple[float, float]]]:
+    common = (COMMON_ROAD, (_LEVEL_DEVIATION, _WAVINESS_DEVIATION))
+    return [common] if before is None else [common, (before, (_LEVEL_STEP, _WAVINESS_STEP))]
+
+
+def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: float) -> Belief:
+    """One scoring step for the noise.
+
+    residual_mps2    (t,) readings less what the solution explains
+    weight           (t,) that they had, with ``belief``
+    told_waves       how many readings' worth the road took: twice the sum of g / (1 + g) over seen waves
+    """
+    free = max(float(np.count_nonzero(weight)) - told_waves, 1.0)
+    gradient = 0.5 * (float(weight @ residual_mps2**2) - free) - belief.log_noise / _NOISE_DEVIATION**2
+    step = gradient / (0.5 * free + _NOISE_DEVIATION**-2.0)
+    return replace(belief, log_noise=belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)))
+
+
+def noise_factor(belief: Belief) -> float:
+    """Noise variance over the sensor's."""
+    return exp(belief.log_noise)

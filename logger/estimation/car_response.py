@@ -1,0 +1,69 @@
+"""How a car's reading depends on the road, by frequency: the bridge from a structure to the estimator."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import exp, log
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
+from logger.vehicle.quarter_car import GOLDEN_CAR
+from logger.vehicle.quarter_car import structure as quarter_car
+from logger.vehicle.structure import Output, Structure, frequency_response, suspension_travel
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+HIGHEST_HZ = 42.0  # recorders pass less from here on
+_SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
+WAVE_NUMBERS_CPM = np.geomspace(0.004, 3.3, 300)
+WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBERS_CPM[0])
+
+
+class CarResponse:
+    """One output of one car, as a function of the road under its wheels."""
+
+    def __init__(self, structure: Structure, output: Output) -> None:
+        self._structure = structure
+        self._output = output
+        self._powers: dict[int, Array] = {}
+        self.behind_m = structure.behind_m
+        self.contact_patch_m = structure.contact_patch_m
+
+    def by_wheel(self, f_hz: Array) -> ComplexArray:
+        """Output per elevation under each wheel, (f, w) [1/s2]; nothing at 0 Hz and above what recorders pass."""
+        seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
+        response = frequency_response(self._structure, [self._output], np.where(seen, f_hz, 1.0))[:, 0, :]
+        return np.where(seen[:, None], response, 0.0)
+
+    def power(self, speed_mps: float) -> Array:
+        """Squared gain from road to output at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.
+
+        The speed is rounded to steps of 5 %, and what was computed is kept.
+        """
+        key = round(log(speed_mps) * _SPEEDS_PER_E)
+        if key not in self._powers:
+            f_hz = WAVE_NUMBERS_CPM * exp(key / _SPEEDS_PER_E)
+            delays = np.exp(-2j * np.pi * WAVE_NUMBERS_CPM[:, None] * self.behind_m)
+            gain = (self.by_wheel(f_hz) * delays).sum(axis=1) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
+            self._powers[key] = np.abs(gain) ** 2
+        return self._powers[key]
+
+
+@lru_cache(maxsize=16)
+def golden_car_on_grid(count: int, spacing_m: float) -> ComplexArray:
+    """``golden_car_slope`` for the rfft of ``count`` elevations at this spacing [m]; kept, for there are few counts."""
+    return golden_car_slope(np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64))
+
+
+def golden_car_slope(wave_number_cpm: Array) -> ComplexArray:
+    """Slope between body and wheel of the Golden Car per elevation [1/m], with its tire's 250 mm average.
+
+    As in the exact filter (``logger.roads.golden_car``) the average reaches ahead of where the value counts.
+    """
+    car = quarter_car(GOLDEN_CAR)
+    rate = frequency_response(car, [suspension_travel(car, 0, order=1)], wave_number_cpm * STANDARD_SPEED_MPS)[:, 0, 0]
+    ahead = np.exp(1j * np.pi * wave_number_cpm * TIRE_BASE_M)
+    return rate / STANDARD_SPEED_MPS * np.sinc(wave_number_cpm * TIRE_BASE_M) * ahead

@@ -1,0 +1,139 @@
+"""From an estimated road to its IRI: what is known of the Golden Car's slope, and the mean of its absolute value.
+
+An estimated road is too smooth: what the readings do not tell is missing in it. The slope of the Golden Car at a place
+is known with a mean and a variance, and the IRI asks for the mean of its absolute value, which the variance adds to
+(folded normal distribution). The error of a window follows from the covariance of those absolute values. For a steady
+speed both are integrals over wave numbers: of the road's spectrum S, gain H and noise N, S N / (|H|^2 S + N) is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.car_response import (
+    WAVE_NUMBER_STEPS_CPM,
+    WAVE_NUMBERS_CPM,
+    CarResponse,
+    golden_car_slope,
+)
+from logger.estimation.gaussian import mean_absolute, variance_of_mean_absolute
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.roads.iri import PER_KM
+
+Array = npt.NDArray[np.float64]
+
+_SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
+_LEVEL_TRIAL = 0.3
+_FORGETTING_M = 5.85
+
+
+def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> float:
+    """White noise of readings, as a spectrum over wave number at a speed [(m/s2)2 per cycle/m]."""
+    return 2 * variance / rate_hz * speed_mps
+
+
+def told_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
+    """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings tell."""
+    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+    return signal / (signal + noise_psd)
+
+
+def acceleration_variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> float:
+    """Variance of the acceleration itself once the readings are known [(m/s2)2]."""
+    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+    return float((signal * noise_psd / (signal + noise_psd)) @ WAVE_NUMBER_STEPS_CPM)
+
+
+@dataclass(frozen=True)
+class SlopeKnowledge:
+    """What the readings leave open of the Golden Car's slope at a steady speed.
+
+    variance         before anything is read [m2/m2]
+    left             of it, once the readings are known [m2/m2]
+    correlation      (l,) of what is left, at lags of whole steps of the distance grid
+    """
+
+    variance: float
+    left: float
+    correlation: Array
+
+    @property
+    def told(self) -> float:
+        """Share of the variance that the readings tell."""
+        return 1 - self.left / self.variance
+
+
+class SlopeErrors:
+    """``SlopeKnowledge`` for one car, for lags up to a window."""
+
+    def __init__(self, car: CarResponse, rate_hz: float, spacing_m: float, lags: int) -> None:
+        self._car = car
+        self._rate_hz = rate_hz
+        self._waves = np.cos(2 * pi * WAVE_NUMBERS_CPM[:, None] * spacing_m * np.arange(lags))
+
+    def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
+        """For readings of this variance [(m/s2)2] at this speed [m/s]."""
+        prior = _SLOPE_POWER * spectrum.psd(WAVE_NUMBERS_CPM)
+        told = told_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
+        left = (prior * (1 - told)) @ self._waves
+        return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0])
+
+
+@dataclass(frozen=True)
+class WindowIri:
+    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level, ``shared`` with neighbours."""
+
+    iri_m_per_km: float
+    own_std_m_per_km: float
+    shared_std_m_per_km: float
+
+
+def window_iri(
+    slope: Array, unseen: Array, knowledge: SlopeKnowledge, louder: SlopeKnowledge, log_level_std: float
+) -> WindowIri:
+    """IRI of the window whose estimated slopes are given from edge to edge.
+
+    slope            (p,) at the points of the distance grid [m/m]
+    unseen           (p,) share of the slope's variance, 0 to 1, that comes from road that was not read at all
+    knowledge        at the window's speed
+    louder           the same for the ``raised`` spectrum
+    log_level_std    standard error of the road's log level
+    """
+    weight = np.full(len(slope), 1 / (len(slope) - 1))
+    weight[[0, -1]] *= 0.5
+    deviation = _deviation(knowledge, unseen)
+    mean = float(weight @ mean_absolute(slope, deviation))
+    own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
+    # Were the level higher, more of the readings would be taken for road, and more be left open.
+    stretched = slope * (louder.told / max(knowledge.told, 1e-3))
+    more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
+    shared = (more - mean) / _LEVEL_TRIAL * log_level_std
+    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * abs(shared))
+
+
+def raised(spectrum: RoadSpectrum) -> RoadSpectrum:
+    """A somewhat rougher road, to see what the road's level does to an estimate."""
+    return replace(spectrum, log_level=spectrum.log_level + _LEVEL_TRIAL)
+
+
+def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:
+    deviation: Array = np.sqrt(knowledge.left + (knowledge.variance - knowledge.left) * unseen)
+    return deviation
+
+
+def unseen_share(seen: Array, spacing_m: float) -> Array:
+    """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0.
+
+    The Golden Car forgets with its body's damping: amplitude by a factor of e in 11.7 m, power in half of that.
+    """
+    fade = exp(-spacing_m / _FORGETTING_M)
+    kernel = (1 - fade) * fade ** np.arange(int(6 * _FORGETTING_M / spacing_m))
+    missing = np.concatenate([np.ones(len(kernel)), 1.0 - seen])
+    length = len(missing) + len(kernel)
+    share = np.fft.irfft(np.fft.rfft(missing, length) * np.fft.rfft(kernel, length), length)
+    return np.clip(share[len(kernel): len(missing)], 0.0, 1.0)
+

@@ -1,0 +1,325 @@
+"""The road and its IRI while the car drives: blocks of readings, a few seconds behind.
+
+A block of 20 s is solved every 2 s (``block.py``); a stretch of road is taken from it once the car is ``LAG_S`` past
+it, because the rear axle, and the body's slow swing, still tell of a road already driven. What was learnt of the road's
+roughness, of the noise and of coarse readings goes on to the next block. Splitting the readings differently changes
+nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import ceil, hypot, nan, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
+from logger.estimation.block import ENTRY_S, Block, Solution, TimeGrid
+from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.iri_posterior import (
+    SlopeErrors,
+    WindowIri,
+    acceleration_variance_left,
+    raised,
+    reading_noise_psd,
+    told_share,
+    unseen_share,
+    window_iri,
+)
+from logger.estimation.rounding import Readings, bounds, first_guess, improved
+from logger.estimation.sensor import Sensor
+from logger.vehicle.structure import Output, Structure
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+RATE_HZ = 100.0
+BLOCK_SAMPLES = 2048
+HOP_SAMPLES = 200
+LAG_S = 4.0
+FAINT_BELOW = 0.2
+SLOWEST_MPS = 1.0
+_LONGEST_PIECE_M = 10.0
+_SPACING_M = 0.155
+_STEPS = 6
+_FIRST_SAMPLES = 1000
+_FIRST_STEPS = 24
+_FIRST_ROUNDS = 8
+_ROUNDS = 1
+_COARSE_ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class WindowEstimate:
+    """IRI of one window of travelled distance, [number, number + 1) windows from 0.
+
+    iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
+                        this speed, ``unsettled`` next to the start of the readings or a hole in them
+    iri_std_m_per_km    its standard error [m/km], NaN likewise
+    told                share of the variance of the IRI's slope that the readings tell, 0 to 1
+    """
+
+    number: int
+    iri_m_per_km: float
+    iri_std_m_per_km: float
+    told: float
+    flags: frozenset[str]
+
+
+@dataclass(frozen=True)
+class RoadPiece:
+    """Estimated elevations (p,) [m] at ``start_m + k spacing_m``; the last point is the next piece's first.
+
+    The elevations of two pieces may differ by a slow wave that the readings do not tell. Waves from ``shortest_m`` to
+    ``longest_m`` are told by the readings for more than half of their variance; both are NaN if none is.
+    """
+
+    start_m: float
+    spacing_m: float
+    elevation_m: Array
+    shortest_m: float
+    longest_m: float
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Readings on the time grid, arrays (n,), as ``RoadEstimator.push`` takes them."""
+
+    reading_mps2: Array
+    usable: Bools
+    at_end: Array
+    distance_m: Array
+
+    def __len__(self) -> int:
+        return len(self.usable)
+
+    def part(self, low: int, high: int) -> _Samples:
+        return _Samples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
+
+    def then(self, later: _Samples) -> _Samples:
+        both = ((getattr(self, name), getattr(later, name)) for name in self.__dataclass_fields__)
+        return _Samples(*(np.concatenate(pair) for pair in both))
+
+    @classmethod
+    def unread(cls, count: int, until_m: float, step_m: float) -> _Samples:
+        """Nothing was read while the car came up to ``until_m``, ``step_m`` further with each sample."""
+        distance_m = until_m - step_m * np.arange(count, 0, -1.0)
+        return cls(np.zeros(count), np.zeros(count, dtype=np.bool_), np.zeros(count), distance_m)
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """What a stretch of road that is at most 10 m long gave; ``missing`` says why nothing."""
+
+    iri: WindowIri
+    told: float
+    missing: str = ""
+
+
+class RoadEstimator:
+    """Readings of a body accelerometer in, IRI of windows out, some seconds late.
+
+    structure    the car
+    output       the motion of it that is read: an acceleration
+    sensor       noise and step of the readings
+    window_m     length of a window [m]
+    on_road      is given each piece of estimated road
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        output: Output,
+        sensor: Sensor,
+        window_m: float,
+        on_road: Callable[[RoadPiece], None] | None = None,
+    ) -> None:
+        self._car = CarResponse(structure, output)
+        self._sensor = sensor
+        self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
+        self._piece_m = window_m / self._pieces_per_window
+        self._points = ceil(self._piece_m / _SPACING_M)
+        self._spacing_m = self._piece_m / self._points
+        self._on_road = on_road
+        self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
+        self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
+        self._belief = Belief(COMMON_ROAD)
+        self._start_anew()
+
+    def _start_anew(self) -> None:
+        self._waiting = _Samples.unread(0, 0.0, 0.0)
+        self._read = 0
+        self._samples: _Samples | None = None
+        self._gaussian: Readings | None = None
+        self._begun = False
+        self._next = 0
+        self._gathered: list[_Piece] = []
+
+    def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
+        """More readings, arrays (n,) on an unbroken grid of 100 Hz.
+
+        reading_mps2    up positive; gravity may be in it
+        usable          there is a reading
+        at_end          1 where it is at the top of the sensor's range, -1 at the bottom, else 0
+        distance_m      where the front axle is [m], not decreasing
+
+        Returns the windows that have become certain, in order and without gaps, from the first whole one on.
+        """
+        waiting = self._waiting.then(_Samples(reading_mps2, usable, at_end, distance_m))
+        estimates: list[WindowEstimate] = []
+        taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
+        for low in range(0, taken, HOP_SAMPLES):
+            estimates += self._hop(waiting.part(low, low + HOP_SAMPLES))
+        self._waiting = waiting.part(taken, len(waiting))
+        return estimates
+
+    def finish(self) -> list[WindowEstimate]:
+        """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
+        last = self._waiting if len(self._waiting) else self._samples
+        estimates: list[WindowEstimate] = []
+        if last is not None:
+            count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
+            after = _Samples.unread(count, float(last.distance_m[-1]), 0.0)
+            self._read = BLOCK_SAMPLES
+            estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
+        self._start_anew()
+        return estimates
+
+    def _hop(self, fresh: _Samples) -> list[WindowEstimate]:
+        if self._samples is None:
+            self._samples = _Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), _mean_step_m(fresh))
+            windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
+            self._next = windows * self._pieces_per_window
+        self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
+        if self._gaussian is not None:
+            guess = first_guess(fresh.reading_mps2, self._sensor)
+            self._gaussian = Readings(
+                np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
+                np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
+            )
+        self._read += int(np.count_nonzero(fresh.usable))
+        if not self._begun and self._read < _FIRST_SAMPLES:
+            return []
+        due = list(self._due(self._samples))
+        return self._estimates(self._samples, due) if due else []
+
+    def _due(self, samples: _Samples) -> Iterator[int]:
+        """Numbers of the pieces that the car is far enough past."""
+        passed_m = samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
+        while (self._next + 1) * self._piece_m <= passed_m:
+            yield self._next
+            self._next += 1
+
+    def _estimates(self, samples: _Samples, due: list[int]) -> list[WindowEstimate]:
+        """Solve the block and take the pieces that are due."""
+        block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
+        read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
+        if block.seen_points(read) < self._points:
+            nothing = _Piece(WindowIri(nan, nan, nan), 0.0, "unsettled")
+            return [estimate for number in due for estimate in self._window(number, nothing)]
+        solution, variance = self._solved(block, samples, read)
+        slope = np.fft.irfft(solution.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
+        elevation = np.fft.irfft(solution.road, block.count)
+        unseen = unseen_share(block.seen(read), self._spacing_m)
+        estimates: list[WindowEstimate] = []
+        for number in due:
+            low = round((number * self._piece_m - block.start_m) / self._spacing_m)
+            inside = slice(low, low + self._points + 1)
+            speed_mps = self._speed_mps(samples, number)
+            if low < 0 or speed_mps is None:
+                piece = _Piece(WindowIri(nan, nan, nan), 0.0, "faint")
+            else:
+                piece = self._piece(slope[inside], unseen[inside], speed_mps, variance)
+                self._give_road(number, elevation[inside], speed_mps, variance)
+            estimates += self._window(number, piece)
+        return estimates
+
+    def _solved(self, block: Block, samples: _Samples, read: Bools) -> tuple[Solution, float]:
+        """The block's road and the variance of a reading, while the belief follows."""
+        rounds = _FIRST_ROUNDS if not self._begun else _COARSE_ROUNDS if self._sensor.is_coarse else _ROUNDS
+        steps = _STEPS if self._begun else _FIRST_STEPS
+        before = self._belief.spectrum if self._begun else None
+        seen_share = block.seen_points(read) / block.count
+        self._begun = True
+        solution: Solution | None = None
+        for _ in range(rounds):
+            readings = self._as_gaussian(samples)
+            usable = read if self._sensor.is_coarse else read & (samples.at_end == 0)
+            weight = np.where(usable, 1 / readings.variance, 0.0)
+            start = None if solution is None else solution.waves
+            solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, steps, start)
+            told_waves = 2 * seen_share * float((solution.gain / (1 + solution.gain)).sum())
+            moving = weight[block.moving & usable]
+            variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
+            self._belief = learnt(
+                self._belief, solution, block.wave_number_cpm, seen_share, block.count, before
+            )
+            if self._sensor.is_coarse:
+                self._improve(samples, block, solution, variance)
+            else:
+                residual = readings.value_mps2 - solution.fitted_mps2
+                self._belief = with_noise(self._belief, residual, weight, told_waves)
+        assert solution is not None
+        return solution, variance
+
+    def _as_gaussian(self, samples: _Samples) -> Readings:
+        if not self._sensor.is_coarse:
+            noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
+            return Readings(samples.reading_mps2, np.full(BLOCK_SAMPLES, noise))
+        if self._gaussian is None:
+            self._gaussian = first_guess(samples.reading_mps2, self._sensor)
+        return self._gaussian
+
+    def _improve(self, samples: _Samples, block: Block, solution: Solution, variance: float) -> None:
+        assert self._gaussian is not None
+        speed_mps = block.mean_speed_mps
+        noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
+        left = acceleration_variance_left(self._car, speed_mps, self._belief.spectrum, noise_psd)
+        low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
+        self._gaussian = improved(self._gaussian, low, high, solution.fitted_mps2, left, self._sensor)
+
+    def _speed_mps(self, samples: _Samples, number: int) -> float | None:
+        """Mean speed over a piece while the car moved; None when it is slower than anything can be told at."""
+        low, high = np.searchsorted(samples.distance_m, [number * self._piece_m, (number + 1) * self._piece_m])
+        steps_m = np.diff(samples.distance_m[max(low - 1, 0):high + 1])
+        moving = steps_m > SLOWEST_MPS / RATE_HZ
+        return float(steps_m[moving].mean()) * RATE_HZ if moving.sum() > 0.5 * len(steps_m) else None
+
+    def _piece(self, slope: Array, unseen: Array, speed_mps: float, variance: float) -> _Piece:
+        spectrum = self._belief.spectrum
+        knowledge = self._errors.at(speed_mps, spectrum, variance)
+        louder = self._errors.at(speed_mps, raised(spectrum), variance)
+        told = knowledge.told * (1 - float(unseen.mean()))
+        missing = "" if told >= FAINT_BELOW else "faint" if knowledge.told < FAINT_BELOW else "unsettled"
+        return _Piece(window_iri(slope, unseen, knowledge, louder, self._belief.log_level_std), told, missing)
+
+    def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
+        """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
+        road's level, which they share, adds."""
+        self._gathered.append(piece)
+        if len(self._gathered) < self._pieces_per_window:
+            return []
+        pieces, self._gathered = self._gathered, []
+        told = sum(one.told for one in pieces) / len(pieces)
+        flags = frozenset(one.missing for one in pieces if one.missing)
+        if flags:
+            return [WindowEstimate(number // self._pieces_per_window, nan, nan, told, flags)]
+        iri = [one.iri for one in pieces]
+        own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
+        shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
+        mean = sum(one.iri_m_per_km for one in iri) / len(iri)
+        return [WindowEstimate(number // self._pieces_per_window, mean, hypot(own, shared), told, flags)]
+
+    def _give_road(self, number: int, elevation: Array, speed_mps: float, variance: float) -> None:
+        if self._on_road is None:
+            return
+        noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
+        told = WAVE_NUMBERS_CPM[told_share(self._car, speed_mps, self._belief.spectrum, noise_psd) > 0.5]
+        shortest_m, longest_m = (1 / told[-1], 1 / told[0]) if len(told) else (nan, nan)
+        self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
+
+
+def _mean_step_m(samples: _Samples) -> float:
+    return float(samples.distance_m[-1] - samples.distance_m[0]) / max(len(samples) - 1, 1)
