@@ -88,19 +88,20 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service.replay import Player
     from logger.store.folder_lock import FolderLock
     from logger.store.rotation import SegmentLog, next_session, repair
+    from logger.store.vehicle_file import read_vehicle
 
     with open_dump(dump) as reader:
         config = assemble.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         config = replace(config, log=replace(config.log, directory=out))
         sensor = assemble.instrument(config.accelerometer)
-        relation, vehicle_facts = assemble.relation(config)
-        facts = assemble.sidecar(config, sensor, vehicle_facts) | {"replayed_from": dump.name}
+        car = read_vehicle(config.vehicle)
+        facts = assemble.sidecar(config, sensor, car) | {"replayed_from": dump.name}
         out.mkdir(parents=True, exist_ok=True)
         with FolderLock(out):
             repair(out)
             session = next_session(out)
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-            pipeline = assemble.pipeline(config, sensor, relation)
+            pipeline = assemble.pipeline(config, sensor, car)
             core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
             player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
             started_s = time.monotonic()

@@ -70,7 +70,8 @@ class Road:
 
 @dataclass(frozen=True)
 class Motion:
-    """A drive on a grid of ``STEP_S``; distance is that of the centre of gravity from the start.
+    """A drive on a grid of ``STEP_S``; distance is that of the front axle, over which the GPS
+    antenna sits, from the start.
 
     time_s, distance_m, speed_mps, lat_deg, lon_deg, course_deg    (n,)
     forward_mps2, left_mps2                                        (n,) acceleration of the car in the plane
@@ -136,8 +137,8 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: Motion) -> Array:
     band-limited as the recorder does before it samples.
     """
     structure = half_car.structure(vehicle)
-    front = motion.distance_m + vehicle.front.cg_distance_m
-    under = np.stack([road.under(front - behind, vehicle.contact_patch_m) for behind in structure.behind_m], axis=1)
+    patch_m = vehicle.contact_patch_m
+    under = np.stack([road.under(motion.distance_m - behind, patch_m) for behind in structure.behind_m], axis=1)
     under = under - under[0].mean()
     a, b = structure.state_space()
     transition, at_start, at_end = straight_step(a, b, STEP_S)

@@ -38,13 +38,15 @@ class GridRun:
     """Consecutive samples of a uniform grid, arrays (n,), n > 0.
 
     Sample k lies at t0_us + k / rate_hz, in whole microseconds counted from the first sample of its stretch.
-    clipped: the reading nearest to it was at the end of its range; bridged: it stands where a reading was missing.
+    nearest: the reading nearest to it as it was read, or the value itself where readings were thinned out;
+    clipped: that reading was at the end of its range; bridged: it stands where a reading was missing.
     new_start: the first sample of all or the first after a hole; otherwise it follows the run before it.
     """
 
     t0_us: int
     rate_hz: int
     values: Floats
+    nearest: Floats
     clipped: Bools
     bridged: Bools
     new_start: bool
@@ -172,7 +174,8 @@ class GridResampler:
         nearest = np.where(since_us <= until_us, before, after)
         lonely = np.minimum(since_us, until_us) >= 0.5 * self._step_us
         bridged = lonely & (apart_us > HOLE_STEPS * self._step_us)
-        return GridRun(int(grid_us[0]), self._rate_hz, values, self._held.clipped[nearest], bridged, new_start)
+        clipped = self._held.clipped[nearest]
+        return GridRun(int(grid_us[0]), self._rate_hz, values, readings[nearest], clipped, bridged, new_start)
 
 
 def _lagrange(t_us: Times, values: Floats, at_us: Times) -> Floats:
@@ -290,9 +293,8 @@ class Decimator:
     def _run(self, values: Floats) -> GridRun:
         used = len(values) * self._factor
         shares = self._marks[:, :used].reshape(2, len(values), self._factor).mean(axis=2)
-        run = GridRun(
-            self._next_us, SLOW_RATE_HZ, values, shares[0] > 0.0, shares[1] >= BRIDGED_SHARE, self._new_start
-        )
+        clipped, bridged = shares[0] > 0.0, shares[1] >= BRIDGED_SHARE
+        run = GridRun(self._next_us, SLOW_RATE_HZ, values, values, clipped, bridged, self._new_start)
         self._marks = self._marks[:, used:]
         self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
         self._new_start = False

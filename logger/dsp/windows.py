@@ -28,13 +28,14 @@ Bools = npt.NDArray[np.bool_]
 class GridSamples:
     """Filtered samples on the time grid, arrays (n,).
 
-    accel_mps2 is the vertical acceleration without gravity, weighted_mps2 the same through the frequency
-    weighting, running_rms_mps2 the running r.m.s. of that. present: the accelerometer delivered it (False:
-    missing); interpolated: rebuilt from its neighbours over a short hole; settled: the filters have forgotten
-    their start.
+    reading_mps2 is the vertical reading with gravity in it, before any filter; accel_mps2 the same without gravity;
+    weighted_mps2 that through the frequency weighting, running_rms_mps2 the running r.m.s. of it. present: the
+    accelerometer delivered it (False: missing); interpolated: rebuilt from its neighbours over a short hole; settled:
+    the filters have forgotten their start.
     """
 
     t_us: npt.NDArray[np.int64]
+    reading_mps2: Floats
     accel_mps2: Floats
     weighted_mps2: Floats
     running_rms_mps2: Floats
@@ -65,13 +66,17 @@ def joined(parts: list[GridSamples]) -> GridSamples:
 
 @dataclass(frozen=True)
 class Window:
-    """What one window holds. Figures are nan when too few of its samples are good."""
+    """What one window holds. Figures are nan when too few of its samples are good.
+
+    ``number`` counts windows of distance from where the distance is 0, blind ones from the start of their stretch.
+    """
 
     t_us: int
     duration_s: float
     start_m: float | None
     end_m: float | None
     leg: int
+    number: int
     speed_mps: float
     samples: int
     clipped: int
@@ -138,6 +143,7 @@ class _Open:
             start_m=self.start_m,
             end_m=end_m,
             leg=self.key[1],
+            number=self.key[2],
             speed_mps=nan if blind else float(self.sums[_SPEED] / count),
             samples=int(good),
             clipped=int(self.sums[_CLIPPED]),

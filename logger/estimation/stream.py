@@ -125,6 +125,7 @@ class RoadEstimator:
     output       the motion of it that is read: an acceleration
     sensor       noise and step of the readings
     window_m     length of a window [m]
+    place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
     on_road      is given each piece of estimated road
     """
 
@@ -134,10 +135,12 @@ class RoadEstimator:
         output: Output,
         sensor: Sensor,
         window_m: float,
+        place_std_m: float = 0.0,
         on_road: Callable[[RoadPiece], None] | None = None,
     ) -> None:
         self._car = CarResponse(structure, output)
         self._sensor = sensor
+        self._place_std_m = place_std_m
         self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
         self._piece_m = window_m / self._pieces_per_window
         self._points = ceil(self._piece_m / _SPACING_M)
@@ -150,7 +153,7 @@ class RoadEstimator:
 
     def _start_anew(self) -> None:
         self._waiting = _Samples.unread(0, 0.0, 0.0)
-        self._read = 0
+        self._heard = 0
         self._samples: _Samples | None = None
         self._gaussian: Readings | None = None
         self._begun = False
@@ -160,20 +163,27 @@ class RoadEstimator:
     def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
         """More readings, arrays (n,) on an unbroken grid of 100 Hz.
 
-        reading_mps2    up positive; gravity may be in it
+        reading_mps2    up positive; gravity may be in it; anything where it is not usable
         usable          there is a reading
         at_end          1 where it is at the top of the sensor's range, -1 at the bottom, else 0
         distance_m      where the front axle is [m], not decreasing
 
         Returns the windows that have become certain, in order and without gaps, from the first whole one on.
         """
-        waiting = self._waiting.then(_Samples(reading_mps2, usable, at_end, distance_m))
+        waiting = self._waiting.then(self._readable(reading_mps2, usable, at_end, distance_m))
         estimates: list[WindowEstimate] = []
         taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
         for low in range(0, taken, HOP_SAMPLES):
             estimates += self._hop(waiting.part(low, low + HOP_SAMPLES))
         self._waiting = waiting.part(taken, len(waiting))
         return estimates
+
+    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> _Samples:
+        """What is not usable may be any number, NaN too; it has no weight. Nor has what stands at an end of the range,
+        unless readings are taken as bounds."""
+        if not self._sensor.is_coarse:
+            usable = usable & (at_end == 0)
+        return _Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
 
     def finish(self) -> list[WindowEstimate]:
         """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
@@ -182,7 +192,7 @@ class RoadEstimator:
         if last is not None:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
             after = _Samples.unread(count, float(last.distance_m[-1]), 0.0)
-            self._read = BLOCK_SAMPLES
+            self._heard = _FIRST_SAMPLES
             estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
         self._start_anew()
         return estimates
@@ -199,8 +209,8 @@ class RoadEstimator:
                 np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
                 np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
             )
-        self._read += int(np.count_nonzero(fresh.usable))
-        if not self._begun and self._read < _FIRST_SAMPLES:
+        self._heard += len(fresh)
+        if not self._begun and self._heard < _FIRST_SAMPLES:
             return []
         due = list(self._due(self._samples))
         return self._estimates(self._samples, due) if due else []
@@ -217,8 +227,8 @@ class RoadEstimator:
         block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
         read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
-            nothing = _Piece(WindowIri(nan, nan, nan), 0.0, "unsettled")
-            return [estimate for number in due for estimate in self._window(number, nothing)]
+            unread = [_nothing(self._why_none(samples, number)) for number in due]
+            return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
         solution, variance = self._solved(block, samples, read)
         slope = np.fft.irfft(solution.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solution.road, block.count)
@@ -229,7 +239,7 @@ class RoadEstimator:
             inside = slice(low, low + self._points + 1)
             speed_mps = self._speed_mps(samples, number)
             if low < 0 or speed_mps is None:
-                piece = _Piece(WindowIri(nan, nan, nan), 0.0, "faint")
+                piece = _nothing(self._why_none(samples, number))
             else:
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, variance)
                 self._give_road(number, elevation[inside], speed_mps, variance)
@@ -246,12 +256,11 @@ class RoadEstimator:
         solution: Solution | None = None
         for _ in range(rounds):
             readings = self._as_gaussian(samples)
-            usable = read if self._sensor.is_coarse else read & (samples.at_end == 0)
-            weight = np.where(usable, 1 / readings.variance, 0.0)
+            weight = np.where(read, 1 / readings.variance, 0.0)
             start = None if solution is None else solution.waves
             solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, steps, start)
             told_waves = 2 * seen_share * float((solution.gain / (1 + solution.gain)).sum())
-            moving = weight[block.moving & usable]
+            moving = weight[block.moving & read]
             variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
             self._belief = learnt(
                 self._belief, solution, block.wave_number_cpm, seen_share, block.count, before
@@ -287,6 +296,11 @@ class RoadEstimator:
         moving = steps_m > SLOWEST_MPS / RATE_HZ
         return float(steps_m[moving].mean()) * RATE_HZ if moving.sum() > 0.5 * len(steps_m) else None
 
+    def _why_none(self, samples: _Samples, number: int) -> str:
+        """The flag of a piece without an estimate: driven before the block began, or too slowly, or not read."""
+        gone = (number + 1) * self._piece_m <= samples.distance_m[0]
+        return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"
+
     def _piece(self, slope: Array, unseen: Array, speed_mps: float, variance: float) -> _Piece:
         spectrum = self._belief.spectrum
         knowledge = self._errors.at(speed_mps, spectrum, variance)
@@ -319,6 +333,10 @@ class RoadEstimator:
         told = WAVE_NUMBERS_CPM[told_share(self._car, speed_mps, self._belief.spectrum, noise_psd) > 0.5]
         shortest_m, longest_m = (1 / told[-1], 1 / told[0]) if len(told) else (nan, nan)
         self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
+
+
+def _nothing(missing: str) -> _Piece:
+    return _Piece(WindowIri(nan, nan, nan), 0.0, missing)
 
 
 def _mean_step_m(samples: _Samples) -> float:

@@ -11,8 +11,8 @@ with H the car's body acceleration per elevation, R what the recorder's filters 
 ISO 8608; with IRI = 0.5386 Gd(n0)^0.5 (Eq 4.39) that is the ratio.
 
 The ratio is right on the average of a long road of that shape. One window of 7.62 m is a short look: at 31 m/s it lasts
-a quarter of a second, less than one swing of the body. ``RmsRelation.iri_std`` says how far such an estimate is from
-the exact IRI of the same window.
+a quarter of a second, less than one swing of the body, and the estimate scatters by a fifth to a third about the exact
+IRI. ``logger.estimation`` does better.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads import iso8608
-from logger.units import WINDOW_M
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
@@ -38,20 +37,6 @@ _WAVE_NUMBERS = 400  # log-spaced; 5000 of them change no ratio by more than 0.0
 
 # Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
 _CLASS_LIMITS = ((3.05, "B"), (6.09, "C"), (12.19, "D"), (24.37, "E"), (48.74, "F"), (97.48, "G"), (194.96, "H"))
-
-# Relative error of a window's estimate, by speed. Found by driving the RAV4 of Table 4.2 at steady speeds over 80 km
-# of random ISO roads each and comparing windows of 7.62 m with their exact IRI: the scatter is the 68 % quantile of
-# |estimate - exact| / estimate, or the 95 % quantile over 2.35 where the tails make that the larger (from 25 m/s on).
-# Over 15 to 100 m it falls with the square root of the length. The shape row is computed: what a road of waviness
-# 1.75 or 2.25 in place of 2 does to the ratio, which no window length averages out.
-_ERROR_SPEEDS_MPS = (4.5, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0, 31.3, 38.0, 45.0)
-_SCATTER = (0.202, 0.203, 0.215, 0.220, 0.221, 0.228, 0.221, 0.257, 0.326, 0.371, 0.433)
-_SHAPE = (0.091, 0.111, 0.098, 0.067, 0.020, 0.010, 0.057, 0.082, 0.100, 0.135, 0.179)
-
-# A coarse sensor's noise is step / sqrt(12) only while the signal crosses many steps. Resting on the edge of a step it
-# toggles with up to sqrt(3) times that, in the middle of a step it shows nothing. With this margin windows of smooth
-# and of rough roads, read by a BMA220 at +-2 g with any offset, are covered at 7, 15 and 25 m/s.
-_NOISE_MARGIN = 1.35
 
 
 @dataclass(frozen=True)
@@ -72,42 +57,6 @@ class RmsRelation:
     def iri(self, accel_rms_mps2: float | Array, speed_mps: float | Array) -> float | Array:
         """IRI [m/km] of a road that shakes the car this much [m/s2] at this speed; NaN outside the table's speeds."""
         return accel_rms_mps2 * self._ratio(speed_mps)
-
-    @overload
-    def iri_std(
-        self, iri_m_per_km: float, speed_mps: float, window_m: float, noise_rms_mps2: float = 0.0
-    ) -> float: ...
-    @overload
-    def iri_std(
-        self, iri_m_per_km: Array, speed_mps: Array | float, window_m: float, noise_rms_mps2: float = 0.0
-    ) -> Array: ...
-    def iri_std(
-        self, iri_m_per_km: float | Array, speed_mps: float | Array, window_m: float, noise_rms_mps2: float = 0.0
-    ) -> float | Array:
-        """Standard error [m/km] of an estimate that ``iri`` gave for one window; NaN outside the table's speeds.
-
-        iri_m_per_km      the estimate [m/km]
-        window_m          length of the window [m]
-        noise_rms_mps2    r.m.s. noise of the accelerometer in the band that is used, quantising noise included [m/s2]
-
-        Three errors are added in squares. Scatter, because a window is short, and shape, because a road's spectrum is
-        not exactly that of ISO 8608, are shares of the estimate. Noise raises the r.m.s.: the estimate is too high
-        by what vanishes when the noise, with a margin, is taken out of it in squares. An estimate no higher than the
-        noise may be nothing but noise, and a coarse sensor may hide a road as rough as its noise.
-
-        About 68 to 75 in 100 exact values lie within one standard error and 90 to 98 within two; where noise rules, up
-        to all of them, because its bias is counted as an error. The errors are not Gaussian:
-        a rough window that happens to shake the car little gets a small estimate with a small standard error, so there
-        are more far misses on the high side of the estimate than on the low. Found for a half car of common size; a
-        road whose waviness is far from 2, a vehicle file that does not fit the car, or clipping can cost more.
-        """
-        scatter = np.interp(speed_mps, _ERROR_SPEEDS_MPS, _SCATTER) * np.sqrt(WINDOW_M / window_m)
-        shape = np.interp(speed_mps, _ERROR_SPEEDS_MPS, _SHAPE)
-        noise_iri = noise_rms_mps2 * self._ratio(speed_mps)
-        without_noise = np.sqrt(np.maximum(np.square(iri_m_per_km) - np.square(_NOISE_MARGIN * noise_iri), 0.0))
-        excess = np.where(without_noise > 0, iri_m_per_km - without_noise, np.maximum(iri_m_per_km, noise_iri))
-        total = np.sqrt(np.square(iri_m_per_km) * (scatter**2 + shape**2) + excess**2)
-        return total if total.ndim else float(total)
 
     def _ratio(self, speed_mps: float | Array) -> Array:
         return np.asarray(np.interp(speed_mps, self.speeds_mps, self.iri_per_accel_rms, left=np.nan, right=np.nan))

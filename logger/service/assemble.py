@@ -17,13 +17,17 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
-from logger.roads.from_acceleration import RmsRelation, rms_relation
+from logger.estimation.sensor import Sensor
+from logger.estimation.stream import RoadEstimator
+from logger.roads.from_acceleration import rms_relation
 from logger.service.chain import Axis, SignalChain, recorder_gain
 from logger.service.config import AXES, AccelerometerConfig, Config
 from logger.service.core import AccelerationDecoder
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.shipped import vehicle_file, vehicle_names, version
-from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_point
+from logger.vehicle.vehicle import Vehicle
 
 # R.m.s. noise on the 100 Hz grid that no data sheet states: of the chip beside its steps, and of a serial sensor.
 BMA220_NOISE_MPS2 = 0.1
@@ -32,12 +36,12 @@ SERIAL_NOISE_MPS2 = 0.05
 
 @dataclass(frozen=True)
 class Instrument:
-    """What the settings say about the accelerometer: its decoder, its noise, a description for the logs, and a look at
-    what the decoder has counted."""
+    """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, a
+    description for the logs, and a look at what the decoder has counted."""
 
     decoder: AccelerationDecoder
     oversample: int
-    noise_rms_mps2: float
+    sensor: Sensor
     description: dict[str, Any]
     counters: Callable[[], dict[str, int]]
 
@@ -53,7 +57,9 @@ def instrument(config: AccelerometerConfig) -> Instrument:
     if config.driver == "bma220":
         chip = bma220_settings(config)
         step_mps2 = mps2_per_count(chip.range_g)
-        noise_mps2 = sqrt((step_mps2**2 / 12.0 + BMA220_NOISE_MPS2**2) / chip.oversample)
+        sensor = Sensor(BMA220_NOISE_MPS2, step_mps2)
+        if chip.oversample > 1:  # the mean of several readings is on no step any more
+            sensor = Sensor(sqrt(sensor.variance_mps2_2 / chip.oversample), 0.0)
         description = {
             "driver": "bma220",
             "verified": True,
@@ -67,7 +73,7 @@ def instrument(config: AccelerometerConfig) -> Instrument:
         def counters() -> dict[str, int]:
             return {"odd_bits": bytes_decoder.anomalies, "repeated_samples": bytes_decoder.repeats}
 
-        return Instrument(bytes_decoder, chip.oversample, noise_mps2, description, counters)
+        return Instrument(bytes_decoder, chip.oversample, sensor, description, counters)
     profile = _mounted(load_profile(config.pasco.profile), Axis.from_word(config.vertical_axis))
     description = {
         "driver": "pasco",
@@ -77,7 +83,8 @@ def instrument(config: AccelerometerConfig) -> Instrument:
         "calibration": asdict(config.pasco.calibration) if config.pasco.calibration else None,
     }
     decoder = PascoDecoder(profile, config.pasco.calibration)
-    return Instrument(decoder, 1, SERIAL_NOISE_MPS2, description, lambda: asdict(decoder.counters))
+    sensor = Sensor(SERIAL_NOISE_MPS2, 0.0)
+    return Instrument(decoder, 1, sensor, description, lambda: asdict(decoder.counters))
 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
@@ -85,14 +92,7 @@ def gps_decoder(config: Config) -> NmeaDecoder:
     return NmeaDecoder(week_rollovers=config.gps.week_rollovers)
 
 
-def relation(config: Config) -> tuple[RmsRelation, dict[str, Any]]:
-    """The vehicle's r.m.s. relation as this recorder sees it, and the vehicle for the logs."""
-    vehicle = read_vehicle(config.vehicle)
-    gain = recorder_gain(config.pipeline.low_pass_hz)
-    return rms_relation(vehicle, gain), asdict(vehicle)
-
-
-def pipeline(config: Config, sensor: Instrument, vehicle_relation: RmsRelation) -> Pipeline:
+def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     """The pipeline as the settings want it."""
     settings = PipelineSettings(
         window_m=config.pipeline.window_m,
@@ -102,22 +102,26 @@ def pipeline(config: Config, sensor: Instrument, vehicle_relation: RmsRelation) 
         stationary_mps=config.pipeline.stationary_mps,
         drive_end_s=config.pipeline.drive_end_s,
         latency_s=config.gps.latency_s,
-        noise_rms_mps2=sensor.noise_rms_mps2,
+        front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
     )
     axis = Axis.from_word(config.accelerometer.vertical_axis)
     make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
-    chain = SignalChain(axis, WEIGHTING, sensor.oversample, config.pipeline.low_pass_hz, make_filter)
-    return Pipeline(settings, chain, vehicle_relation)
+    low_pass_hz = config.pipeline.low_pass_hz
+    chain = SignalChain(axis, WEIGHTING, sensor.oversample, low_pass_hz, sensor.sensor.is_coarse, make_filter)
+    structure = structure_of(vehicle)
+    place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
+    estimator = RoadEstimator(structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m)
+    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
 
 
-def sidecar(config: Config, sensor: Instrument, vehicle: dict[str, Any]) -> dict[str, Any]:
+def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {
         "ridelog_version": version(),
         "sensor": sensor.description,
-        "vehicle": vehicle,
+        "vehicle": asdict(vehicle),
         "settings": _plain(asdict(config)),
-        "iri_m_per_km": "r.m.s. relation of the vehicle at the measured speed; the same value as iri_rms_m_per_km",
+        "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
 

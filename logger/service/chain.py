@@ -56,12 +56,15 @@ class SignalChain:
     weighting     frequency weighting with stored sections for 100 Hz
     oversample    the sensor is read at this multiple of 100 Hz
     low_pass_hz   corner of a second-order low-pass; None: not used
+    coarse        the sensor's steps are larger than its noise: its readings are passed on as they were read, not
+                  interpolated to the grid
     make_filter   the arithmetic of the recursive filters: ``BlockFilter``, or ``FixedFilter.for_acceleration``
     """
 
-    def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None,
+    def __init__(self, axis: Axis, weighting: Weighting, oversample: int, low_pass_hz: float | None, coarse: bool,
                  make_filter: Callable[[SectionRows], BlockFilter | FixedFilter] = BlockFilter) -> None:
         self._axis = axis
+        self._coarse = coarse
         self._resampler = GridResampler(GRID_RATE_HZ * oversample)
         self._decimator = Decimator(oversample)
         self._high_pass = make_filter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
@@ -161,7 +164,7 @@ class SignalChain:
             return []
         values = np.interp(t_us, [begin_us - GRID_STEP_US, end_us], [from_mps2, to_mps2])
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
-        return self._filter(t_us, values, present=nowhere, interpolated=nowhere, clipped=nowhere)
+        return self._filter(t_us, values, values, nowhere, nowhere, nowhere)
 
     def _absent(self, begin_us: int, end_us: int) -> GridSamples:
         t_us = _grid_us(begin_us, end_us)
@@ -169,14 +172,15 @@ class SignalChain:
             self._next_us = int(t_us[-1]) + GRID_STEP_US
         zero = np.zeros(len(t_us))
         nowhere = np.zeros(len(t_us), dtype=np.bool_)
-        return GridSamples(t_us, zero, zero, zero, nowhere, nowhere, nowhere, nowhere)
+        return GridSamples(t_us, zero, zero, zero, zero, nowhere, nowhere, nowhere, nowhere)
 
     def _samples(self, run: GridRun) -> list[GridSamples]:
         t_us = run.t0_us + GRID_STEP_US * np.arange(len(run.values), dtype=np.int64)
         everywhere = np.ones(len(t_us), dtype=np.bool_)
-        return self._filter(t_us, run.values, present=everywhere, interpolated=run.bridged, clipped=run.clipped)
+        reading = run.nearest if self._coarse else run.values
+        return self._filter(t_us, run.values, reading, everywhere, run.bridged, run.clipped)
 
-    def _filter(self, t_us: Times, values: Floats, present: Bools, interpolated: Bools, clipped: Bools
+    def _filter(self, t_us: Times, values: Floats, reading: Floats, present: Bools, interpolated: Bools, clipped: Bools
                 ) -> list[GridSamples]:
         """Run the filters over more samples. The weighting is some whole samples behind; as many wait for it, and its
         first outputs belong to instants before the start."""
@@ -189,7 +193,7 @@ class SignalChain:
         self._since_start += len(values)
         weighted = self._weighting.process(values)
         blank = np.zeros(len(values))
-        waiting = GridSamples(t_us, accel, blank, blank, present, interpolated, settled, clipped)
+        waiting = GridSamples(t_us, reading, accel, blank, blank, present, interpolated, settled, clipped)
         early = min(self._early, len(weighted))
         self._early -= early
         weighted = weighted[early:]

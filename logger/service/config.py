@@ -66,13 +66,16 @@ class AccelerometerConfig:
 
 @dataclass(frozen=True)
 class GpsConfig:
-    """The receiver's line; its latency, the longest loss that is bridged, and 1024-week periods to add."""
+    """The receiver's line; its latency, the longest loss that is bridged, 1024-week periods to add; where its antenna
+    sits, and how far off the places are that it gives from one window to another (standard deviation)."""
 
     port: str = "/dev/serial0"
     baud: int = 9600
     latency_s: float = 0.10
     bridge_s: float = 10.0
     week_rollovers: int = 0
+    antenna_behind_front_axle_m: float = 0.0
+    place_std_m: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -268,6 +271,8 @@ _gps = _section(GpsConfig, {
     "latency_s": _number(0, 2),
     "bridge_s": _number(0, 60),
     "week_rollovers": _whole(0, 8),
+    "antenna_behind_front_axle_m": _number(-3, 15),
+    "place_std_m": _number(0, 100),
 })
 
 _read_pipeline = _section(PipelineConfig, {

@@ -16,26 +16,29 @@ import numpy as np
 from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
+from logger.estimation.stream import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.from_acceleration import RmsRelation, iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain
 from logger.service.odometer import Odometer
+from logger.service.roughness import RoughnessQueue, Waiting
 from logger.service.timebase import Timebase
 from logger.units import US_PER_S
 
 FIX_DELAY_US = 3_000_000
 SHORT_WINDOW_SHARE = 0.5
+_BLIND = -1
 
 
 @dataclass(frozen=True)
 class PipelineSettings:
     """Lengths and limits of the pipeline.
 
-    bridge_s        longest loss of fix that is bridged [s]
-    slow_mps        below this mean speed a window has no IRI [m/s]
-    stationary_mps  below this speed the car counts as standing [m/s]
-    drive_end_s     standing this long ends the drive [s]
-    noise_rms_mps2  r.m.s. noise of the accelerometer on the grid [m/s2]
+    bridge_s              longest loss of fix that is bridged [s]
+    slow_mps              below this mean speed the r.m.s. relation says nothing [m/s]
+    stationary_mps        below this speed the car counts as standing [m/s]
+    drive_end_s           standing this long ends the drive [s]
+    front_axle_ahead_m    of the GPS antenna, whose distance and place the windows go by [m]
     """
 
     window_m: float
@@ -45,16 +48,19 @@ class PipelineSettings:
     stationary_mps: float
     drive_end_s: float
     latency_s: float
-    noise_rms_mps2: float
+    front_axle_ahead_m: float
 
 
 class Pipeline:
     """The whole way from readings to records of one service run."""
 
-    def __init__(self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation) -> None:
+    def __init__(
+        self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator
+    ) -> None:
         self._settings = settings
         self._chain = chain
         self._relation = relation
+        self._roughness = RoughnessQueue(estimator)
         self._cutter = WindowCutter(settings.window_m, settings.blind_window_s, GRID_STEP_US)
         self._bridge_us = round(settings.bridge_s * US_PER_S)
         self._drive_end_us = round(settings.drive_end_s * US_PER_S)
@@ -62,6 +68,7 @@ class Pipeline:
         self._start_us: int | None = None
         self._active_us: int | None = None
         self._segment = 0
+        self._leg = _BLIND
         self.drive = 1
         self.timebase = Timebase(settings.latency_s)
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
@@ -74,9 +81,12 @@ class Pipeline:
             self.odometer.add(self.timebase.place(fix))
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
-        records = self._recorded(self._release(self._settled_until_us(now_us)))
-        if self._active_us is not None and now_us - self._active_us >= self._drive_end_us:
-            records += self._recorded(self._cutter.break_off())
+        self._release(self._settled_until_us(now_us))
+        ended = self._active_us is not None and now_us - self._active_us >= self._drive_end_us
+        if ended:
+            self._end_leg()
+        records = self._records()
+        if ended:
             self._active_us = None
             self.drive += 1
         self._forget()
@@ -95,7 +105,9 @@ class Pipeline:
         end_us = int(self._pending[-1].t_us[-1]) if self._pending else 0
         last_us = self.odometer.last_t_us
         until_us = last_us if last_us is not None and end_us - last_us <= FIX_DELAY_US else None
-        return self._recorded(self._release(until_us) + self._cutter.break_off())
+        self._release(until_us)
+        self._end_leg()
+        return self._records()
 
     @property
     def late_samples(self) -> int:
@@ -115,33 +127,42 @@ class Pipeline:
             return now_us - FIX_DELAY_US
         return last_us if last_us is not None else begun_us
 
-    def _release(self, until_us: int | None) -> list[Window]:
+    def _release(self, until_us: int | None) -> None:
         if not self._pending:
-            return []
+            return
         waiting = joined(self._pending)
         count = len(waiting) if until_us is None else int(np.searchsorted(waiting.t_us, until_us))
         self._pending = [waiting.part(count, len(waiting))] if count < len(waiting) else []
-        if not count:
-            return []
-        return self._cut(waiting.part(0, count))
+        if count:
+            self._cut(waiting.part(0, count))
 
-    def _cut(self, samples: GridSamples) -> list[Window]:
+    def _cut(self, samples: GridSamples) -> None:
         travel = self.odometer.travel(samples.t_us)
-        windows: list[Window] = []
-        for low, high in runs_of_equal(np.where(travel.known, travel.leg, -1)):
+        for low, high in runs_of_equal(np.where(travel.known, travel.leg, _BLIND)):
             part = samples.part(low, high)
-            if not travel.known[low]:
+            leg = int(travel.leg[low]) if travel.known[low] else _BLIND
+            if leg != self._leg:
+                self._end_leg()
+                self._leg = leg
+            if leg == _BLIND:
                 self._active_us = int(part.t_us[-1])
-                windows += self._cutter.push_blind(part)
+                self._enqueue(self._cutter.push_blind(part))
                 continue
-            speed_mps = travel.speed_mps[low:high]
+            speed_mps, distance_m = travel.speed_mps[low:high], travel.distance_m[low:high]
             moving = np.flatnonzero(speed_mps > 0.0)
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
-            windows += self._cutter.push_known(
-                part, travel.distance_m[low:high], speed_mps, travel.bridged[low:high], int(travel.leg[low])
-            )
-        return windows
+            self._roughness.read(part, distance_m + self._settings.front_axle_ahead_m, leg)
+            self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
+
+    def _end_leg(self) -> None:
+        """Close the window being filled where it stands, and have the estimator give what it can."""
+        self._enqueue(self._cutter.break_off())
+        self._roughness.end_leg()
+        self._leg = _BLIND
+
+    def _enqueue(self, windows: list[Window]) -> None:
+        self._roughness.add([Waiting(window, self._place(window)) for window in windows])
 
     def _forget(self) -> None:
         """Let go of fixes that no waiting sample and no open window needs."""
@@ -154,16 +175,20 @@ class Pipeline:
             min(oldest_us, opened[0]) if opened else oldest_us, opened[1] if opened else float("inf")
         )
 
-    def _recorded(self, windows: list[Window]) -> list[WindowRecord]:
-        return [self._record(window) for window in windows]
+    def _records(self) -> list[WindowRecord]:
+        return [self._record(waiting, estimate) for waiting, estimate in self._roughness.ready()]
 
-    def _record(self, window: Window) -> WindowRecord:
+    def _record(self, waiting: Waiting, estimate: WindowEstimate | None) -> WindowRecord:
+        window, place = waiting.window, waiting.place
         offset_us = self.timebase.utc_offset_us()
         flags = set(window.flags)
         if offset_us is None:
             flags.add("time_unset")
-        iri, iri_std = self._roughness(window, flags)
-        place = self._place(window)
+        if estimate is not None:
+            flags |= estimate.flags
+        elif window.start_m is not None and "partial" not in flags:
+            flags.add("unsettled")
+        iri = _known(estimate.iri_m_per_km) if estimate is not None else None
         crest = window.peak_mps2 / window.a_w_mps2 if window.a_w_mps2 > 0.0 else float("nan")
         self._segment += 1
         return WindowRecord(
@@ -178,8 +203,8 @@ class Pipeline:
             lon_deg=place[1] if place else None,
             speed_mps=_known(window.speed_mps),
             iri_m_per_km=iri,
-            iri_std_m_per_km=iri_std,
-            iri_rms_m_per_km=iri,
+            iri_std_m_per_km=_known(estimate.iri_std_m_per_km) if estimate is not None else None,
+            iri_rms_m_per_km=self._iri_by_rms(window, flags),
             a_w_mps2=_known(window.a_w_mps2),
             mtvv_mps2=_known(window.mtvv_mps2),
             vdv_mps175=_known(window.vdv_mps175),
@@ -192,22 +217,20 @@ class Pipeline:
             flags=tuple(sorted(flags)),
         )
 
-    def _roughness(self, window: Window, flags: set[str]) -> tuple[float | None, float | None]:
-        """IRI by the r.m.s. relation and its standard error [m/km]; flags say why there is none."""
+    def _iri_by_rms(self, window: Window, flags: set[str]) -> float | None:
+        """IRI by the r.m.s. relation [m/km]; flags say why there is none."""
         if window.start_m is None or window.end_m is None or not isfinite(window.accel_rms_mps2):
-            return None, None
+            return None
         if window.speed_mps < self._settings.slow_mps:
             flags.add("slow")
-            return None, None
-        length_m = window.end_m - window.start_m
-        if length_m < SHORT_WINDOW_SHARE * self._settings.window_m:
-            return None, None
+            return None
+        if window.end_m - window.start_m < SHORT_WINDOW_SHARE * self._settings.window_m:
+            return None
         iri = self._relation.iri(window.accel_rms_mps2, window.speed_mps)
         if not isfinite(iri):
             flags.add("fast")
-            return None, None
-        std = self._relation.iri_std(iri, window.speed_mps, length_m, self._settings.noise_rms_mps2)
-        return iri, std
+            return None
+        return iri
 
     def _place(self, window: Window) -> tuple[float, float] | None:
         if window.start_m is None or window.end_m is None:

@@ -26,6 +26,7 @@ from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.supervisor import Supervisor
 from logger.store.folder_lock import FolderLock
 from logger.store.rotation import SegmentLog, next_session, repair
+from logger.store.vehicle_file import read_vehicle
 from logger.units import US_PER_S
 
 SERIAL_WAIT_S = 0.5
@@ -42,7 +43,7 @@ def serve(config: Config, stop: threading.Event) -> None:
 
 def _serve(config: Config, stop: threading.Event) -> None:
     sensor = assemble.instrument(config.accelerometer)
-    relation, vehicle = assemble.relation(config)
+    vehicle = read_vehicle(config.vehicle)
     directory = config.log.directory
     for repaired in repair(directory):
         log.info("repaired %s", repaired)
@@ -50,7 +51,7 @@ def _serve(config: Config, stop: threading.Event) -> None:
     segment_log = SegmentLog(directory, session, assemble.sidecar(config, sensor, vehicle), config.log.max_file_bytes)
     recorder = _recorder(config, session)
     decoder = assemble.gps_decoder(config)
-    pipeline = assemble.pipeline(config, sensor, relation)
+    pipeline = assemble.pipeline(config, sensor, vehicle)
     core = Core(sensor.decoder, decoder, pipeline, segment_log)
     events: deque[Event] = deque()
     deadlines = Deadlines(US_PER_S // (100 * sensor.oversample))

@@ -139,7 +139,7 @@ def test_body_moves_as_scipy_says() -> None:
     patch = np.linspace(-0.125, 0.125, 51)
     wheels = np.stack([
         np.interp(12.5 * time[:, None] + place + patch, profile_m, drive.road.elevation_m).mean(axis=1)
-        for place in (1.47, -1.47)
+        for place in (0.0, -2.94)
     ], axis=1)
     a, b = half_car.structure(RAV4).state_space()
     _, accel, _ = signal.lsim(signal.StateSpace(a, b, a[4:5], b[4:5]), wheels - wheels[0], time, interp=True)

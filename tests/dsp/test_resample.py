@@ -44,6 +44,7 @@ def joined(runs: list[GridRun]) -> list[GridRun]:
             pieces[0].t0_us,
             pieces[0].rate_hz,
             np.concatenate([piece.values for piece in pieces]),
+            np.concatenate([piece.nearest for piece in pieces]),
             np.concatenate([piece.clipped for piece in pieces]),
             np.concatenate([piece.bridged for piece in pieces]),
             True,
@@ -176,7 +177,7 @@ def test_a_rate_whose_step_is_no_whole_microsecond_does_not_drift() -> None:
 
 def fast_run(values: np.ndarray, factor: int, t0_us: int = 1000) -> GridRun:
     nowhere = np.zeros(len(values), dtype=bool)
-    return GridRun(t0_us, 100 * factor, values, nowhere, nowhere, True)
+    return GridRun(t0_us, 100 * factor, values, values, nowhere, nowhere, True)
 
 
 def split(run: GridRun, cuts: list[int]) -> list[GridRun]:
@@ -186,6 +187,7 @@ def split(run: GridRun, cuts: list[int]) -> list[GridRun]:
             run.t0_us + low * 1_000_000 // run.rate_hz,
             run.rate_hz,
             run.values[low:high],
+            run.nearest[low:high],
             run.clipped[low:high],
             run.bridged[low:high],
             run.new_start and low == 0,
@@ -218,7 +220,8 @@ def test_the_decimating_filter_passes_and_stops(factor: int) -> None:
 @settings(deadline=None, max_examples=40)
 def test_any_split_decimates_to_the_same_bits(cuts: list[int], factor: int) -> None:
     rng = np.random.default_rng(9)
-    run = GridRun(0, 100 * factor, rng.standard_normal(1500), rng.random(1500) > 0.98, rng.random(1500) > 0.98, True)
+    values = rng.standard_normal(1500)
+    run = GridRun(0, 100 * factor, values, values, rng.random(1500) > 0.98, rng.random(1500) > 0.98, True)
     assert bits(decimated(factor, split(run, cuts))) == bits(decimated(factor, [run]))
 
 

@@ -41,7 +41,7 @@ def through(chain: SignalChain, samples: AccelerationBlock, cuts: list[int]) -> 
 
 
 def chain_for(oversample: int = 1, axis: str = "+z") -> SignalChain:
-    return SignalChain(Axis.from_word(axis), WEIGHTING, oversample, None)
+    return SignalChain(Axis.from_word(axis), WEIGHTING, oversample, None, coarse=False)
 
 
 @settings(deadline=None, max_examples=25)

@@ -11,6 +11,7 @@ from logger.service.config import Config
 from logger.service.core import Core
 from logger.store.rotation import ClockMap
 from logger.store.segment_log import format_row
+from logger.store.vehicle_file import read_vehicle
 
 
 class Rows:
@@ -37,9 +38,9 @@ class Rows:
 def core_for(header: DumpHeader, config: Config | None = None) -> tuple[Core, Rows]:
     config = assemble.config_for_dump(header, config, None)
     sensor = assemble.instrument(config.accelerometer)
-    relation, _ = assemble.relation(config)
+    vehicle = read_vehicle(config.vehicle)
     rows = Rows()
-    return Core(sensor.decoder, assemble.gps_decoder(config), assemble.pipeline(config, sensor, relation), rows), rows
+    return Core(sensor.decoder, assemble.gps_decoder(config), assemble.pipeline(config, sensor, vehicle), rows), rows
 
 
 def rows_of(header: DumpHeader, events: Iterable[Event], config: Config | None = None) -> Rows:
