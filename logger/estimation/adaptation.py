@@ -28,12 +28,13 @@ _WAVINESS_RANGE = (1.2, 3.2)
 _LEVEL_STEP = 0.3
 _WAVINESS_STEP = 0.1
 _NOISE_DEVIATION = 0.5
+_LEAST_LOG_NOISE = -2.0  # a sensor that hangs must not be taken for one without noise
 _LARGEST_STEP = 0.7
 
 
 @dataclass(frozen=True)
 class Belief:
-    """What has been learnt: the spectrum, the standard error of its log level, and log (noise over sensor's variance)."""
+    """The spectrum, the standard error of its log level, and log of the noise variance over the sensor's."""
 
     spectrum: RoadSpectrum
     log_noise: float = 0.0
@@ -91,7 +92,8 @@ def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: 
     free = max(float(np.count_nonzero(weight)) - told_waves, 1.0)
     gradient = 0.5 * (float(weight @ residual_mps2**2) - free) - belief.log_noise / _NOISE_DEVIATION**2
     step = gradient / (0.5 * free + _NOISE_DEVIATION**-2.0)
-    return replace(belief, log_noise=belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)))
+    log_noise = belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
+    return replace(belief, log_noise=max(log_noise, _LEAST_LOG_NOISE))
 
 
 def noise_factor(belief: Belief) -> float:

@@ -8,7 +8,7 @@ a fixed filter.
 Solution. The road is written r = F u with u white (amplitudes of its waves, each divided by its standard deviation).
 Then the estimate solves (I + B' W B) u = B' W y with B = A F and W the weights of the readings (one over their
 variance, 0 where there is none). A is quick to apply: waves to elevations by an inverse FFT, elevations to those under
-each wheel by interpolation, and from there to the reading by an FFT in time; its transpose likewise. At constant
+each axle by interpolation, and from there to the reading by an FFT in time; its transpose likewise. At constant
 speed the matrix is nearly diagonal in u, which is the Wiener filter, and makes a preconditioner with which a few
 steps of conjugate gradients are enough. Slow drift (gravity, tilt, braking, temperature) is a few cosines of broad
 variance, eliminated exactly.
@@ -19,7 +19,6 @@ Both grids are periodic. In space the road goes on unseen for longer than it rem
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
 
@@ -36,6 +35,7 @@ ENTRY_S = 2.5
 UNSEEN_M = 60.0
 SLOWEST_MPS = 0.4
 _MARGIN_M = 5.0
+_FAST_SHARE = 0.98
 _SPEED_CLASSES_PER_E = 10
 _DRIFT_BELOW_HZ = 0.1
 _DRIFT_MPS2 = 0.05
@@ -59,12 +59,12 @@ class Solution:
 
 class TimeGrid:
     """What is the same for every block of ``count`` samples (even) at ``rate_hz``: how the car answers the road under
-    each wheel, by frequency, and what drift looks like."""
+    each axle, by frequency, and what drift looks like."""
 
     def __init__(self, car: CarResponse, count: int, rate_hz: float) -> None:
         self.car = car
         self.rate_hz = rate_hz
-        self.by_wheel = car.by_wheel(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
+        self.by_axle = car.by_axle(np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64))
         half_waves = np.arange(1, int(2 * _DRIFT_BELOW_HZ * count / rate_hz) + 1)
         phase = pi * half_waves * (np.arange(count)[:, None] + 0.5) / count
         self.drift = np.hstack([np.ones((count, 1)), np.cos(phase)])
@@ -91,13 +91,17 @@ class Block:
         self.count = _fft_length((distance_m[-1] + _MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
         self.wave_number_cpm = np.asarray(np.fft.rfftfreq(self.count, spacing_m), dtype=np.float64)
         speed_mps = np.gradient(distance_m) * rate_hz
-        self._highest_cpm = HIGHEST_HZ / max(float(speed_mps.max()), SLOWEST_MPS)
+        # Not the highest speed: a single place that is wrong by metres must not cost the short waves of the block.
+        self._highest_cpm = HIGHEST_HZ / max(float(np.quantile(speed_mps, _FAST_SHARE)), SLOWEST_MPS)
         # Reading between two points by a straight line weakens short waves; the division makes up for it.
         n = self.wave_number_cpm
         self._averaged = np.sinc(n * car.contact_patch_m) / np.sinc(n * spacing_m) ** 2
-        place = (distance_m[:, None] - car.behind_m - self.start_m) / spacing_m
-        self._low = np.floor(place).astype(np.int64)
-        self._share = place - self._low
+        place = (distance_m - car.behind_m[:, None] - self.start_m) / spacing_m
+        low = np.floor(place).astype(np.int64)
+        self._front = low[0]
+        # (2, axles, t): the points on either side of each axle, and their shares in the elevation there
+        self._points = np.stack([low, low + 1])
+        self._shares = np.stack([1 - (place - low), place - low])
         self.moving = speed_mps > SLOWEST_MPS
         self.mean_speed_mps = float(speed_mps[self.moving].mean()) if self.moving.any() else SLOWEST_MPS
         self._speed_class = np.round(np.log(np.maximum(speed_mps, SLOWEST_MPS)) * _SPEED_CLASSES_PER_E).astype(int)
@@ -109,11 +113,11 @@ class Block:
 
         reading_mps2    (t,) readings
         weight          (t,) one over the variance of each, 0 where there is none [(m/s2)-2]
-        steps           of conjugate gradients
-        start           ``waves`` of an earlier solution of this block, to go on from
+        steps           of conjugate gradients (Hestenes and Stiefel), from ``start`` or from a flat road
+        start           ``waves`` of an earlier solution of this block to go on from, or ``carried_over`` ones
         """
-        deviation = self._wave_deviations(spectrum)
-        shape = deviation * self._averaged
+        deviation = self.wave_deviations(spectrum)
+        gain = self._gain(weight) * deviation**2
         weighted = weight[:, None] * self._grid.drift
         inner = np.linalg.inv(self._grid.drift.T @ weighted + np.diag(self._grid.drift_precision))
 
@@ -122,17 +126,38 @@ class Block:
             result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
             return result
 
-        def normal(waves: ComplexArray) -> ComplexArray:
-            return waves + self._transposed(weigh(self._applied(waves, shape)), shape)
-
-        gain = self._gain(weight) * deviation**2
-        target = self._transposed(weigh(reading_mps2), shape)
-        waves = _conjugate_gradients(normal, target, 1 / (1 + gain), steps, start)
-        explained = self._applied(waves, shape)
+        waves: ComplexArray = np.zeros(len(deviation), dtype=np.complex128) if start is None else start * (deviation > 0)
+        explained = np.zeros(len(weight)) if start is None else self.driven(waves * deviation)
+        unexplained = weigh(reading_mps2 - explained)
+        direction, before = np.zeros_like(waves), np.inf
+        for _ in range(steps):
+            residual = deviation * self.transposed(unexplained) - waves
+            preconditioned = residual / (1 + gain)
+            size = _product(residual, preconditioned)
+            if size <= 0.0:
+                break
+            direction = preconditioned + (size / before) * direction
+            image = self.driven(direction * deviation)
+            weighed = weigh(image)
+            step = size / (_product(direction, direction) + self.count * float(image @ weighed))
+            waves = waves + step * direction
+            explained = explained + step * image
+            unexplained = unexplained - step * weighed
+            before = size
         drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
         return Solution(waves, waves * deviation, explained + drift, drift, gain)
 
-    def _wave_deviations(self, spectrum: RoadSpectrum) -> Array:
+    def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
+        """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
+
+        White amplitudes are local in space, so they can be cut and shifted where elevations would get an edge.
+        """
+        white = np.fft.irfft(waves, earlier.count)
+        behind = round((self.start_m - earlier.start_m) / self.spacing_m)
+        kept = white[behind: min(earlier.count, behind + self.count)] if behind >= 0 else white[:0]
+        return np.fft.rfft(kept, self.count)
+
+    def wave_deviations(self, spectrum: RoadSpectrum) -> Array:
         """Standard deviation of each wave of the road; 0 for the mean and for waves that the time grid cannot hold."""
         psd = spectrum.psd(self.wave_number_cpm)
         psd[(self.wave_number_cpm == 0) | (self.wave_number_cpm > self._highest_cpm)] = 0.0
@@ -141,81 +166,50 @@ class Block:
 
     def _gain(self, weight: Array) -> Array:
         """Information on each wave where the road is seen, were the speeds mixed evenly along it."""
-        log_n = np.log(np.maximum(self.wave_number_cpm, WAVE_NUMBERS_CPM[0]))
-        total = np.zeros(len(log_n))
+        total = np.zeros(len(WAVE_NUMBERS_CPM))
         moving = self.moving & (weight > 0)
         for speed_class in np.unique(self._speed_class[moving]):
             power = self._grid.car.power(float(np.exp(speed_class / _SPEED_CLASSES_PER_E)))
-            seen = weight[moving & (self._speed_class == speed_class)].sum()
-            total += seen * np.interp(log_n, np.log(WAVE_NUMBERS_CPM), np.sqrt(power), right=0.0) ** 2
-        return total / max(self.seen_points(weight > 0), 1)
+            total += weight[moving & (self._speed_class == speed_class)].sum() * power
+        log_n = np.log(np.maximum(self.wave_number_cpm, WAVE_NUMBERS_CPM[0]))
+        gain: Array = np.interp(log_n, np.log(WAVE_NUMBERS_CPM), np.sqrt(total), right=0.0) ** 2
+        return gain / max(self.seen_points(weight > 0), 1)
 
     def seen(self, read: npt.NDArray[np.bool_]) -> Array:
         """(count,) 1 where the front wheel passed a point of the distance grid while there were readings, else 0."""
-        seen = np.zeros(self.count + 1)
-        reach = np.maximum(np.diff(self._low[:, 0], append=self._low[-1, 0] + 1), 1)
-        np.add.at(seen, self._low[read, 0], 1.0)
-        np.add.at(seen, np.minimum(self._low[read, 0] + reach[read], self.count), -1.0)
-        result: Array = (np.cumsum(seen)[:-1] > 0).astype(np.float64)
+        front = self._front
+        change = np.zeros(self.count + 1)
+        reach = np.maximum(np.diff(front, append=front[-1] + 1), 1)
+        np.add.at(change, front[read], 1.0)
+        np.add.at(change, np.minimum(front[read] + reach[read], self.count), -1.0)
+        result: Array = (np.cumsum(change)[:-1] > 0).astype(np.float64)
         return result
 
     def seen_points(self, read: npt.NDArray[np.bool_]) -> int:
         """How many points of the distance grid the car passed between its first and its last reading."""
         at = np.flatnonzero(read)
-        return int(self._low[at[-1], 0] - self._low[at[0], 0]) if len(at) else 0
+        return int(self._front[at[-1]] - self._front[at[0]]) if len(at) else 0
 
-    def _applied(self, waves: ComplexArray, shape: Array) -> Array:
-        """B u: the readings that a road makes."""
-        road = np.fft.irfft(waves * shape, self.count)
-        total = np.zeros(len(self._grid.by_wheel), dtype=complex)
-        for wheel in range(self._low.shape[1]):
-            low, share = self._low[:, wheel], self._share[:, wheel]
-            total += np.fft.rfft(road[low] * (1 - share) + road[low + 1] * share) * self._grid.by_wheel[:, wheel]
-        return np.fft.irfft(total, len(self._low))
+    def driven(self, road: ComplexArray) -> Array:
+        """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
+        elevation = np.fft.irfft(road * self._averaged, self.count)
+        under = np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
+        return np.fft.irfft((under * self._grid.by_axle).sum(axis=0), len(self._front))
 
-    def _transposed(self, row: Array, shape: Array) -> ComplexArray:
-        """B' times a row in time."""
-        spectrum = np.fft.rfft(row)
-        road = np.zeros(self.count)
-        for wheel in range(self._low.shape[1]):
-            low, share = self._low[:, wheel], self._share[:, wheel]
-            back = np.fft.irfft(spectrum * np.conj(self._grid.by_wheel[:, wheel]), len(row))
-            road += np.bincount(low, back * (1 - share), self.count) + np.bincount(low + 1, back * share, self.count)
-        return np.fft.rfft(road) * shape
-
-
-def _conjugate_gradients(
-    matrix: Callable[[ComplexArray], ComplexArray],
-    target: ComplexArray,
-    preconditioner: Array,
-    steps: int,
-    start: ComplexArray | None,
-) -> ComplexArray:
-    """Solve matrix x = target for a real row given by its rfft (conjugate gradients of Hestenes and Stiefel)."""
-    x = preconditioner * target if start is None else start
-    residual = target - matrix(x)
-    direction = preconditioned = preconditioner * residual
-    size = _product(residual, preconditioned)
-    for _ in range(steps):
-        if size <= 0.0:
-            break
-        image = matrix(direction)
-        step = size / _product(direction, image)
-        x = x + step * direction
-        residual = residual - step * image
-        preconditioned = preconditioner * residual
-        size, before = _product(residual, preconditioned), size
-        direction = preconditioned + (size / before) * direction
-    return x
+    def transposed(self, row: Array) -> ComplexArray:
+        """A' times a row (t,) in time, as an rfft."""
+        back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.by_axle), len(row))
+        elevation = np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count)
+        return np.fft.rfft(elevation) * self._averaged
 
 
 def _product(one: ComplexArray, other: ComplexArray) -> float:
-    """Scalar product of two real rows of even length given by their rfft, but for a constant factor."""
+    """Scalar product of two real rows of even length given by their rfft, times that length."""
     both = 2 * np.vdot(one, other).real
     return float(both - (one[0] * other[0]).real - (one[-1] * other[-1]).real)
 
 
 def _fft_length(least: float) -> int:
-    """The next 2^k or 3 2^k: quick to transform, and even."""
-    power = 1 << int(np.ceil(np.log2(least)))
-    return power * 3 // 4 if power * 3 // 4 >= least else power
+    """The next of 4, 5, 6, 7 times a power of two: quick to transform, and even."""
+    power = 1 << max(int(np.ceil(np.log2(least))) - 3, 1)
+    return next(factor * power for factor in (4, 5, 6, 7, 8) if factor * power >= least)

@@ -23,20 +23,24 @@ WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBER
 
 
 class CarResponse:
-    """One output of one car, as a function of the road under its wheels."""
+    """One output of one car, as a function of the road under its axles; left and right wheels see the same road.
+
+    ``behind_m`` (x,) is how far behind the front axle each axle stands [m], the front axle first.
+    """
 
     def __init__(self, structure: Structure, output: Output) -> None:
         self._structure = structure
         self._output = output
         self._powers: dict[int, Array] = {}
-        self.behind_m = structure.behind_m
+        self.behind_m, self._axle = np.unique(structure.behind_m, return_inverse=True)
         self.contact_patch_m = structure.contact_patch_m
 
-    def by_wheel(self, f_hz: Array) -> ComplexArray:
-        """Output per elevation under each wheel, (f, w) [1/s2]; nothing at 0 Hz and above what recorders pass."""
+    def by_axle(self, f_hz: Array) -> ComplexArray:
+        """Output per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
-        response = frequency_response(self._structure, [self._output], np.where(seen, f_hz, 1.0))[:, 0, :]
-        return np.where(seen[:, None], response, 0.0)
+        by_wheel = frequency_response(self._structure, [self._output], np.where(seen, f_hz, 1.0))[:, 0, :]
+        response = np.stack([by_wheel[:, self._axle == axle].sum(axis=1) for axle in range(len(self.behind_m))])
+        return np.where(seen, response, 0.0)
 
     def power(self, speed_mps: float) -> Array:
         """Squared gain from road to output at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.
@@ -46,13 +50,13 @@ class CarResponse:
         key = round(log(speed_mps) * _SPEEDS_PER_E)
         if key not in self._powers:
             f_hz = WAVE_NUMBERS_CPM * exp(key / _SPEEDS_PER_E)
-            delays = np.exp(-2j * np.pi * WAVE_NUMBERS_CPM[:, None] * self.behind_m)
-            gain = (self.by_wheel(f_hz) * delays).sum(axis=1) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
+            delays = np.exp(-2j * np.pi * self.behind_m[:, None] * WAVE_NUMBERS_CPM)
+            gain = (self.by_axle(f_hz) * delays).sum(axis=0) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
             self._powers[key] = np.abs(gain) ** 2
         return self._powers[key]
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def golden_car_on_grid(count: int, spacing_m: float) -> ComplexArray:
     """``golden_car_slope`` for the rfft of ``count`` elevations at this spacing [m]; kept, for there are few counts."""
     return golden_car_slope(np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64))

@@ -9,7 +9,8 @@ speed both are integrals over wave numbers: of the road's spectrum S, gain H and
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, pi, sqrt
+from functools import lru_cache
+from math import pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 _SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
 _LEVEL_TRIAL = 0.3
-_FORGETTING_M = 5.85
+_FORGOTTEN_M = 40.0
 
 
 def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> float:
@@ -126,14 +127,25 @@ def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:
 
 
 def unseen_share(seen: Array, spacing_m: float) -> Array:
-    """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0.
+    """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0."""
+    memory = _memory(spacing_m)
+    missing = np.concatenate([np.ones(len(memory)), 1.0 - seen])
+    length = len(missing) + len(memory)
+    share = np.fft.irfft(np.fft.rfft(missing, length) * np.fft.rfft(memory, length), length)
+    return np.clip(share[len(memory): len(missing)], 0.0, 1.0)
 
-    The Golden Car forgets with its body's damping: amplitude by a factor of e in 11.7 m, power in half of that.
+
+@lru_cache(maxsize=4)
+def _memory(spacing_m: float) -> Array:
+    """Where the variance of the Golden Car's slope comes from, by the way back in steps of the grid; its sum is 1.
+
+    Road slopes are nearly white, so it is the square of the response to one step of slope. Most of it comes from the
+    last metre and a half, the rest from as far as the body swings on.
     """
-    fade = exp(-spacing_m / _FORGETTING_M)
-    kernel = (1 - fade) * fade ** np.arange(int(6 * _FORGETTING_M / spacing_m))
-    missing = np.concatenate([np.ones(len(kernel)), 1.0 - seen])
-    length = len(missing) + len(kernel)
-    share = np.fft.irfft(np.fft.rfft(missing, length) * np.fft.rfft(kernel, length), length)
-    return np.clip(share[len(kernel): len(missing)], 0.0, 1.0)
-
+    count = 2 * int(_FORGOTTEN_M / spacing_m)
+    wave_number_cpm = np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64)
+    per_slope = np.zeros(len(wave_number_cpm), dtype=np.complex128)
+    per_slope[1:] = golden_car_slope(wave_number_cpm[1:]) / (2j * pi * wave_number_cpm[1:])
+    power = np.fft.irfft(per_slope, count)[: count // 2] ** 2
+    memory: Array = power / power.sum()
+    return memory

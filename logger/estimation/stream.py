@@ -33,6 +33,7 @@ from logger.estimation.sensor import Sensor
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
 
 RATE_HZ = 100.0
@@ -43,12 +44,11 @@ FAINT_BELOW = 0.2
 SLOWEST_MPS = 1.0
 _LONGEST_PIECE_M = 10.0
 _SPACING_M = 0.155
-_STEPS = 6
+_STEPS = 8
 _FIRST_SAMPLES = 1000
 _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
-_ROUNDS = 1
-_COARSE_ROUNDS = 2
+_COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 
 
 @dataclass(frozen=True)
@@ -156,6 +156,7 @@ class RoadEstimator:
         self._heard = 0
         self._samples: _Samples | None = None
         self._gaussian: Readings | None = None
+        self._solved_last: tuple[Block, ComplexArray] | None = None
         self._begun = False
         self._next = 0
         self._gathered: list[_Piece] = []
@@ -248,17 +249,19 @@ class RoadEstimator:
 
     def _solved(self, block: Block, samples: _Samples, read: Bools) -> tuple[Solution, float]:
         """The block's road and the variance of a reading, while the belief follows."""
-        rounds = _FIRST_ROUNDS if not self._begun else _COARSE_ROUNDS if self._sensor.is_coarse else _ROUNDS
-        steps = _STEPS if self._begun else _FIRST_STEPS
+        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._sensor.is_coarse else (1, _STEPS)
+        if not self._begun:
+            rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         seen_share = block.seen_points(read) / block.count
         self._begun = True
         solution: Solution | None = None
+        start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         for _ in range(rounds):
             readings = self._as_gaussian(samples)
             weight = np.where(read, 1 / readings.variance, 0.0)
-            start = None if solution is None else solution.waves
             solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, steps, start)
+            start = solution.waves
             told_waves = 2 * seen_share * float((solution.gain / (1 + solution.gain)).sum())
             moving = weight[block.moving & read]
             variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
@@ -271,6 +274,7 @@ class RoadEstimator:
                 residual = readings.value_mps2 - solution.fitted_mps2
                 self._belief = with_noise(self._belief, residual, weight, told_waves)
         assert solution is not None
+        self._solved_last = block, solution.waves
         return solution, variance
 
     def _as_gaussian(self, samples: _Samples) -> Readings:

@@ -1,0 +1,184 @@
+"""Learning of spectrum and noise against exact log evidence, and on generated roads of known spectrum."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
+from logger.estimation.block import Block, Solution, TimeGrid
+from logger.estimation.car_response import CarResponse
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
+from logger.roads import iso8608
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_point
+
+NOISE_MPS2 = 0.06
+RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+
+
+@cache
+def time_grid(count: int) -> TimeGrid:
+    return TimeGrid(CarResponse(RAV4, body_point(RAV4)), count, 100.0)
+
+
+def a_block(count: int, speed_mps: float) -> Block:
+    return Block(time_grid(count), speed_mps / 100 * np.arange(count), 0.1524, 7.62)
+
+
+def moved(spectrum: RoadSpectrum, level: float, waviness: float) -> RoadSpectrum:
+    return RoadSpectrum(spectrum.log_level + level, spectrum.waviness + waviness)
+
+
+def log_prior(spectrum: RoadSpectrum, before: RoadSpectrum | None) -> float:
+    """Deviations as the module states them: what roads are like, and how far they wander between two blocks."""
+    total = -0.5 * ((spectrum.log_level - COMMON_ROAD.log_level) / 1.8) ** 2
+    total -= 0.5 * ((spectrum.waviness - 2) / 0.3) ** 2
+    if before is not None:
+        total -= 0.5 * ((spectrum.log_level - before.log_level) / 0.3) ** 2
+        total -= 0.5 * ((spectrum.waviness - before.waviness) / 0.1) ** 2
+    return total
+
+
+@pytest.mark.parametrize("before", [None, RoadSpectrum.of_iri(3.1, 2.05)])
+def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | None) -> None:
+    """Waves each seen through noise of their own have a closed evidence; slope by differences, curvature expected."""
+    rng = np.random.default_rng(1)
+    n = np.linspace(0.004, 2.0, 400)
+    now = RoadSpectrum.of_iri(3.0, 2.1)
+    information = rng.uniform(0.1, 3.0, 400) * (0.05 / n)
+    gain = information * now.psd(n) / now.psd(np.array([0.3]))
+    power = (1 + gain) * rng.exponential(1.0, 400)  # of the reading of each wave, over its noise
+
+    def log_posterior(level: float, waviness: float) -> float:
+        there = moved(now, level, waviness)
+        g = gain * there.psd(n) / now.psd(n)
+        return float(-np.log1p(g).sum() - (power / (1 + g)).sum()) + log_prior(there, before)
+
+    count = 1000
+    waves = np.sqrt(count * power * gain) / (1 + gain)
+    nothing = np.zeros(1)
+    found = learnt(Belief(now), Solution(waves + 0j, waves + 0j, nothing, nothing, gain), n, 1.0, count, before)
+    h = 1e-4
+    slope = np.array([
+        log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
+    ]) / (2 * h)
+    tilt = -np.log(np.maximum(n, FLATTENED_BELOW_CPM) / PIVOT_CPM)
+    rows = np.stack([np.ones(400), tilt])
+    expected = (rows * (gain / (1 + gain)) ** 2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+    if before is not None:
+        expected += np.diag([0.3**-2, 0.1**-2])
+    step = np.linalg.solve(expected, slope)
+    assert np.abs(step).max() < 0.7
+    assert found.spectrum.log_level - now.log_level == pytest.approx(step[0], rel=1e-4)
+    assert found.spectrum.waviness - now.waviness == pytest.approx(step[1], rel=1e-4)
+    assert found.log_level_std == pytest.approx(np.sqrt(np.linalg.inv(expected)[0, 0]), rel=1e-6)
+
+
+def test_slope_is_that_of_the_exact_evidence_of_a_drive() -> None:
+    """log N(y; 0, B B' + noise) by dense algebra, its slope by differences; the level is put off on purpose."""
+    rng = np.random.default_rng(3)
+    block = a_block(1024, 25.0)
+    true, now = RoadSpectrum.of_iri(3.0), RoadSpectrum.of_iri(2.6, 2.05)
+    road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_deviations(true)
+    reading = block.driven(road) + rng.normal(0, NOISE_MPS2, 1024)
+    unit = np.fft.rfft(np.eye(block.count), axis=1)
+    # A apart from F, so that the matrix is built once: B B' = A S A'.
+    matrix = np.array([block.driven(row * block.wave_deviations(now)) for row in unit]).T
+    ratio = block.wave_number_cpm
+
+    def log_posterior(level: float, waviness: float) -> float:
+        there = moved(now, level, waviness)
+        shape = np.sqrt(there.psd(ratio) / now.psd(ratio))
+        scaled = np.fft.irfft(np.fft.rfft(matrix, axis=1) * shape, block.count, axis=1)
+        drift = time_grid(1024).drift
+        covariance = scaled @ scaled.T + NOISE_MPS2**2 * np.eye(1024)
+        covariance += drift @ np.diag(1 / time_grid(1024).drift_precision) @ drift.T
+        return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * reading @ np.linalg.solve(covariance, reading)
+                     + log_prior(there, None))
+
+    weight = np.full(1024, NOISE_MPS2**-2)
+    solution = block.solve(reading, weight, now, 100)
+    share = block.seen_points(weight > 0) / block.count
+    found = learnt(Belief(now), solution, block.wave_number_cpm, share, block.count, None)
+    step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
+    h = 0.02
+    slope = np.array([
+        log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
+    ]) / (2 * h)
+    told = solution.gain / (1 + solution.gain)
+    seen = solution.gain > 0
+    tilt = -np.log(np.maximum(block.wave_number_cpm[seen], FLATTENED_BELOW_CPM) / PIVOT_CPM)
+    rows = np.stack([np.ones(seen.sum()), tilt])
+    curvature = (rows * share * told[seen] ** 2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+    exact = np.linalg.solve(curvature, slope)
+    error = np.sqrt(np.diag(np.linalg.inv(curvature)))
+    assert exact[0] > 2 * error[0]  # there is something to learn
+    assert np.abs(step - exact) == pytest.approx([0.0, 0.0], abs=0.3 * error.max())
+
+
+@pytest.mark.parametrize("speed_mps", [5.0, 14.0, 30.0])
+def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
+    """Thirty roads of random amplitudes; errors over the stated standard error, and the bias of the level."""
+    count = 2048
+    rng = np.random.default_rng(round(speed_mps))
+    block = a_block(count, speed_mps)
+    weight = np.full(count, NOISE_MPS2**-2)
+    weight[:250] = 0.0
+    share = block.seen_points(weight > 0) / block.count
+    scores, wavinesses = [], []
+    for iri, waviness in ((1.0, 2.2), (3.0, 1.9), (9.0, 2.0)):
+        true = RoadSpectrum.of_iri(iri, waviness)
+        for _ in range(10):
+            road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_deviations(true)
+            reading = block.driven(road) + rng.normal(0, NOISE_MPS2, count)
+            belief, waves = Belief(COMMON_ROAD), None
+            for _ in range(8):
+                solution = block.solve(reading, weight, belief.spectrum, 8, waves)
+                waves = solution.waves
+                belief = learnt(belief, solution, block.wave_number_cpm, share, block.count, None)
+            scores.append((belief.spectrum.log_level - true.log_level) / belief.log_level_std)
+            wavinesses.append(belief.spectrum.waviness - waviness)
+    assert abs(np.mean(scores)) < 0.6
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.4
+    assert abs(np.mean(wavinesses)) < 0.08 and np.std(wavinesses) < 0.2
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
+def test_noise_is_found_from_residuals(factor: float) -> None:
+    rng = np.random.default_rng(2)
+    residual = np.sqrt(factor) * NOISE_MPS2 * rng.standard_normal(4000)
+    weight = np.full(4000, 0.0)
+    weight[500:] = NOISE_MPS2**-2
+    belief = Belief(COMMON_ROAD)
+    for _ in range(12):
+        belief = with_noise(belief, residual, weight / noise_factor(belief), 0.0)
+    assert noise_factor(belief) == pytest.approx(factor, rel=0.06)
+
+
+def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
+    belief = Belief(COMMON_ROAD)
+    for _ in range(200):
+        belief = with_noise(belief, np.zeros(1000), np.full(1000, 1e6), 900.0)
+    assert noise_factor(belief) > 0.1
+
+
+def test_nothing_read_leaves_what_roads_are_like() -> None:
+    block = a_block(1024, 15.0)
+    solution = block.solve(np.zeros(1024), np.zeros(1024), COMMON_ROAD, 4)
+    found = learnt(Belief(COMMON_ROAD), solution, block.wave_number_cpm, 0.0, block.count, None)
+    assert found.spectrum == COMMON_ROAD
+    assert found.log_level_std == pytest.approx(1.8)
+    assert with_noise(found, np.zeros(1024), np.zeros(1024), 0.0).log_noise == pytest.approx(0.0, abs=0.2)
+
+
+@pytest.mark.parametrize("waviness", [1.6, 2.0, 2.4])
+def test_a_spectrum_of_an_iri_is_that_of_the_standard(waviness: float) -> None:
+    """Gd(n) = Gd(n0) (n / n0)^-w with Gd(n0) of Eq 4.40, flat where it would grow beyond bounds."""
+    spectrum = RoadSpectrum.of_iri(2.7, waviness)
+    assert spectrum.gd_n0_cm3 == pytest.approx((2.7 / 0.5386) ** 2)
+    n = np.array([0.01, 0.1, 0.7, 3.0])
+    assert spectrum.psd(n) == pytest.approx(iso8608.displacement_psd(n, spectrum.gd_n0_cm3, waviness))
+    assert spectrum.psd(np.array([0.0, 0.005])) == pytest.approx(np.full(2, spectrum.psd(n[:1])[0]))

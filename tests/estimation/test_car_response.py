@@ -1,0 +1,63 @@
+"""The bridge from a structure to the estimator, against the models' own answers and the exact Golden Car."""
+
+import numpy as np
+import pytest
+from scipy.signal import sosfreqz
+
+from logger.estimation.car_response import (
+    HIGHEST_HZ,
+    WAVE_NUMBERS_CPM,
+    CarResponse,
+    golden_car_on_grid,
+    golden_car_slope,
+)
+from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_acceleration_response, body_point
+from logger.vehicle.vehicle import SensorPlace
+
+
+@pytest.mark.parametrize("name", ["golden-car", "rav4-2009", "rav4-2009-full"])
+@pytest.mark.parametrize("speed_mps", [4.0, 31.0])
+def test_power_is_that_of_the_car_at_a_steady_speed(name: str, speed_mps: float) -> None:
+    """Within what rounding the speed to 5 % leaves: of all power, not of each wave near a notch."""
+    car = structure_of(read_vehicle(vehicle_file(name)))
+    ahead_m = 0.0 if name == "golden-car" else 0.7
+    found = CarResponse(car, body_point(car, ahead_m)).power(speed_mps)
+    seen = WAVE_NUMBERS_CPM * speed_mps <= HIGHEST_HZ
+    exact = np.abs(body_acceleration_response(car, WAVE_NUMBERS_CPM * speed_mps, speed_mps, SensorPlace(ahead_m))) ** 2
+    road = WAVE_NUMBERS_CPM**-2.0 * WAVE_NUMBERS_CPM
+    assert (found * road)[seen].sum() == pytest.approx((exact * road)[seen].sum(), rel=0.1)
+    assert not found[WAVE_NUMBERS_CPM * speed_mps > HIGHEST_HZ * 1.03].any()
+
+
+def test_a_full_car_has_one_response_per_axle() -> None:
+    full = structure_of(read_vehicle(vehicle_file("rav4-2009-full")))
+    car = CarResponse(full, body_point(full))
+    assert car.behind_m.tolist() == [0.0, full.behind_m.max()]
+    f_hz = np.array([0.0, 1.0, 5.0, 41.0, 43.0])
+    by_axle = car.by_axle(f_hz)
+    assert by_axle.shape == (2, 5) and not by_axle[:, [0, 4]].any()
+    delays = np.exp(-2j * np.pi * car.behind_m[:, None] * f_hz / 10.0)
+    exact = body_acceleration_response(full, f_hz[1:4], 10.0) / np.sinc(f_hz[1:4] / 10.0 * full.contact_patch_m)
+    assert (by_axle * delays).sum(axis=0)[1:4] == pytest.approx(exact, rel=1e-9)
+
+
+def test_golden_car_slope_is_that_of_the_exact_filter() -> None:
+    """The exact filter on a profile of 1 mm, its tire's average and its place taken from the definition."""
+    spacing_m = 0.001
+    wave_number = np.geomspace(0.005, 3.0, 60)
+    phase = 2 * np.pi * wave_number * spacing_m
+    base = round(TIRE_BASE_M / spacing_m)
+    slope = (np.exp(1j * phase * base) - 1) / TIRE_BASE_M  # to the sample 250 mm ahead, counted at the end of the step
+    exact = sosfreqz(sections(spacing_m), phase)[1] * slope * np.exp(-1j * phase)
+    found = golden_car_slope(wave_number)
+    assert np.abs(found - exact).max() < 0.01 * np.abs(exact).max()
+    assert np.abs(found) == pytest.approx(np.abs(exact), rel=0.01)
+
+
+def test_golden_car_on_a_grid_is_kept() -> None:
+    assert golden_car_on_grid(64, 0.15) is golden_car_on_grid(64, 0.15)
+    assert golden_car_on_grid(64, 0.15) == pytest.approx(golden_car_slope(np.fft.rfftfreq(64, 0.15)))

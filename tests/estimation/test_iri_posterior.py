@@ -1,0 +1,139 @@
+"""From an estimated road to its IRI, against many simulated roads and the Golden Car's own memory."""
+
+import numpy as np
+import pytest
+from scipy.signal import sosfilt
+
+from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
+from logger.estimation.iri_posterior import (
+    SlopeErrors,
+    acceleration_variance_left,
+    raised,
+    reading_noise_psd,
+    told_share,
+    unseen_share,
+    window_iri,
+)
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.roads.golden_car import TIRE_BASE_M, sections
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_acceleration_response, body_point
+
+SPACING_M, POINTS, COUNT = 0.1524, 50, 50 * 2560
+RATE_HZ = 100.0
+RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+CAR = CarResponse(RAV4, body_point(RAV4))
+WAVES = np.fft.rfftfreq(COUNT, SPACING_M)
+
+
+def simulated(speed_mps: float, spectrum: RoadSpectrum, variance: float) -> tuple[np.ndarray, ...]:
+    """True and estimated slopes (COUNT,), true and estimated acceleration, of a long road that closes on itself.
+
+    The estimate is the textbook Wiener filter, wave by wave.
+    """
+    rng = np.random.default_rng(3)
+    road_psd = np.where(WAVES > 0, spectrum.psd(WAVES), 0.0)
+    noise_psd = 2 * variance / RATE_HZ * speed_mps
+    seen = (WAVES > 0) & (WAVES * speed_mps <= 42.0)
+    gain = np.zeros(len(WAVES), dtype=complex)
+    gain[seen] = body_acceleration_response(RAV4, WAVES[seen] * speed_mps, speed_mps)
+
+    def drawn(psd: np.ndarray) -> np.ndarray:
+        waves = rng.standard_normal(len(WAVES)) + 1j * rng.standard_normal(len(WAVES))
+        return waves * np.sqrt(psd * COUNT / (4 * SPACING_M))
+
+    road = drawn(road_psd)
+    reading = gain * road + drawn(np.full(len(WAVES), noise_psd))
+    wiener = np.conj(gain) * road_psd / (np.abs(gain) ** 2 * road_psd + noise_psd)
+    golden = golden_car_slope(WAVES)
+    rows = (golden * road, golden * wiener * reading, gain * road, gain * wiener * reading)
+    return tuple(np.fft.irfft(row, COUNT) for row in rows)
+
+
+@pytest.mark.parametrize("speed_mps", [4.5, 13.4, 31.3])
+@pytest.mark.parametrize(("iri", "waviness", "deviation"), [(1.0, 2.0, 0.06), (4.0, 1.7, 0.06), (3.0, 2.3, 0.25)])
+def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness: float, deviation: float) -> None:
+    """Variance of the slope and of the acceleration, their correlation, bias and spread of 2560 windows' IRI."""
+    spectrum = RoadSpectrum.of_iri(iri, waviness)
+    true, found, accel, fitted = simulated(speed_mps, spectrum, deviation**2)
+    knowledge = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1).at(speed_mps, spectrum, deviation**2)
+    assert knowledge.variance == pytest.approx(true.var(), rel=0.03)
+    assert knowledge.left == pytest.approx((true - found).var(), rel=0.06)  # the cut at 42 Hz falls between two waves
+    assert knowledge.told == pytest.approx(1 - (true - found).var() / true.var(), abs=0.01)
+    off = true - found
+    by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
+    assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)
+
+    noise_psd = reading_noise_psd(deviation**2, RATE_HZ, speed_mps)
+    left = acceleration_variance_left(CAR, speed_mps, spectrum, noise_psd)
+    assert left == pytest.approx((accel - fitted).var(), rel=0.05)
+
+    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
+    louder = errors.at(speed_mps, raised(spectrum), deviation**2)
+    numbers = range(COUNT // POINTS - 1)
+    windows = [slice(number * POINTS, (number + 1) * POINTS + 1) for number in numbers]
+    estimates = [window_iri(found[w], np.zeros(POINTS + 1), knowledge, louder, 0.0) for w in windows]
+    exact = np.array([1000 * np.trapezoid(np.abs(true[w])) / POINTS for w in windows])
+    estimate = np.array([one.iri_m_per_km for one in estimates])
+    std = np.array([one.own_std_m_per_km for one in estimates])
+    assert estimate.mean() == pytest.approx(exact.mean(), rel=0.015)
+    score = (estimate - exact) / std
+    assert np.sqrt(np.mean(score**2)) == pytest.approx(1.0, abs=0.06)
+    assert np.mean(np.abs(score) < 1) == pytest.approx(0.683, abs=0.03)
+    assert np.mean(np.abs(score) < 2) == pytest.approx(0.954, abs=0.02)
+
+
+def test_the_levels_error_moves_all_windows_alike() -> None:
+    """The shared part is the change of the estimate when level and told share change, times the level's error."""
+    spectrum = RoadSpectrum.of_iri(1.0)
+    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
+    dull, louder = errors.at(5.0, spectrum, 0.3**2), errors.at(5.0, raised(spectrum), 0.3**2)
+    flat, unseen = np.zeros(POINTS + 1), np.zeros(POINTS + 1)
+    found = window_iri(flat, unseen, dull, louder, 0.2)
+    more = window_iri(flat, unseen, louder, louder, 0.2)
+    rise = (more.iri_m_per_km - found.iri_m_per_km) / (raised(spectrum).log_level - spectrum.log_level)
+    assert found.shared_std_m_per_km == pytest.approx(0.2 * rise, rel=1e-9)
+    assert found.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * dull.left), rel=1e-6)
+
+
+def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
+    spectrum = RoadSpectrum.of_iri(3.0)
+    errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
+    known = errors.at(20.0, spectrum, 0.05**2)
+    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), known, known, 0.0)
+    assert blind.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * known.variance), rel=1e-6)
+    assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre
+
+
+def test_told_share_goes_from_nothing_to_all_with_the_noise() -> None:
+    spectrum = RoadSpectrum.of_iri(2.0)
+    seen = CAR.power(15.0) > 0
+    shares = [told_share(CAR, 15.0, spectrum, noise_psd)[seen] for noise_psd in (1e12, 1e-3, 1e-30)]
+    assert shares[0].max() < 1e-9 and shares[2].min() > 1 - 1e-9
+    assert ((shares[0] <= shares[1]) & (shares[1] <= shares[2])).all()
+    assert not told_share(CAR, 15.0, spectrum, 1e-3)[WAVE_NUMBERS_CPM * 15 > 45].any()
+
+
+def remembered_power(spacing_m: float) -> np.ndarray:
+    """Power of the exact filter's response to one unit of slope, 1 mm at a time, summed over steps of a grid."""
+    fine_m = spacing_m / 100
+    impulse = np.zeros(round(45.0 / fine_m))
+    impulse[: round(TIRE_BASE_M / fine_m)] = 1.0  # the tire's average, which reaches ahead by half of it
+    ahead = round(0.5 * TIRE_BASE_M / fine_m)
+    power = sosfilt(sections(fine_m), impulse)[ahead:] ** 2
+    by_step = np.add.reduceat(power, np.arange(0, len(power), 100))
+    return by_step / by_step.sum()
+
+
+@pytest.mark.parametrize("seen", ["all", "none", "from the middle on", "hole"])
+def test_unseen_share_by_direct_convolution(seen: str) -> None:
+    row = np.ones(900)
+    row[{"all": slice(0), "none": slice(None), "from the middle on": slice(450), "hole": slice(300, 340)}[seen]] = 0
+    missing = np.concatenate([np.ones(1000), 1 - row])
+    direct = np.convolve(missing, remembered_power(SPACING_M))[1000: 1000 + len(row)]
+    found = unseen_share(row, SPACING_M)
+    assert found.shape == row.shape
+    assert found == pytest.approx(direct, abs=0.07)  # a grid's step is half the way in which most is forgotten
+    assert (found >= 0).all() and (found <= 1).all()
