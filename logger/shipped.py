@@ -34,6 +34,20 @@ def vehicle_file(name: str) -> Path:
     return shipped("config") / "vehicles" / f"{name}.yaml"
 
 
+def is_path(word: str) -> bool:
+    """Whether a word that may be a path or a name of something that comes with the program is a path: it has a / in it
+    or ends in .yaml."""
+    return "/" in word or word.endswith(".yaml")
+
+
+def vehicle_path(word: str, beside: Path = Path()) -> Path:
+    """The file of a vehicle by the word that a person gave: a path (``is_path``), seen from ``beside``, or a name.
+
+    Raises BadInput for a name that is not known here. Whether there is a file at a path shows when it is read.
+    """
+    return beside / word if is_path(word) else vehicle_file(word)
+
+
 def version() -> str:
     """The version that is installed, or ``unknown`` when the program runs from a folder that was not."""
     try:

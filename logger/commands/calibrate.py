@@ -56,10 +56,11 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog calibrate``."""
     from logger.roads.calibration import loaded
     from logger.service.chain import recorder_gain
+    from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
 
     _check(args)
-    path = _vehicle_path(args.vehicle)
+    path = vehicle_path(args.vehicle)
     vehicle = read_vehicle(path)
     if args.out is not None and args.out.exists() and args.out.samefile(path):
         raise BadInput(f"--out {args.out}: expected another file than the vehicle's")
@@ -99,12 +100,6 @@ def _settings(args: argparse.Namespace) -> Settings:
         return Settings(window_m=WINDOW_M if args.window is None else args.window, seed=args.seed)
     except ValueError as error:
         raise BadInput(f"--window: {error}") from None
-
-
-def _vehicle_path(word: str) -> Path:
-    from logger.shipped import vehicle_file
-
-    return Path(word) if "/" in word or word.endswith(".yaml") else vehicle_file(word)
 
 
 # --- found or computed ---

@@ -27,6 +27,7 @@ VERBS = {
     "calibrate": "what roughness a vehicle's acceleration stands for, per speed",
     "road": "make a random road, or tell the class of a measured one",
     "simulate": "what a vehicle's accelerometer would record on a road",
+    "estimate": "IRI and profile of the road from a drive's acceleration, beside what is possible",
     "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
 }

@@ -38,8 +38,8 @@ OUTPUTS = ("wheels", "travel", "tires", "body")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--vehicle", required=True, metavar="VEHICLE",
-                        help="vehicle file, or the name of one that comes with ridelog")
+    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
+                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     road = parser.add_mutually_exclusive_group(required=True)
     road.add_argument("--profile", type=Path, metavar="FILE",
                       help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
@@ -131,12 +131,11 @@ def _check_range(name: str, value: float, lowest: float, highest: float, unit: s
 
 
 def _vehicle(name: str) -> tuple[Vehicle, Structure]:
-    from logger.shipped import vehicle_file, vehicle_names
+    from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
     from logger.vehicle.models import structure_of
 
-    is_path = name not in vehicle_names() and Path(name).exists()
-    vehicle = read_vehicle(name if is_path else vehicle_file(name))
+    vehicle = read_vehicle(vehicle_path(name))
     return vehicle, structure_of(vehicle)
 
 

@@ -1,0 +1,383 @@
+"""The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
+
+RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies in
+the folder, the estimates are compared with its exact IRI. Beside them stands the limit: what an estimator could reach
+that knew the road's spectrum, the sensor's noise and the car exactly.
+
+  ridelog estimate run --vehicle rav4-2009
+  ridelog estimate drive.csv --vehicle mycar.yaml --noise 0.1 --step 0.613 --profile-out road.csv
+
+A distance may go back by up to 1 m, as one corrected by GPS does; it is then laid anew, as the integral of speed_mps
+plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to 100 Hz.
+
+The profile holds only the wavelengths that the readings tell: it is smoother than the road, and its own IRI too low. A
+drive with holes makes several: P.csv, P-2.csv, P-3.csv. An R2 depends on how much the windows differ: the limit's is
+told for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one all along.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.estimation.limit import Limits
+    from logger.estimation.road_profile import RoadProfile
+    from logger.estimation.whole_drive import Windows
+    from logger.roads.track import Array, Track
+    from logger.vehicle.vehicle import Vehicle
+
+NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
+MIX_IRI = tuple(range(1, 11))
+BACK_M = 1.0
+_SLOWEST_RATE_HZ = 80.0
+_SPEED_CLASS_MPS = 5.0
+_NEARLY = 1e-6
+_FAR_ABOVE = 1.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder with drive.csv, or a drive.csv")
+    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
+                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
+                             "also says where the sensor sits")
+    parser.add_argument("--noise", type=float, default=NOISE_MPS2, metavar="MPS2",
+                        help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it "
+                             "blurs the steps, what is found on the way corrects it")
+    parser.add_argument("--step", type=float, default=STEP_MPS2, metavar="MPS2",
+                        help="step that readings are rounded to [m/s2] (default: 0, none)")
+    parser.add_argument("--window", type=float, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
+    parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog estimate``."""
+    from logger.shipped import vehicle_path
+    from logger.store.vehicle_file import read_vehicle
+    from logger.units import WINDOW_M
+
+    window_m = WINDOW_M if args.window is None else args.window
+    for name, value, low, high, unit in (("--noise", args.noise, 1e-4, 100.0, "m/s2"),
+                                         ("--step", args.step, 0.0, 100.0, "m/s2"),
+                                         ("--window", window_m, 1.0, 1000.0, "m")):
+        if not low <= value <= high:
+            raise BadInput(f"{name} {value:g}: expected {low:g} to {high:g} {unit}")
+    vehicle = read_vehicle(vehicle_path(args.vehicle))
+    result = estimate(args.run, vehicle, args.noise, args.step, window_m)
+    files = [] if args.profile_out is None else _write_road(args.profile_out, result)
+    if args.out is not None:
+        args.out.write_text("".join(_csv(result)), encoding="ascii")
+    print(json.dumps(as_json(result, files), allow_nan=False) if args.json else "\n".join(screen(result, files)))
+    return EXIT_DONE
+
+
+# --- the drive ---
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive as it was recorded, arrays (n,): samples at ``rate_hz``, distances that do not decrease.
+
+    relaid_m    the farthest that a distance was moved to make them so [m]; 0 where they are the file's
+    """
+
+    rate_hz: float
+    accel_z_mps2: Array
+    distance_m: Array
+    relaid_m: float
+
+
+def read_drive(run: Path) -> Drive:
+    """The drive of a run's folder, or of a file. BadInput ("file:line: expected ..., found ...") for what it cannot be.
+    """
+    import numpy as np
+
+    from logger.estimation.whole_drive import laid_anew
+    from logger.store.bounded import read_bounded
+    from logger.store.drive_file import COLUMNS, DRIVE, MAX_SPEED_MPS
+    from logger.store.number_table import parse_columns
+    from logger.store.record_file import MAX_BYTES, MAX_MPS2, even_rate_hz
+
+    file = str(run / DRIVE if run.is_dir() else run)
+    _, table = parse_columns(
+        read_bounded(file, MAX_BYTES), file,
+        lambda names: COLUMNS if all(names.count(name) == 1 for name in COLUMNS) else None,
+        f"a header with {','.join(COLUMNS)}, each once")
+    if len(table) < 2:
+        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+    time_s, accel, speed_mps, distance_m = table.T.copy()
+    rate_hz = even_rate_hz(time_s, file)
+    if rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
+        raise BadInput(f"{file}: expected at least {_SLOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}")
+    for values, name, largest in ((accel, COLUMNS[1], MAX_MPS2), (speed_mps, COLUMNS[2], MAX_SPEED_MPS)):
+        if (wild := np.abs(values) > largest).any():
+            row = int(np.argmax(wild))
+            raise BadInput(f"{file}:{row + 2}: expected {name} within {largest:g}, found {values[row]:g}")
+    _check_way(distance_m, MAX_SPEED_MPS / rate_hz, file)
+    if (np.diff(distance_m) >= 0).all():
+        return Drive(rate_hz, accel, distance_m, 0.0)
+    relaid = laid_anew(distance_m, speed_mps, rate_hz)
+    return Drive(rate_hz, accel, relaid, float(np.abs(relaid - distance_m).max()))
+
+
+def _check_way(distance_m: Array, longest_m: float, file: str) -> None:
+    """Refuse a distance that jumps, or goes back farther than a correction would take it."""
+    import numpy as np
+
+    back = distance_m < np.maximum.accumulate(distance_m) - BACK_M
+    jump = np.diff(distance_m, prepend=distance_m[0]) > longest_m + BACK_M
+    if (wrong := back | jump).any():
+        row = int(np.argmax(wrong))
+        limit = (f"at most {BACK_M:g} m before the farthest yet, {distance_m[:row].max():.10g} m" if back[row]
+                 else f"at most {longest_m + BACK_M:.4g} m after {distance_m[row - 1]:.10g} m")
+        raise BadInput(f"{file}:{row + 2}: expected a distance {limit}, found {distance_m[row]:.10g}")
+
+
+# --- what is found ---
+
+
+@dataclass(frozen=True)
+class Result:
+    """All there is to tell of a run.
+
+    exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
+    compared                whether there is a profile to compare with
+    least_error_m_per_km    (w,) r.m.s. error of the best possible values
+    """
+
+    run: Path
+    vehicle: Vehicle
+    drive: Drive
+    noise_mps2: float
+    step_mps2: float
+    window_m: float
+    windows: Windows
+    exact_m_per_km: Array
+    compared: bool
+    least_error_m_per_km: Array
+    limits: Limits
+    road: RoadProfile | None
+
+
+def estimate(run: Path, vehicle: Vehicle, noise_mps2: float, step_mps2: float, window_m: float) -> Result:
+    """Read a run, estimate its road, compare it. BadInput for files that are not what they should be."""
+    import numpy as np
+
+    from logger.estimation.limit import Limits
+    from logger.estimation.sensor import Sensor
+    from logger.estimation.whole_drive import estimated, exact_iri, least_errors, local_level, on_grid
+    from logger.store.drive_file import PROFILE, track_of
+    from logger.store.profile_file import read_profile
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.structure import body_point
+
+    structure = structure_of(vehicle)
+    output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
+    drive = read_drive(run)
+    profile = run / PROFILE
+    track = track_of(read_profile(profile)) if run.is_dir() and profile.exists() else None
+    sensor, readings, distance_m = on_grid(
+        Sensor(noise_mps2, step_mps2), drive.rate_hz, drive.accel_z_mps2, drive.distance_m)
+    windows, road = estimated(structure, output, sensor, window_m, readings, distance_m)
+    exact = np.full(len(windows.iri_m_per_km), np.nan)
+    if track is not None:
+        exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
+    limits = Limits(structure, output, sensor, window_m)
+    level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
+    return Result(run, vehicle, drive, noise_mps2, step_mps2, window_m, windows, exact, track is not None,
+                  least_errors(limits, windows.speed_mps, level), limits, road)
+
+
+def _driven(track: Track, vehicle: Vehicle) -> Array:
+    """The elevations that the sensor is compared with: of two tracks their mean for a full car, else the left one."""
+    if track.elevation_m.ndim == 1:
+        return track.elevation_m
+    return track.elevation_m.mean(axis=1) if vehicle.model == "full_car" else track.elevation_m[:, 0]
+
+
+def _write_road(path: Path, result: Result) -> list[Path]:
+    """The parts of the profile, each a file of its own."""
+    from logger.roads.track import Track
+    from logger.store.drive_file import write_profile
+
+    if result.road is None or not result.road.parts:
+        raise BadInput(f"--profile-out {path}: expected readings that tell wavelengths, over a stretch longer than the "
+                       f"longest, and {result.run} has none")
+    files = []
+    for number, part in enumerate(result.road.parts, start=1):
+        file = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+        write_profile(file, Track(part.spacing_m, part.elevation_m, part.start_m))
+        files.append(file)
+    return files
+
+
+# --- for programs ---
+
+
+def as_json(result: Result, files: list[Path]) -> dict[str, Any]:
+    """Settings, the run as a whole, per class of speed, per window; null for what is not known."""
+    drive, windows = result.drive, result.windows
+    everything = windows.speed_mps > 0
+    road = result.road
+    return {
+        "run": str(result.run), "vehicle": result.vehicle.name, "rate_hz": drive.rate_hz,
+        "noise_mps2": result.noise_mps2, "step_mps2": result.step_mps2, "window_m": result.window_m,
+        "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
+        "distance_relaid_m": drive.relaid_m, "compared": result.compared,
+        **_summary(result, everything),
+        "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
+        "shortest_wavelength_m": road.shortest_m if road else None,
+        "longest_wavelength_m": road.longest_m if road else None,
+        "profile_files": [str(file) for file in files],
+        "speeds": [{"from_mps": low, "to_mps": low + _SPEED_CLASS_MPS, **_summary(result, which)}
+                   for low, which in _speed_classes(windows)],
+        "windows": list(_rows(result)),
+    }
+
+
+def _speed_classes(windows: Windows) -> Iterator[tuple[float, Any]]:
+    import numpy as np
+
+    number = np.floor(windows.speed_mps / _SPEED_CLASS_MPS + _NEARLY).astype(int)
+    for one in np.unique(number).tolist():
+        yield one * _SPEED_CLASS_MPS, number == one
+
+
+def _summary(result: Result, which: Any) -> dict[str, Any]:
+    """Figures of the windows that are marked (w,)."""
+    import numpy as np
+
+    from logger.estimation.limit import pooled_r2
+    from logger.estimation.road_spectrum import RoadSpectrum
+    from logger.estimation.whole_drive import score
+
+    windows = result.windows
+    answered = which & np.isfinite(windows.iri_m_per_km)
+    summary: dict[str, Any] = {"window_count": int(which.sum()), "answered_count": int(answered.sum())}
+    if not answered.any():
+        return summary
+    iri, least = windows.iri_m_per_km[answered], result.least_error_m_per_km[answered]
+    speed_mps, mean = float(windows.speed_mps[answered].mean()), float(iri.mean())
+    summary |= {
+        "speed_mps": speed_mps, "iri_m_per_km": mean, "iri_min_m_per_km": float(iri.min()),
+        "iri_max_m_per_km": float(iri.max()), "iri_std_m_per_km": _rms(windows.iri_std_m_per_km[answered]),
+        "limit": {
+            "std_m_per_km": _rms(least),
+            "r2_this_road": result.limits.at(speed_mps, RoadSpectrum.of_iri(mean)).r2,
+            "r2_iri_1_to_10": pooled_r2([result.limits.at(speed_mps, RoadSpectrum.of_iri(iri)) for iri in MIX_IRI]),
+        },
+    }
+    found = score(windows, result.exact_m_per_km, which)
+    if found is not None:
+        known = answered & np.isfinite(result.exact_m_per_km)
+        squares = np.mean(result.least_error_m_per_km[known] ** 2)
+        limit_r2 = float(1 - squares / np.var(result.exact_m_per_km[known]))
+        summary["comparison"] = {**asdict(found), "limit_r2": limit_r2}
+    return summary
+
+
+def _rms(values: Array) -> float:
+    return float((values**2).mean()) ** 0.5
+
+
+def _rows(result: Result) -> Iterator[dict[str, Any]]:
+    from math import isfinite
+
+    windows = result.windows
+    columns = {
+        "distance_start_m": windows.edges_m[:-1], "distance_end_m": windows.edges_m[1:],
+        "speed_mps": windows.speed_mps, "iri_m_per_km": windows.iri_m_per_km,
+        "iri_std_m_per_km": windows.iri_std_m_per_km, "told": windows.told,
+        "limit_std_m_per_km": result.least_error_m_per_km,
+    } | ({"iri_exact_m_per_km": result.exact_m_per_km} if result.compared else {})
+    for *values, flags in zip(*(column.tolist() for column in columns.values()), windows.flags, strict=True):
+        row = {name: value if isfinite(value) else None for name, value in zip(columns, values, strict=True)}
+        yield row | {"flags": sorted(flags)}
+
+
+def _csv(result: Result) -> Iterator[str]:
+    for number, row in enumerate(_rows(result)):
+        if number == 0:
+            yield ",".join(row) + "\n"
+        *values, flags = row.values()
+        yield ",".join("" if value is None else f"{value:.7g}" for value in values) + f",{'|'.join(flags)}\n"
+
+
+# --- for a person ---
+
+
+def screen(result: Result, files: list[Path]) -> list[str]:
+    """The lines a person sees."""
+    told = as_json(result, files)
+    way_m = told["distance_end_m"] - told["distance_start_m"]
+    lines = [
+        f"{result.run}: {way_m:.0f} m in a {told['vehicle']}, "
+        f"{len(result.drive.distance_m) / told['rate_hz']:.0f} s at {told['rate_hz']:.5g} Hz; windows of "
+        f"{told['window_m']:.4g} m",
+        f"Taken for granted: noise of {told['noise_mps2']:g} m/s2 in a reading (--noise), "
+        + (f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"),
+    ]
+    if told["distance_relaid_m"]:
+        lines.append("The distance went back here and there: laid anew by the speed, "
+                     f"{told['distance_relaid_m']:.2f} m off at most.")
+    if not told["answered_count"]:
+        return [*lines, f"No IRI: {_unanswered(told) or 'not one whole window was driven'}"]
+    limit = told["limit"]
+    lines += [
+        "", f"IRI {told['iri_m_per_km']:.2f} m/km on the mean, {told['iri_min_m_per_km']:.2f} to "
+        f"{told['iri_max_m_per_km']:.2f}; {told['answered_count']} of {told['window_count']} windows"
+        + (f" ({_unanswered(told)})" if told["unanswered"] else "") + ".",
+        f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
+        f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
+        f"{limit['std_m_per_km']:.2f} m/km at {told['speed_mps']:.0f} m/s.",
+        "Wavelengths told: " + _range_words(result),
+    ]
+    if (factor := told["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
+        lines.append(f"The standard errors are {factor:.1f} times as large: there is more in the readings than this "
+                     "vehicle and this noise explain.")
+    lines += ["", *_table(told)]
+    return lines + [f"Profile: {file}" for file in files]
+
+
+def _unanswered(told: dict[str, Any]) -> str:
+    return ", ".join(f"{count} {flags.replace('|', ' and ')}" for flags, count in told["unanswered"].items())
+
+
+def _range_words(result: Result) -> str:
+    from logger.estimation.road_profile import TOLD_OVER
+
+    road = result.road
+    if road is None:
+        return f"none over {TOLD_OVER:.0%} of the way."
+    left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {TOLD_OVER:.0%} of the way); that is what "
+            f"a profile holds{left_out}.")
+
+
+def _table(told: dict[str, Any]) -> Iterator[str]:
+    """Per class of speed: the estimates, then the comparison where there is one."""
+    compared = "comparison" in told
+    yield (f"{'m/s':>10}{'windows':>9}{'answered':>10}{'IRI':>8}{'std. error':>12}{'limit':>8}"
+           + (f"   {'R2':>7}{'limit':>7}{'bias':>8}{'in 1':>7}{'in 2':>6}" if compared else ""))
+    total = [{"from_mps": None, **told}] if len(told["speeds"]) > 1 else []
+    for row in [*told["speeds"], *total]:
+        name = "all" if row["from_mps"] is None else f"{row['from_mps']:.0f} to {row['to_mps']:.0f}"
+        line = f"{name:>10}{row['window_count']:9d}{row['answered_count']:10d}"
+        if row["answered_count"]:
+            line += f"{row['iri_m_per_km']:8.2f}{row['iri_std_m_per_km']:12.3f}{row['limit']['std_m_per_km']:8.3f}"
+        if found := row.get("comparison"):
+            line += (f"   {found['r2']:7.3f}{found['limit_r2']:7.3f}{found['bias']:+8.1%}{found['within_one']:7.2f}"
+                     f"{found['within_two']:6.2f}")
+        yield line
+    if compared:
+        yield "R2 against the profile; in 1, in 2: windows within one and two standard errors (right: 0.68, 0.95)."

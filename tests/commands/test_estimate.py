@@ -1,0 +1,239 @@
+"""``ridelog estimate`` on simulated runs, whose roads are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.estimation.road_profile import band_passed
+from logger.roads import iso8608
+from logger.roads.iri import iri
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.drive_file import write_profile
+from logger.store.profile_file import read_profile
+
+ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 800, 0.05, 12), 100.0)
+CAR = "rav4-2009"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """800 m at 16 m/s."""
+    path = tmp_path_factory.mktemp("run")
+    write_profile(path / "profile.csv", ROAD)
+    assert main(["simulate", "--vehicle", CAR, "--profile", str(path / "profile.csv"), "--speed", "16", "--noise",
+                 "0.05", "--out", str(path / "drive.csv")]) == 0
+    return path
+
+
+def told(capsys: pytest.CaptureFixture[str], run: Path, *arguments: object) -> dict[str, Any]:
+    capsys.readouterr()
+    assert main(["estimate", str(run), "--vehicle", CAR, "--json", *map(str, arguments)]) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    result: dict[str, Any] = json.loads(out)
+    return result
+
+
+def read(run: Path) -> dict[str, np.ndarray]:
+    names, *_ = (run / "drive.csv").read_text().split("\n", 1)
+    table = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)
+    return dict(zip(names.split(","), table.T.copy(), strict=True))
+
+
+def write(run: Path, columns: dict[str, np.ndarray]) -> Path:
+    run.mkdir(exist_ok=True)
+    np.savetxt(run / "drive.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns),
+               comments="", fmt="%.8g")
+    return run / "drive.csv"
+
+
+def test_windows_beside_the_profile_and_the_limit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = told(capsys, folder)
+    found, limit = result["comparison"], result["limit"]
+    assert result["iri_m_per_km"] == pytest.approx(iri(ROAD.elevation_m, 0.05), rel=0.03)
+    assert abs(found["bias"]) < 0.03
+    assert found["r2"] == pytest.approx(found["limit_r2"], abs=0.06)
+    assert 0.55 < found["within_one"] < 0.85
+    assert found["within_two"] > 0.88
+    assert limit["r2_this_road"] < limit["r2_iri_1_to_10"] < 1
+    assert result["iri_std_m_per_km"] == pytest.approx(limit["std_m_per_km"], rel=0.15)
+    assert result["compared"]
+    first = result["windows"][0]
+    assert first["distance_start_m"] == pytest.approx(14 * 7.62)  # the first whole one from 100 m on
+    assert first["speed_mps"] == pytest.approx(16)
+    assert sum(row["window_count"] for row in result["speeds"]) == result["window_count"] == len(result["windows"])
+    assert [(row["from_mps"], row["to_mps"]) for row in result["speeds"]] == [(15, 20)]
+
+
+def test_the_estimated_profile_is_the_road_within_the_range_told(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = told(capsys, folder, "--profile-out", tmp_path / "road.csv")
+    assert result["profile_files"] == [str(tmp_path / "road.csv")]
+    profile = read_profile(tmp_path / "road.csv")
+    x = profile.start_m + profile.spacing_m * np.arange(len(profile.elevation_m))
+    inside = (x > 105) & (x < 895)
+    road = np.interp(x[inside], 100 + 0.05 * np.arange(len(ROAD.elevation_m)), ROAD.elevation_m)
+    shortest_m, longest_m = result["shortest_wavelength_m"], result["longest_wavelength_m"]
+    assert shortest_m < 1
+    assert longest_m > 40
+    true = band_passed(road, profile.spacing_m, shortest_m, longest_m)
+    middle = slice(round(longest_m / 2 / profile.spacing_m), -round(longest_m / 2 / profile.spacing_m))
+    found = profile.elevation_m[inside][middle]
+    assert np.corrcoef(found, true[middle])[0, 1] > 0.9
+    assert np.std(found) == pytest.approx(np.std(true[middle]), rel=0.15)
+
+
+def test_windows_as_csv(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = told(capsys, folder, "--out", tmp_path / "windows.csv", "--window", "30.48")
+    with (tmp_path / "windows.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(result["windows"])
+    for row, window in zip(rows, result["windows"], strict=True):
+        assert row["flags"] == "|".join(window.pop("flags"))
+        assert list(row) == [*window, "flags"]
+        for name, value in window.items():
+            assert row[name] == "" if value is None else float(row[name]) == pytest.approx(value, rel=1e-6)
+    assert float(rows[1]["distance_end_m"]) - float(rows[1]["distance_start_m"]) == pytest.approx(30.48)
+
+
+def test_a_drive_alone_is_estimated_without_comparison(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    alone = tmp_path / "drive.csv"
+    alone.write_bytes((folder / "drive.csv").read_bytes())
+    with_road, by_file, by_folder = told(capsys, folder), told(capsys, alone), told(capsys, tmp_path)
+    assert not by_file["compared"]
+    assert "comparison" not in by_file
+    assert "iri_exact_m_per_km" not in by_file["windows"][0]
+    for result in (by_file, by_folder):
+        assert [w["iri_m_per_km"] for w in result["windows"]] == [w["iri_m_per_km"] for w in with_road["windows"]]
+
+
+def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
+    assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
+                 "0.07", "--rate", "208", "--out", str(tmp_path / "drive.csv")]) == 0
+    result = told(capsys, tmp_path, "--noise", "0.07")
+    assert result["rate_hz"] == pytest.approx(208)
+    assert result["comparison"]["r2"] == pytest.approx(result["comparison"]["limit_r2"], abs=0.06)
+    assert abs(result["comparison"]["bias"]) < 0.03
+    assert result["limit"]["std_m_per_km"] == pytest.approx(told(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
+
+
+def test_a_distance_that_goes_back_a_little_is_laid_anew(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = read(folder)
+    columns["distance_m"] += 0.3 * (columns["t_s"].astype(int) % 2)
+    write(tmp_path, columns)
+    (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
+    result = told(capsys, tmp_path)
+    assert result["distance_relaid_m"] == pytest.approx(0.15, abs=0.03)
+    assert result["comparison"]["r2"] > told(capsys, folder)["comparison"]["r2"] - 0.08
+
+
+def test_the_screen_says_what_was_assumed_and_what_is_possible(
+    folder: Path, tmp_path: Path, ridelog: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = told(capsys, folder)
+    done = subprocess.run([ridelog, "estimate", folder, "--vehicle", vehicle_file(CAR), "--profile-out",
+                           tmp_path / "p.csv"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "noise of 0.05 m/s2 in a reading (--noise), not rounded (--step)" in done.stdout
+    assert f"IRI {result['iri_m_per_km']:.2f} m/km on the mean" in done.stdout
+    assert f"would reach R2 {result['limit']['r2_iri_1_to_10']:.3f} over roads of IRI 1 to 10" in done.stdout
+    assert f"standard error {result['limit']['std_m_per_km']:.2f} m/km at 16 m/s" in done.stdout
+    assert f"{result['comparison']['r2']:.3f}" in done.stdout
+    assert f"Profile: {tmp_path / 'p.csv'}" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) < 170
+
+
+def test_more_in_the_readings_than_is_explained_is_said(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = read(folder)
+    columns["accel_z_mps2"] += 0.4 * np.random.default_rng(3).standard_normal(len(columns["t_s"]))
+    drive = write(tmp_path, columns)
+    assert main(["estimate", str(drive), "--vehicle", CAR]) == 0
+    assert "there is more in the readings than this vehicle and this noise explain" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 5.0])
+def test_a_drive_without_a_window(speed_mps: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t = np.arange(100) / 100
+    drive = write(tmp_path, {"t_s": t, "accel_z_mps2": 0 * t, "speed_mps": 0 * t + speed_mps,
+                             "distance_m": speed_mps * t})
+    result = told(capsys, drive)
+    assert (result["window_count"], result["answered_count"], result["windows"]) == (0, 0, [])
+    assert main(["estimate", str(drive), "--vehicle", CAR, "--out", str(tmp_path / "w.csv")]) == 0
+    assert "No IRI: not one whole window was driven" in capsys.readouterr().out
+    with pytest.raises(BadInput, match=r"--profile-out .*p.csv: expected readings that tell wavelengths"):
+        main(["estimate", str(drive), "--vehicle", CAR, "--profile-out", str(tmp_path / "p.csv")])
+
+
+def test_a_road_without_any_roughness_in_places_has_a_limit_all_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "--vehicle", CAR, "--flat", "400", "--obstacle",
+                 "bump:start_m=200,height_m=0.08,width_m=3.6", "--speed", "16", "--noise", "0.05", "--out",
+                 str(tmp_path / "drive.csv"), "--profile-out", str(tmp_path / "profile.csv")]) == 0
+    result = told(capsys, tmp_path)
+    on_profile = [window for window in result["windows"] if window["iri_exact_m_per_km"] is not None]
+    assert min(window["iri_exact_m_per_km"] for window in on_profile) == pytest.approx(0, abs=1e-3)
+    assert min(window["limit_std_m_per_km"] for window in on_profile) > 0
+
+
+def refusal(run: Path, *arguments: str) -> str:
+    with pytest.raises(BadInput) as refused:
+        main(["estimate", str(run), "--vehicle", CAR, *arguments])
+    return str(refused.value)
+
+
+def test_files_that_will_not_do(folder: Path, tmp_path: Path) -> None:
+    good = {name: column[:2000] for name, column in read(folder).items()}
+    drive = tmp_path / "drive.csv"
+
+    def refused(**changed: np.ndarray) -> str:
+        write(tmp_path, good | changed)
+        return refusal(tmp_path).removeprefix(str(drive))
+
+    back, jump, fast, wild = (good[name].copy() for name in ("distance_m", "distance_m", "speed_mps", "accel_z_mps2"))
+    back[700:] -= 3.0
+    jump[700:] += 9.0
+    fast[10], wild[20] = 151.0, 2e6
+    assert refused(distance_m=back) == (f":702: expected a distance at most 1 m before the farthest yet, "
+                                        f"{back[699]:.10g} m, found {back[700]:.10g}")
+    assert refused(distance_m=jump) == (f":702: expected a distance at most 2.5 m after {jump[699]:.10g} m, "
+                                        f"found {jump[700]:.10g}")
+    assert refused(speed_mps=fast) == ":12: expected speed_mps within 150, found 151"
+    assert refused(accel_z_mps2=wild) == ":22: expected accel_z_mps2 within 1e+06, found 2e+06"
+    assert refused(t_s=good["t_s"] * 100 / 79) == ": expected at least 80 samples a second, found 79"
+    drive.write_text("t_s,accel_z_mps2,speed_mps\n0,0,0\n")
+    assert refusal(tmp_path).startswith(f"{drive}:1: expected a header with t_s,accel_z_mps2,speed_mps,distance_m")
+    drive.write_text("t_s,accel_z_mps2,speed_mps,distance_m\n0,0,0,0\n")
+    assert refusal(tmp_path) == f"{drive}:3: expected at least two samples, found the end of the file"
+    assert "expected a readable file" in refusal(tmp_path / "nothing")
+    write(tmp_path, good)
+    (tmp_path / "profile.csv").write_text("distance_m,elevation_m\n0,0\n0.5,x\n")
+    assert refusal(tmp_path).startswith(f"{tmp_path / 'profile.csv'}:3: expected a number")
+
+
+@pytest.mark.parametrize(("arguments", "complaint"), [
+    (("--noise", "0"), "--noise 0: expected 0.0001 to 100 m/s2"),
+    (("--step", "-1"), "--step -1: expected 0 to 100 m/s2"),
+    (("--window", "nan"), "--window nan: expected 1 to 1000 m"),
+    (("--vehicle", "rav5"), "no vehicle 'rav5' comes with ridelog"),
+])
+def test_wrong_use_is_one_line(folder: Path, arguments: tuple[str, ...], complaint: str) -> None:
+    assert refusal(folder, *arguments).startswith(complaint)
