@@ -126,7 +126,7 @@ class Block:
             result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
             return result
 
-        waves: ComplexArray = np.zeros(len(deviation), dtype=np.complex128) if start is None else start * (deviation > 0)
+        waves: ComplexArray = np.zeros(len(deviation), np.complex128) if start is None else start * (deviation > 0)
         explained = np.zeros(len(weight)) if start is None else self.driven(waves * deviation)
         unexplained = weigh(reading_mps2 - explained)
         direction, before = np.zeros_like(waves), np.inf
