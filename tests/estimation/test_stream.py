@@ -5,6 +5,7 @@ Readings come from the simulation in time, which shares nothing with the estimat
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ def estimated(
     found = estimator.push(reading, everywhere if usable is None else usable,
                            np.zeros(len(reading)) if at_end is None else at_end, distance_m)
     found += estimator.finish()
-    assert [one.number for one in found] == list(range(found[0].number, found[0].number + len(found))) if found else True
+    assert all(later.number == one.number + 1 for one, later in pairwise(found))
     for one in found:
         assert 0 <= one.told <= 1
         assert one.flags <= {"faint", "unsettled"}
@@ -200,7 +201,7 @@ def test_windows_come_a_few_seconds_after_they_were_driven() -> None:
         for window in estimator.push(reading[part], np.ones(50, dtype=bool), np.zeros(50), one.distance_m[part]):
             seen[window.number] = (low + 50) / 100 - (window.number + 1) * WINDOW_M / 20.0
     late = np.array([seen[number] for number in seen if number > 30])
-    assert LAG_S <= late.min() + 0.011 and late.max() < LAG_S + 2.5
+    assert late.min() > LAG_S - 0.011 and late.max() < LAG_S + 2.5
 
 
 def test_a_second_drive_is_numbered_by_its_own_distance() -> None:
