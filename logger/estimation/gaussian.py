@@ -80,7 +80,7 @@ def variance_of_mean_absolute(mean: Array, deviation: Array, correlation: Array,
     u = mean / deviation
     first = deviation * (2 * distribution(u) - 1)
     second = sqrt(2) * deviation * density(u)
-    whole = mean**2 + deviation**2 - mean_absolute(mean, deviation) ** 2
+    whole = mean**2 + deviation**2 - (sqrt(2) * second + u * first) ** 2  # its mean is as in mean_absolute
     third = np.sqrt(np.maximum(whole - first**2 - second**2, 0.0))
     total = 0.0
     for power, term in enumerate((first, second, third), start=1):
