@@ -1,4 +1,5 @@
-"""Check segment logs and recorded dumps: records good, torn or corrupt, and gaps.
+"""Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
+is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
 
 Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn last row of an open part is not wrong.
 """
@@ -17,7 +18,8 @@ _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the verb."""
-    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="a log, a dump, or a folder of them")
+    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH",
+                        help="a log, a dump, a manifest, or a folder of them")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

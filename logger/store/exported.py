@@ -8,11 +8,13 @@ as none, and the files are marked again by the next export that finds them on it
 take turns.
 
 The identity is a random number made at the first export. It names the logger's folder on every stick, so that the logs
-of two cars, which have the same names, never meet.
+of two cars, which have the same names, never meet. A card that has gone read-only or is full can still be emptied: then
+the number comes from the machine's own.
 """
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import json
@@ -29,10 +31,12 @@ from logger.store.open_folder import OpenFolder
 MARKS_NAME = "exported.json"
 LOCK_NAME = "exported.lock"
 IDENTITY_NAME = "logger-id"
+MACHINE_ID = Path("/etc/machine-id")
 MAX_BYTES = 64_000_000
 
 _IDENTITY = re.compile(rb"([0-9a-f]{12})\n")
 _FORMAT = 1
+_CARD_FAULTS = {errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
 @dataclass(frozen=True)
@@ -81,14 +85,24 @@ def mark_exported(log_folder: OpenFolder, new: Mapping[str, Mark]) -> None:
 
 
 def logger_identity(log_folder: OpenFolder) -> str:
-    """The logger's 12 hex digits, made when there are none. Raises ``OSError`` when they cannot be stored."""
+    """The logger's 12 hex digits, made when there are none. Raises ``OSError`` when there can be none."""
     known = _read_identity(log_folder)
-    if known is None:
-        with _turn(log_folder):
-            known = _read_identity(log_folder)
-            if known is None:
-                known = secrets.token_hex(6)
-                log_folder.replace(IDENTITY_NAME, f"{known}\n".encode("ascii"))
+    if known is not None:
+        return known
+    try:
+        return _make_identity(log_folder)
+    except OSError as error:
+        if error.errno not in _CARD_FAULTS:
+            raise
+        return hashlib.sha256(b"ridelog " + MACHINE_ID.read_bytes()).hexdigest()[:12]
+
+
+def _make_identity(log_folder: OpenFolder) -> str:
+    with _turn(log_folder):
+        known = _read_identity(log_folder)
+        if known is None:
+            known = secrets.token_hex(6)
+            log_folder.replace(IDENTITY_NAME, f"{known}\n".encode("ascii"))
     return known
 
 

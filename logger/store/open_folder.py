@@ -137,7 +137,7 @@ class OpenFolder:
     def write(self, blocks: Iterable[bytes]) -> tuple[str, str]:
         """Write a new file and wait until it is on the disk; give its temporary name and its SHA-256.
 
-        Raises ``OSError``, then with nothing left behind if the disk allows.
+        Raises ``OSError``, and what ``blocks`` raises, then with nothing left behind if the disk allows.
         """
         name = f"{secrets.token_hex(8)}.ridelog-tmp"
         digest = hashlib.sha256()
@@ -152,7 +152,7 @@ class OpenFolder:
                 os.fsync(descriptor)
             finally:
                 os.close(descriptor)
-        except OSError:
+        except BaseException:
             self.discard(name)
             raise
         return name, digest.hexdigest()

@@ -5,6 +5,7 @@ Solution. Every record is read the way every other reader reads it. A row that d
 corrupt, a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one
 through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
 had, so that a file cut neatly between two rows shows too. A part that ends in a torn row is simply open.
+A stick that logs were exported to is compared with the manifest that lies beside them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from drivers.dump import ACCELEROMETERS, open_dump
 from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
+from logger.store import manifest
+from logger.store.manifest import parse_manifest
+from logger.store.open_folder import OpenFolder
 from logger.store.rotation import LogName, read_sidecar
 from logger.store.segment_log import Row, scan
 from logger.units import US_PER_S
@@ -36,8 +40,8 @@ _DUMP_START = b"# ridelog-dump "
 class FileCheck:
     """What was found in one file.
 
-    kind               ``log`` or ``dump``
-    state              ``finished``, ``open`` (a part: the service may be writing to it), or ``dump``
+    kind               ``log``, ``dump`` or ``manifest``
+    state              ``finished``, ``open`` (a part: the service may be writing to it), ``dump`` or ``manifest``
     records_good       rows or events that are as they were written
     records_torn       1 when the file ends in the middle of one
     records_corrupt    lines that are damaged; a dump is read up to the first
@@ -84,16 +88,18 @@ class _Findings:
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
-    """Check files, and the logs and dumps inside folders (at any depth), in order of their names.
+    """Check files, and the logs, dumps and manifests inside folders (at any depth), in order of their names.
 
-    Raises ``BadInput`` for a path that is not there, a file that is neither log nor dump, or a folder without any.
+    Raises ``BadInput`` for a path that is not there, a file that is none of these, or a folder without any.
     """
     found = dict.fromkeys(file for path in paths for file in _files_of(path))
     logs: dict[Path, _Findings] = {}
     checks: dict[Path, FileCheck] = {}
     for path in found:
         try:
-            if _is_dump(path):
+            if path.name == manifest.NAME:
+                checks[path] = _check_manifest(path)
+            elif _is_dump(path):
                 checks[path] = _check_dump(path)
             else:
                 logs[path] = _check_log(path)
@@ -110,7 +116,8 @@ def _files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
     files = sorted(file for file in path.rglob("*")
-                   if file.is_file() and (LogName.of(file) or file.name.endswith(DUMP_ENDINGS)))
+                   if file.is_file() and not file.is_symlink()
+                   and (LogName.of(file) or file.name.endswith(DUMP_ENDINGS) or file.name == manifest.NAME))
     if not files:
         raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
     return files
@@ -225,3 +232,39 @@ def _check_dump(path: Path) -> FileCheck:
         findings.corrupt = 1
         findings.wrong(f"corrupt: {str(error).removeprefix(f'{path}:')}")
     return findings.check(path, "dump", "dump")
+
+
+def _check_manifest(path: Path) -> FileCheck:
+    """Compare the files beside a manifest with it: as listed, changed (corrupt), missing or not listed (gaps)."""
+    findings = _Findings()
+    with OpenFolder.at(path.parent) as folder:
+        try:
+            listed = parse_manifest(folder.read(manifest.NAME, manifest.MAX_BYTES)).files
+        except ValueError as error:
+            findings.corrupt = 1
+            findings.wrong(f"corrupt: {error}")
+            return findings.check(path, "manifest", "manifest")
+        present = set(folder.names())
+        for name, digest in listed.items():
+            _compare_with_manifest(findings, folder, name, digest, name in present)
+    for name in sorted(present - set(listed)):
+        if LogName.of(Path(name)) or name.endswith(DUMP_ENDINGS):
+            findings.gaps += 1
+            findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
+    return findings.check(path, "manifest", "manifest")
+
+
+def _compare_with_manifest(findings: _Findings, folder: OpenFolder, name: str, digest: str, present: bool) -> None:
+    if not present:
+        findings.gaps += 1
+        findings.wrong(f"{name}: missing")
+        return
+    try:
+        found = folder.sha256(name)
+    except OSError as error:
+        found = str(error.strerror)
+    if found == digest:
+        findings.good += 1
+    else:
+        findings.corrupt += 1
+        findings.wrong(f"{name}: corrupt: expected SHA-256 {digest}, found {found}")

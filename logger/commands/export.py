@@ -1,0 +1,125 @@
+"""Copy finished logs to a USB stick: checked, atomic, repeatable.
+
+Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
+already is read and left alone. Exit status 0: all finished logs are there; 1: some are not, and why; 2: wrong use.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
+from logger.service.config import find_config, load_config
+from logger.store.export import ExportResult, Progress, export
+from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, write_note
+
+_PULL = "it may be pulled"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog export``."""
+    phase = parser.add_mutually_exclusive_group(required=True)
+    phase.add_argument("--to", metavar="DIR", type=Path, help="the stick, or any other folder")
+    phase.add_argument("--unmounted", metavar="DIR", type=Path, help="say in the note that this stick may be pulled")
+    phase.add_argument("--removed", action="store_true", help="take the note away")
+    parser.add_argument("--from", dest="logs", metavar="LOGDIR", type=Path, help="logs (default: the service's)")
+    parser.add_argument("--dumps", action="store_true", help="also the recorded dumps")
+    parser.add_argument("--mounted", action="store_true", help="only if DIR is a mount point")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service")
+    parser.add_argument("--note", metavar="FILE", type=Path, help="keep a note for 'ridelog status' in this file")
+    parser.add_argument("--led", metavar="DIR", type=Path, help="light that shows the notes: /sys/class/leds/NAME")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog export``."""
+    board = _Board(args.note, args.led)
+    if args.removed:
+        return board.removed()
+    if args.unmounted is not None:
+        return board.unmounted(args.unmounted)
+    if args.mounted and not args.to.is_mount():
+        reason = f"{args.to}: no stick could be mounted there; expected one with FAT or exFAT"
+        board.tell("unmounting", False, reason)
+        print(reason)
+        return EXIT_CHECK_FAILED
+    board.tell("copying", True, "copying")
+    try:
+        logs = args.logs if args.logs is not None else load_config(find_config(args.config)).log.directory
+        result = export(logs, args.to, args.dumps, board.progress)
+    except RidelogError as error:
+        board.tell("unmounting", False, str(error))
+        raise
+    board.tell("unmounting", result.complete, summary(result))
+    if args.json:
+        print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
+    else:
+        print("\n".join(screen(result)))
+    return EXIT_DONE if result.complete else EXIT_CHECK_FAILED
+
+
+def summary(result: ExportResult) -> str:
+    """What happened, in one line."""
+    there = f"{len(result.copied)} files copied ({result.bytes_copied / 1e6:.1f} MB), " \
+            f"{len(result.already_there)} were there"
+    if result.complete:
+        return there
+    reason, _ = Counter(failure.reason for failure in result.failures).most_common(1)[0]
+    return f"{len(result.failures)} files NOT copied: {reason}. {there}"
+
+
+def screen(result: ExportResult) -> list[str]:
+    """The lines a person sees."""
+    lines = [f"{'ok' if result.complete else 'WRONG'}: {summary(result)}"]
+    reasons = Counter(failure.reason for failure in result.failures)
+    for reason, count in reasons.most_common():
+        first = next(failure.name for failure in result.failures if failure.reason == reason)
+        lines.append(f"    {first}{f' and {count - 1} more' if count > 1 else ''}: {reason}")
+    lines += [f"    set aside on the stick: {name}" for name in result.set_aside]
+    if result.unmarked is not None:
+        lines.append(f"    the logger does not remember this export: {result.unmarked}")
+    return lines
+
+
+class _Board:
+    """The note of one stick, and the light; both only where they were asked for."""
+
+    def __init__(self, note: Path | None, led: Path | None) -> None:
+        self._note = note
+        self._led = led
+
+    def tell(self, state: StickState, ok: bool, text: str) -> None:
+        if self._note is not None:
+            before = read_note(self._note)
+            write_note(self._note, StickNote(self._note.stem, state, ok, text))
+            if before is None or (before.state, before.ok) != (state, ok):
+                self._show()
+
+    def progress(self, progress: Progress) -> None:
+        self.tell("copying", True, f"copying, {progress.done} of {progress.total} files")
+
+    def unmounted(self, place: Path) -> int:
+        """After the unmounting: only now may the stick be pulled."""
+        before = read_note(self._note) if self._note is not None else None
+        if place.is_mount():
+            self.tell("unmounting", False, f"{place} is still mounted; shut down before pulling it")
+            return EXIT_CHECK_FAILED
+        if before is None or before.state == "copying":
+            self.tell("ready", False, f"copying did not end as it should; {_PULL}")
+        else:
+            self.tell("ready", before.ok, f"{before.text}; {_PULL}")
+        return EXIT_DONE
+
+    def removed(self) -> int:
+        if self._note is not None:
+            self._note.unlink(missing_ok=True)
+            self._show()
+        return EXIT_DONE
+
+    def _show(self) -> None:
+        if self._led is not None and self._note is not None:
+            show_on_led(self._led, self._note.parent)

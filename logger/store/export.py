@@ -1,0 +1,328 @@
+"""Finished logs copied to a stick that may be pulled at any instant, and remembered as exported when they are safe.
+
+Problem. A person plugs a stick into a car and pulls it when it suits them. What is on the stick then must be right or
+absent, what is remembered as exported must really be there, and the next try must put right what is missing. The stick
+may be full, read-only or worn, may carry other cars' logs, and may hold names that somebody prepared.
+
+Solution. Every logger has a folder of its own on the stick, ``ridelog/<identity>``. A file is written there under a
+temporary name, flushed, read back from the medium against the SHA-256 of what was read from the card, and only then
+given its name. What has the name already, and is not the same, is set aside under another name, never overwritten.
+Every few files the manifest is replaced in the same way; only what a manifest that was read back lists is marked as
+exported. So at every instant the marks are true, and a second export copies what the first one did not. Nothing is
+written when all is there, so that a stick that is write-protected by then is no fault.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import stat
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from logger.errors import BadInput
+from logger.store import manifest
+from logger.store.exported import Mark, logger_identity, mark_exported, read_marks
+from logger.store.manifest import Manifest, format_manifest, parse_manifest
+from logger.store.open_folder import OpenFile, OpenFolder
+
+FOLDER = "ridelog"
+FILES_PER_MANIFEST = 32
+ROOM_FOR_MANIFEST_BYTES = 65_536
+BYTES_PER_ENTRY = 128
+
+_LOG = re.compile(r"(\d{5,})-(\d{3,})\.(csv|json)(\.part)?")
+_DUMP = re.compile(r"(\d{5,})(-\d{3,})?\.dump(\.gz)?")
+_STICK_IS_LOST = {
+    errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOTCONN,
+    errno.ENOMEDIUM, errno.ESHUTDOWN,
+}
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A file that is not on the stick, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an export is: files looked at, of how many."""
+
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """What an export did.
+
+    logger          identity of the logger, which names its folder on the stick; None: it was not reached
+    copied          names of the files that were copied now
+    already_there   those that were there and right
+    failures        those that are not there, or not in the manifest yet
+    set_aside       new names of what was in the way on the stick
+    bytes_copied    size of the copied files
+    bytes_short     how much more room the stick would need
+    unmarked        why the card could not remember the export; None: it does
+    """
+
+    logger: str | None = None
+    copied: tuple[str, ...] = ()
+    already_there: tuple[str, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    set_aside: tuple[str, ...] = ()
+    bytes_copied: int = 0
+    bytes_short: int = 0
+    unmarked: str | None = None
+
+    @property
+    def complete(self) -> bool:
+        """True when every finished file is on the stick, right, and in its manifest."""
+        return not self.failures
+
+
+class _CardFault(Exception):
+    """The card did not give a file."""
+
+
+def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None]) -> ExportResult:
+    """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
+
+    ``tell`` is called before the first file and after each. What the stick or the card refuses is in the result.
+    Raises BadInput for folders that are not there, or lie within each other.
+    """
+    if stick.resolve().is_relative_to(logs.resolve()):
+        raise BadInput(f"{stick}: expected a place outside of the folder of logs, {logs}")
+    with _folder(logs, "with the logs") as card, _folder(stick, "to copy to, such as a mounted stick") as root:
+        names = finished_files(card, dumps)
+        try:
+            identity = logger_identity(card)
+        except OSError as error:
+            raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
+                           "service's user or with sudo") from None
+        try:
+            with root.inside(FOLDER) as common, common.inside(identity) as own:
+                if not own.lock():
+                    raise OSError(errno.EBUSY, "another export is writing to this stick")
+                return _Export(card, own, identity, tell).run(names)
+        except OSError as error:
+            reason = f"{FOLDER}/{identity} on the stick: {_reason(error)}"
+            return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
+
+
+def finished_files(card: OpenFolder, dumps: bool) -> list[str]:
+    """Names of what can be exported, oldest first; each log is followed by its sidecar.
+
+    A recording belongs to its session, and is being written while a log of that session is open.
+    """
+    present = set(card.names())
+    logs = sorted((int(match[1]), int(match[2]), match[0]) for name in present if (match := _LOG.fullmatch(name)))
+    opened = {session for session, _, name in logs if name.endswith(".part")}
+    finished = [name for _, _, name in logs
+                if not name.endswith(".part") and name.rpartition(".")[0] + ".csv" in present]
+    recordings = sorted((int(match[1]), name) for name in present if (match := _DUMP.fullmatch(name)))
+    return finished + [name for session, name in recordings if dumps and session not in opened]
+
+
+class _Export:
+    """One run: from the card's folder to the logger's own on the stick."""
+
+    def __init__(self, card: OpenFolder, stick: OpenFolder, identity: str, tell: Callable[[Progress], None]) -> None:
+        self._card = card
+        self._stick = stick
+        self._identity = identity
+        self._tell = tell
+        self._marks = read_marks(card)
+        self._listed = self._read_manifest()
+        on_stick = {name.lower() for name in stick.names()}
+        self._entries = {name: digest for name, digest in self._listed.items() if name in on_stick}
+        self._fresh: dict[str, Mark] = {}
+        self._copied: list[str] = []
+        self._there: list[str] = []
+        self._failures: list[Failure] = []
+        self._set_aside: list[str] = []
+        self._bytes = 0
+        self._unmarked: str | None = None
+
+    def run(self, names: list[str]) -> ExportResult:
+        """Everything in turn; what does not fit is left out from the end."""
+        self._stick.clean()
+        missing = self._look(names)
+        fitting, short = self._fitting(missing) if missing else ([], 0)
+        for number, name in enumerate(fitting, start=1):
+            fault = self._copy_one(name)
+            self._tell(Progress(len(names) - len(missing) + number, len(names)))
+            if fault is not None:
+                self._failures += [Failure(rest, fault) for rest in fitting[number:]]
+                break
+            if len(self._fresh) >= FILES_PER_MANIFEST:
+                self._settle()
+        reason = f"no room on the stick: {short / 1e6:.1f} MB more are needed"
+        self._failures += [Failure(name, reason) for name in missing[len(fitting):]]
+        if (fault := self._settle()) is not None:
+            self._give_up_unlisted(f"the manifest on the stick: {fault}")
+        return ExportResult(self._identity, tuple(self._copied), tuple(self._there), tuple(self._failures),
+                            tuple(self._set_aside), self._bytes, short, self._unmarked)
+
+    def _look(self, names: list[str]) -> list[str]:
+        """Those of the files that are not on the stick."""
+        missing: list[str] = []
+        for number, name in enumerate(names):
+            self._tell(Progress(number - len(missing), len(names)))
+            if not self._is_there(name):
+                missing.append(name)
+        self._tell(Progress(len(names) - len(missing), len(names)))
+        return missing
+
+    def _is_there(self, name: str) -> bool:
+        """True when the stick holds the file as the card does. Both are read, but for what a mark tells of the card."""
+        try:
+            found = self._stick.find(name)
+            with self._card.open(name) as file:
+                if found is None or found.st_size != file.stat.st_size:
+                    return False
+                known = self._marks.get(name)
+                is_known = known is not None and known.is_of(file.stat)
+                mark = known if known and is_known else _mark(file, self._card.sha256(name))
+            if self._stick.sha256(name) != mark.sha256:
+                return False
+        except OSError:
+            return False  # the copy will meet the same fault, and tell of it
+        self._there.append(name)
+        self._entries[name] = mark.sha256
+        if not is_known:
+            self._fresh[name] = mark
+        return True
+
+    def _fitting(self, names: list[str]) -> tuple[list[str], int]:
+        """The first of these files, as many as there is room for, and the bytes that the rest is short of."""
+        free, unit = self._stick.free_bytes()
+        free -= ROOM_FOR_MANIFEST_BYTES + BYTES_PER_ENTRY * (len(self._entries) + len(names))
+        fitting = []
+        for name in names:
+            free -= -(-self._size_on_card(name) // unit) * unit
+            if free >= 0:
+                fitting.append(name)
+        return fitting, max(0, -free)
+
+    def _size_on_card(self, name: str) -> int:
+        try:
+            found = self._card.find(name)
+        except OSError:
+            return 0  # the copy will meet the same fault, and tell of it
+        return found.st_size if found else 0
+
+    def _copy_one(self, name: str) -> str | None:
+        """Copy a file; give the reason when nothing more can be copied after it."""
+        try:
+            self._copy(name)
+        except _CardFault as fault:
+            self._failures.append(Failure(name, str(fault)))
+        except OSError as error:
+            self._failures.append(Failure(name, f"stick: {_reason(error)}"))
+            return f"stick: {_reason(error)}" if error.errno in _STICK_IS_LOST else None
+        return None
+
+    def _copy(self, name: str) -> None:
+        try:
+            file = self._card.open(name)
+        except OSError as error:
+            raise _CardFault(f"card: {_reason(error)}") from None
+        with file:
+            temporary, digest = self._stick.write(_from_card(file))
+            try:
+                if self._stick.sha256(temporary) != digest:
+                    raise OSError(errno.EIO, "does not read back what was written")
+                self._clear(name)
+                self._stick.rename(temporary, name)
+            except OSError:
+                self._stick.discard(temporary)
+                raise
+            self._fresh[name] = _mark(file, digest)
+            self._bytes += file.stat.st_size
+        self._entries[name] = digest
+        self._copied.append(name)
+
+    def _clear(self, name: str) -> None:
+        """Set aside what stands in the way: an older state, a damaged copy, or something that is not ours."""
+        if self._stick.find(name) is None:
+            return
+        aside = f"{name}.{secrets.token_hex(4)}.old"
+        self._stick.rename(name, aside)
+        self._set_aside.append(aside)
+
+    def _settle(self) -> str | None:
+        """Bring the manifest up to date, then remember what it lists. Gives the reason when the stick refuses."""
+        try:
+            if self._entries != self._listed:
+                self._write_manifest()
+        except OSError as error:
+            return _reason(error)
+        try:
+            if self._fresh:
+                mark_exported(self._card, self._fresh)
+        except OSError as error:
+            self._unmarked = _reason(error)
+        self._fresh = {}
+        return None
+
+    def _give_up_unlisted(self, reason: str) -> None:
+        """What no manifest lists cannot be checked at the desk: it counts as not copied."""
+        unlisted = {name for name, digest in self._entries.items() if self._listed.get(name) != digest}
+        self._failures += [Failure(name, reason) for name in sorted(unlisted)]
+        self._copied = [name for name in self._copied if name not in unlisted]
+        self._there = [name for name in self._there if name not in unlisted]
+
+    def _read_manifest(self) -> dict[str, str]:
+        """What the stick's manifest lists; nothing for one that is missing, not whole, or another logger's."""
+        try:
+            found = parse_manifest(self._stick.read(manifest.NAME, manifest.MAX_BYTES))
+        except (OSError, ValueError):
+            return {}
+        return dict(found.files) if found.logger == self._identity else {}
+
+    def _write_manifest(self) -> None:
+        text = format_manifest(Manifest(self._identity, self._entries))
+        found = self._stick.find(manifest.NAME)
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            self._clear(manifest.NAME)
+        self._stick.replace(manifest.NAME, text)
+        if self._stick.read(manifest.NAME, len(text)) != text:
+            raise OSError(errno.EIO, "does not read back what was written")
+        self._listed = dict(self._entries)
+
+
+def _from_card(file: OpenFile) -> Iterator[bytes]:
+    """The bytes of a file. Raises _CardFault where the card does not give them, or not as many as it said."""
+    rest = file.stat.st_size
+    try:
+        for block in file.blocks():
+            rest -= len(block)
+            yield block
+            if rest < 0:
+                break
+    except OSError as error:
+        raise _CardFault(f"card: {_reason(error)}") from None
+    if rest:
+        raise _CardFault("card: the file changes while it is copied")
+
+
+def _mark(file: OpenFile, digest: str) -> Mark:
+    return Mark(file.stat.st_size, file.stat.st_mtime_ns, digest)
+
+
+def _folder(path: Path, meaning: str) -> OpenFolder:
+    try:
+        return OpenFolder.at(path)
+    except OSError as error:
+        raise BadInput(f"{path}: expected a folder {meaning} ({_reason(error)})") from None
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or os.strerror(error.errno or errno.EIO)

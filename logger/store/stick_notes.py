@@ -1,0 +1,104 @@
+"""What a person at the car is told about the sticks that are plugged in: a note per stick, and a light for all.
+
+Problem. Somebody stands beside the car with a hand on the stick. They have no screen, or look once at ``ridelog
+status``; and there may be two sticks. Solution: a small file in memory per stick, written by its export and removed
+when the stick is; and one LED of the board that shows what matters most of all notes: it beats while any stick must
+stay, blinks fast when one of them did not get everything, and is steady when all may be pulled. When the last stick
+has gone the LED does again what it did before.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+FOLDER = Path("/run/ridelog-export")
+LED_MEMORY = "led-trigger"
+
+StickState = Literal["copying", "unmounting", "ready"]
+
+
+@dataclass(frozen=True)
+class StickNote:
+    """One stick.
+
+    stick    its device, such as sda1
+    state    copying; unmounting; ready: it may be pulled
+    ok       everything is on it, as far as is known
+    text     one line for the person
+    """
+
+    stick: str
+    state: StickState
+    ok: bool
+    text: str
+
+
+def write_note(path: Path, note: StickNote) -> None:
+    """Put a note, ``FOLDER/<stick>.json``, into place in one step. Raises ``OSError``."""
+    new = path.with_suffix(".new")
+    new.write_text(json.dumps(asdict(note)) + "\n", encoding="utf-8")
+    new.replace(path)
+
+
+def read_note(path: Path) -> StickNote | None:
+    """A note; None where there is none that can be read."""
+    try:
+        note = StickNote(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+    return note if note.state in get_args(StickState) else None
+
+
+def read_notes(folder: Path = FOLDER) -> list[StickNote]:
+    """All notes, by the names of their sticks."""
+    return [note for path in sorted(folder.glob("*.json")) if (note := read_note(path)) is not None]
+
+
+def show_on_led(led: Path, folder: Path) -> None:
+    """Let a light, a folder such as /sys/class/leds/ACT, show the notes of a folder.
+
+    A light that is not there, or may not be changed, shows nothing: the notes are still true. Source: Linux,
+    Documentation/leds/leds-class.rst.
+    """
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            _show(led, folder / LED_MEMORY, read_notes(folder))
+        finally:
+            os.close(descriptor)
+
+
+def _show(led: Path, memory: Path, notes: list[StickNote]) -> None:
+    if not notes:
+        if memory.exists():
+            _trigger(led, memory.read_text("ascii"))
+            memory.unlink()
+        return
+    if not memory.exists():
+        memory.write_text(_present_trigger(led), "ascii")
+    if any(note.state != "ready" for note in notes):
+        _trigger(led, "heartbeat")
+    elif all(note.ok for note in notes):
+        _trigger(led, "none")
+        (led / "brightness").write_text((led / "max_brightness").read_text("ascii"), "ascii")
+    else:
+        _trigger(led, "timer")
+        for phase in ("delay_on", "delay_off"):
+            (led / phase).write_text("100", "ascii")
+
+
+def _present_trigger(led: Path) -> str:
+    """The kernel lists all triggers and puts the present one into brackets."""
+    listed = (led / "trigger").read_text("ascii").split()
+    return next((word.strip("[]") for word in listed if word.startswith("[")), "none")
+
+
+def _trigger(led: Path, name: str) -> None:
+    (led / "trigger").write_text(name, "ascii")
