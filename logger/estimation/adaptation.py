@@ -14,7 +14,6 @@ from math import exp
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.block import Solution
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
 
 Array = npt.NDArray[np.float64]
@@ -30,6 +29,8 @@ _WAVINESS_STEP = 0.1
 _NOISE_DEVIATION = 0.5
 _LEAST_LOG_NOISE = -2.0  # a sensor that hangs must not be taken for one without noise
 _LARGEST_STEP = 0.7
+_BAND_SHARE = 0.76  # recorders are flat to 38 of 50 Hz
+_SECOND = 100
 
 
 @dataclass(frozen=True)
@@ -42,23 +43,17 @@ class Belief:
 
 
 def learnt(
-    belief: Belief,
-    solution: Solution,
-    wave_number_cpm: Array,
-    seen_share: float,
-    count: int,
-    before: RoadSpectrum | None,
+    belief: Belief, power: Array, told: Array, wave_number_cpm: Array, seen_share: float, before: RoadSpectrum | None
 ) -> Belief:
     """One scoring step for level and waviness.
 
-    solution      of a stretch, solved with ``belief``
+    power         (k,) of each wave of the white innovations, where 1 is expected of a wave that is fully told
+    told          (k,) share of each wave that the readings tell where the road was read
     seen_share    of the distance grid, where the car was read
-    count         of points of the distance grid
     before        the spectrum of the stretch before; None: there was none
     """
-    used = solution.gain > 0
-    told = (solution.gain / (1 + solution.gain))[used]
-    power = np.abs(solution.waves[used]) ** 2 / count
+    used = told > 0
+    power, told = power[used], told[used]
     tilt = -np.log(np.maximum(wave_number_cpm[used], FLATTENED_BELOW_CPM) / PIVOT_CPM)
     slopes = np.stack([np.ones(len(tilt)), tilt])
     gradient = slopes @ (power - seen_share * told)
@@ -83,14 +78,27 @@ def _priors(before: RoadSpectrum | None) -> list[tuple[RoadSpectrum, tuple[float
 
 
 def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: float) -> Belief:
-    """One scoring step for the noise.
+    """One scoring step for the noise, from the typical second: a pothole that is not explained yet is no noise.
 
-    residual_mps2    (t,) readings less what the solution explains
+    residual_mps2    (t,) readings less what the solution explains, 100 a second
     weight           (t,) that they had, with ``belief``
-    told_waves       how many readings' worth the road took: twice the sum of g / (1 + g) over seen waves
+    told_waves       how many readings' worth the road took: twice the sum of told shares over seen waves
+
+    Only what recorders pass is looked at: noise that was thinned out to 100 Hz has nothing above.
     """
-    free = max(float(np.count_nonzero(weight)) - told_waves, 1.0)
-    gradient = 0.5 * (float(weight @ residual_mps2**2) - free) - belief.log_noise / _NOISE_DEVIATION**2
+    waves = np.fft.rfft(residual_mps2 * (weight > 0))
+    waves[int(len(waves) * _BAND_SHARE):] = 0.0
+    in_band = weight * np.fft.irfft(waves, len(weight)) ** 2
+    seconds = len(weight) // _SECOND
+    sums = in_band[-seconds * _SECOND:].reshape(seconds, _SECOND).sum(axis=1)
+    counts = (weight[-seconds * _SECOND:] > 0).reshape(seconds, _SECOND).sum(axis=1)
+    if not (counts > _SECOND // 2).any():
+        return belief
+    typical = float(np.median((sums / np.maximum(counts, 1))[counts > _SECOND // 2]))
+    in_band_count = _BAND_SHARE * float(np.count_nonzero(weight))
+    free = max(in_band_count - told_waves, 1.0)
+    excess = typical * in_band_count / (_BAND_SHARE * free) - 1
+    gradient = 0.5 * free * excess - belief.log_noise / _NOISE_DEVIATION**2
     step = gradient / (0.5 * free + _NOISE_DEVIATION**-2.0)
     log_noise = belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
     return replace(belief, log_noise=max(log_noise, _LEAST_LOG_NOISE))

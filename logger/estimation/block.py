@@ -5,13 +5,13 @@ over it with the speed as it was, so the rear axle meets the road a wheelbase la
 road has a spectrum. The best estimate is that of a Kalman smoother or a Wiener filter; with changing speed neither is
 a fixed filter.
 
-Solution. The road is written r = F u with u white (amplitudes of its waves, each divided by its standard deviation).
-Then the estimate solves (I + B' W B) u = B' W y with B = A F and W the weights of the readings (one over their
-variance, 0 where there is none). A is quick to apply: waves to elevations by an inverse FFT, elevations to those under
-each axle by interpolation, and from there to the reading by an FFT in time; its transpose likewise. At constant
-speed the matrix is nearly diagonal in u, which is the Wiener filter, and makes a preconditioner with which a few
-steps of conjugate gradients are enough. Slow drift (gravity, tilt, braking, temperature) is a few cosines of broad
-variance, eliminated exactly.
+Solution. The road is written r = F v: F shapes its spectrum, and the innovations v are white, but for a variance D that
+may differ from place to place. Then the estimate solves (1/D + B' W B) v = B' W y with B = A F and W the weights of the
+readings (one over their variance, 0 where there is none). A is quick to apply: waves to elevations by an inverse FFT,
+elevations to those under each axle by interpolation, and from there to the reading by an FFT in time; its transpose
+likewise. At constant speed and with D = 1 the matrix is nearly diagonal in the waves of v, which is the Wiener filter,
+and makes a preconditioner with which a few steps of conjugate gradients are enough. Slow drift (gravity, tilt, braking,
+temperature) is a few cosines of broad variance, eliminated exactly.
 
 Both grids are periodic. In space the road goes on unseen for longer than it remembers; in time the first
 ``ENTRY_S`` are where the car's memory of what came before dies, and their readings must have no weight.
@@ -43,11 +43,11 @@ _DRIFT_MPS2 = 0.05
 
 @dataclass(frozen=True)
 class Solution:
-    """waves     (k,) rfft of the white amplitudes u
-    road         (k,) rfft of the elevations on the distance grid [m]
+    """waves     (k,) rfft of the innovations v on the distance grid
+    road         (k,) rfft of the elevations there [m]
     fitted_mps2  (t,) the readings that this road and the drift explain
     drift_mps2   (t,) the drift alone
-    gain         (k,) information over prior for each wave; g / (1 + g) of its variance is told by the readings
+    gain         (k,) information over prior of each wave where D is 1; the readings tell g / (1 + g) of its variance
     """
 
     waves: ComplexArray
@@ -107,17 +107,24 @@ class Block:
         self._speed_class = np.round(np.log(np.maximum(speed_mps, SLOWEST_MPS)) * _SPEED_CLASSES_PER_E).astype(int)
 
     def solve(
-        self, reading_mps2: Array, weight: Array, spectrum: RoadSpectrum, steps: int, start: ComplexArray | None = None
+        self,
+        reading_mps2: Array,
+        weight: Array,
+        spectrum: RoadSpectrum,
+        relative_variance: Array,
+        steps: int,
+        start: ComplexArray | None = None,
     ) -> Solution:
         """The most probable road.
 
         reading_mps2    (t,) readings
         weight          (t,) one over the variance of each, 0 where there is none [(m/s2)-2]
+        relative_variance    (count,) of the road at each point, about 1
         steps           of conjugate gradients (Hestenes and Stiefel), from ``start`` or from a flat road
         start           ``waves`` of an earlier solution of this block to go on from, or ``carried_over`` ones
         """
-        deviation = self.wave_deviations(spectrum)
-        gain = self._gain(weight) * deviation**2
+        factor = self.wave_factors(spectrum)
+        gain = self._gain(weight) * np.abs(factor) ** 2
         weighted = weight[:, None] * self._grid.drift
         inner = np.linalg.inv(self._grid.drift.T @ weighted + np.diag(self._grid.drift_precision))
 
@@ -126,43 +133,54 @@ class Block:
             result: Array = weight * row - weighted @ (inner @ (weighted.T @ row))
             return result
 
-        waves: ComplexArray = np.zeros(len(deviation), np.complex128) if start is None else start * (deviation > 0)
-        explained = np.zeros(len(weight)) if start is None else self.driven(waves * deviation)
+        def unlikely(waves: ComplexArray) -> ComplexArray:
+            """Prior precision times the innovations: the inverse of their variance from point to point."""
+            return np.fft.rfft(np.fft.irfft(waves, self.count) / relative_variance)
+
+        waves: ComplexArray = np.zeros(len(factor), np.complex128) if start is None else start * (factor != 0)
+        explained = np.zeros(len(weight)) if start is None else self.driven(waves * factor)
+        held = unlikely(waves)
         unexplained = weigh(reading_mps2 - explained)
         direction, before = np.zeros_like(waves), np.inf
         for _ in range(steps):
-            residual = deviation * self.transposed(unexplained) - waves
+            residual = np.conj(factor) * self.transposed(unexplained) - held
             preconditioned = residual / (1 + gain)
             size = _product(residual, preconditioned)
             if size <= 0.0:
                 break
             direction = preconditioned + (size / before) * direction
-            image = self.driven(direction * deviation)
+            image, holding = self.driven(direction * factor), unlikely(direction)
             weighed = weigh(image)
-            step = size / (_product(direction, direction) + self.count * float(image @ weighed))
+            step = size / (_product(direction, holding) + self.count * float(image @ weighed))
             waves = waves + step * direction
+            held = held + step * holding
             explained = explained + step * image
             unexplained = unexplained - step * weighed
             before = size
         drift = self._grid.drift @ (inner @ (weighted.T @ (reading_mps2 - explained)))
-        return Solution(waves, waves * deviation, explained + drift, drift, gain)
+        return Solution(waves, waves * factor, explained + drift, drift, gain)
 
     def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
 
-        White amplitudes are local in space, so they can be cut and shifted where elevations would get an edge.
+        Innovations are local, so they can be cut and shifted where elevations would get an edge.
         """
         white = np.fft.irfft(waves, earlier.count)
         behind = round((self.start_m - earlier.start_m) / self.spacing_m)
         kept = white[behind: min(earlier.count, behind + self.count)] if behind >= 0 else white[:0]
         return np.fft.rfft(kept, self.count)
 
-    def wave_deviations(self, spectrum: RoadSpectrum) -> Array:
-        """Standard deviation of each wave of the road; 0 for the mean and for waves that the time grid cannot hold."""
+    def wave_factors(self, spectrum: RoadSpectrum) -> ComplexArray:
+        """F: from white innovations to elevations [m]; 0 for the mean and for waves that the time grid cannot hold.
+
+        A quarter of a wave behind, as an integral is: where the waviness is 2, innovations are the road's slope, so
+        that what is rough at one place is an innovation at that place.
+        """
         psd = spectrum.psd(self.wave_number_cpm)
         psd[(self.wave_number_cpm == 0) | (self.wave_number_cpm > self._highest_cpm)] = 0.0
-        deviation: Array = np.sqrt(psd / (2 * self.spacing_m))
-        return deviation
+        factor: ComplexArray = -1j * np.sqrt(psd / (2 * self.spacing_m))
+        factor[-1] = 0.0  # the shortest wave of the grid has no quarter
+        return factor
 
     def _gain(self, weight: Array) -> Array:
         """Information on each wave where the road is seen, were the speeds mixed evenly along it."""

@@ -86,15 +86,24 @@ class SlopeErrors:
 
 @dataclass(frozen=True)
 class WindowIri:
-    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level, ``shared`` with neighbours."""
+    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level, ``shared`` with neighbours.
+
+    change_per_m    how much the IRI of a window a metre further on is higher [m/km per m]
+    """
 
     iri_m_per_km: float
     own_std_m_per_km: float
     shared_std_m_per_km: float
+    change_per_m: float
 
 
 def window_iri(
-    slope: Array, unseen: Array, knowledge: SlopeKnowledge, louder: SlopeKnowledge, log_level_std: float
+    slope: Array,
+    unseen: Array,
+    knowledge: SlopeKnowledge,
+    louder: SlopeKnowledge,
+    log_level_std: float,
+    length_m: float,
 ) -> WindowIri:
     """IRI of the window whose estimated slopes are given from edge to edge.
 
@@ -103,17 +112,20 @@ def window_iri(
     knowledge        at the window's speed
     louder           the same for the ``raised`` spectrum
     log_level_std    standard error of the road's log level
+    length_m         of the window [m]
     """
     weight = np.full(len(slope), 1 / (len(slope) - 1))
     weight[[0, -1]] *= 0.5
     deviation = _deviation(knowledge, unseen)
-    mean = float(weight @ mean_absolute(slope, deviation))
+    absolute = mean_absolute(slope, deviation)
+    mean = float(weight @ absolute)
     own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
     # Were the level higher, more of the readings would be taken for road, and more be left open.
     stretched = slope * (louder.told / max(knowledge.told, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
     shared = (more - mean) / _LEVEL_TRIAL * log_level_std
-    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * abs(shared))
+    change = float(absolute[-1] - absolute[0]) / length_m
+    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * abs(shared), PER_KM * change)
 
 
 def raised(spectrum: RoadSpectrum) -> RoadSpectrum:

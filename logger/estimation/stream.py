@@ -9,8 +9,8 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from math import ceil, hypot, nan, sqrt
+from dataclasses import dataclass, replace
+from math import ceil, hypot, log, nan, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from logger.estimation.iri_posterior import (
     unseen_share,
     window_iri,
 )
+from logger.estimation.local_roughness import LocalRoughness, mean_told
+from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.rounding import Readings, bounds, first_guess, improved
 from logger.estimation.sensor import Sensor
 from logger.vehicle.structure import Output, Structure
@@ -42,7 +44,9 @@ HOP_SAMPLES = 200
 LAG_S = 4.0
 FAINT_BELOW = 0.2
 SLOWEST_MPS = 1.0
+SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
 _LONGEST_PIECE_M = 10.0
+_REMEMBERED_M = 6.0
 _SPACING_M = 0.155
 _STEPS = 8
 _FIRST_SAMPLES = 1000
@@ -157,6 +161,7 @@ class RoadEstimator:
         self._samples: _Samples | None = None
         self._gaussian: Readings | None = None
         self._solved_last: tuple[Block, ComplexArray] | None = None
+        self._local = LocalRoughness(self._spacing_m)
         self._begun = False
         self._next = 0
         self._gathered: list[_Piece] = []
@@ -242,8 +247,9 @@ class RoadEstimator:
             if low < 0 or speed_mps is None:
                 piece = _nothing(self._why_none(samples, number))
             else:
-                piece = self._piece(slope[inside], unseen[inside], speed_mps, variance)
-                self._give_road(number, elevation[inside], speed_mps, variance)
+                spectrum, log_level_std = self._level_at(number)
+                piece = self._piece(slope[inside], unseen[inside], speed_mps, variance, spectrum, log_level_std)
+                self._give_road(number, elevation[inside], speed_mps, variance, spectrum)
             estimates += self._window(number, piece)
         return estimates
 
@@ -254,25 +260,29 @@ class RoadEstimator:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         seen_share = block.seen_points(read) / block.count
+        seen, first = block.seen(read), round(block.start_m / self._spacing_m)
         self._begun = True
         solution: Solution | None = None
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         for _ in range(rounds):
             readings = self._as_gaussian(samples)
             weight = np.where(read, 1 / readings.variance, 0.0)
-            solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, steps, start)
+            local = self._local.at(first, block.count).variance
+            solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, local, steps, start)
             start = solution.waves
-            told_waves = 2 * seen_share * float((solution.gain / (1 + solution.gain)).sum())
+            innovations = np.fft.irfft(solution.waves, block.count)
+            white = np.fft.rfft(innovations / np.sqrt(local))
+            told = mean_told(solution.gain, local[seen > 0])
+            self._local.learn(first, innovations, local, solution.gain, seen)
             moving = weight[block.moving & read]
             variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
-            self._belief = learnt(
-                self._belief, solution, block.wave_number_cpm, seen_share, block.count, before
-            )
+            power = np.abs(white) ** 2 / block.count
+            self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
             if self._sensor.is_coarse:
                 self._improve(samples, block, solution, variance)
             else:
                 residual = readings.value_mps2 - solution.fitted_mps2
-                self._belief = with_noise(self._belief, residual, weight, told_waves)
+                self._belief = with_noise(self._belief, residual, weight, 2 * seen_share * float(told.sum()))
         assert solution is not None
         self._solved_last = block, solution.waves
         return solution, variance
@@ -305,13 +315,28 @@ class RoadEstimator:
         gone = (number + 1) * self._piece_m <= samples.distance_m[0]
         return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"
 
-    def _piece(self, slope: Array, unseen: Array, speed_mps: float, variance: float) -> _Piece:
+    def _level_at(self, number: int) -> tuple[RoadSpectrum, float]:
+        """The spectrum of the road under a piece and shortly before it, and the standard error of its log level."""
+        back = round(_REMEMBERED_M / self._spacing_m)
+        local = self._local.at(number * self._points - back, back + self._points + 1)
         spectrum = self._belief.spectrum
+        there = replace(spectrum, log_level=spectrum.log_level + log(float(local.variance.mean())))
+        return there, sqrt(self._belief.log_level_std**2 + float(local.log_error.mean()))
+
+    def _piece(
+        self,
+        slope: Array,
+        unseen: Array,
+        speed_mps: float,
+        variance: float,
+        spectrum: RoadSpectrum,
+        log_level_std: float,
+    ) -> _Piece:
         knowledge = self._errors.at(speed_mps, spectrum, variance)
         louder = self._errors.at(speed_mps, raised(spectrum), variance)
         told = knowledge.told * (1 - float(unseen.mean()))
         missing = "" if told >= FAINT_BELOW else "faint" if knowledge.told < FAINT_BELOW else "unsettled"
-        return _Piece(window_iri(slope, unseen, knowledge, louder, self._belief.log_level_std), told, missing)
+        return _Piece(window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m), told, missing)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
         """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
@@ -328,19 +353,23 @@ class RoadEstimator:
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
-        return [WindowEstimate(number // self._pieces_per_window, mean, hypot(own, shared), told, flags)]
+        misplaced = self._place_std_m * sum(one.change_per_m for one in iri) / len(iri)
+        return [WindowEstimate(number // self._pieces_per_window, mean, hypot(own, shared, misplaced), told, flags)]
 
-    def _give_road(self, number: int, elevation: Array, speed_mps: float, variance: float) -> None:
+    def _give_road(
+        self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum
+    ) -> None:
         if self._on_road is None:
             return
         noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        told = WAVE_NUMBERS_CPM[told_share(self._car, speed_mps, self._belief.spectrum, noise_psd) > 0.5]
+        seen = told_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
+        told = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
         shortest_m, longest_m = (1 / told[-1], 1 / told[0]) if len(told) else (nan, nan)
         self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
 
 
 def _nothing(missing: str) -> _Piece:
-    return _Piece(WindowIri(nan, nan, nan), 0.0, missing)
+    return _Piece(WindowIri(nan, nan, nan, nan), 0.0, missing)
 
 
 def _mean_step_m(samples: _Samples) -> float:
