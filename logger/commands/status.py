@@ -11,6 +11,7 @@ from pathlib import Path
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, process_exists, read_status, trouble
+from logger.store.stick_notes import FOLDER, StickNote, read_notes
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
 _JOURNAL = "See why: journalctl -u ridelog -n 50"
@@ -25,12 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     status = read_status(load_config(find_config(args.config)).status_file)
     fault = trouble(status, time.monotonic_ns() // 1000, status is not None and process_exists(status.pid))
+    notes = read_notes(FOLDER)
     if args.json:
         known = {} if status is None else asdict(status)
-        print(json.dumps({"running": fault is None, "trouble": fault, **known}))
+        sticks = [asdict(note) for note in notes]
+        print(json.dumps({"running": fault is None, "trouble": fault, "sticks": sticks, **known}))
     else:
-        print("\n".join(screen(status, fault)))
+        print("\n".join([*stick_lines(notes), *screen(status, fault)]))
     return EXIT_DONE if fault is None else EXIT_CHECK_FAILED
+
+
+def stick_lines(notes: list[StickNote]) -> list[str]:
+    """What each stick that is plugged in is doing, and whether it may be pulled."""
+    return [f"stick {note.stick}: {'' if note.ok else 'WRONG, '}{note.text}"
+            f"{'' if note.state == 'ready' else '; leave it in'}" for note in notes]
 
 
 def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:

@@ -1,0 +1,118 @@
+"""The command: what it prints and returns, and the note that it keeps from the first file to the pulled stick."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.commands.status import stick_lines
+from logger.store.exported import exported_names
+from logger.store.stick_notes import read_note
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    folder = tmp_path / "log"
+    folder.mkdir()
+    for name in ("00001-001.csv", "00001-001.json", "00001.dump"):
+        (folder / name).write_text("content\n")
+    return folder
+
+
+@pytest.fixture
+def stick(tmp_path: Path) -> Path:
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
+def note(tmp_path: Path) -> Path:
+    (tmp_path / "notes").mkdir()
+    return tmp_path / "notes" / "sda1.json"
+
+
+def told(note: Path) -> str:
+    read = read_note(note)
+    assert read is not None
+    line, = stick_lines([read])
+    return line
+
+
+def test_a_person_is_told_what_was_copied(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for said in ("ok: 2 files copied (0.0 MB), 0 were there\n", "ok: 0 files copied (0.0 MB), 2 were there\n"):
+        assert main(["export", "--from", str(logs), "--to", str(stick)]) == 0
+        assert capsys.readouterr().out == said
+    assert exported_names(logs) == {"00001-001.csv", "00001-001.json"}
+
+
+def test_a_program_gets_one_object(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--dumps", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["complete"] is True
+    assert said["copied"] == ["00001-001.csv", "00001-001.json", "00001.dump"]
+    assert said["failures"] == said["already_there"] == []
+    assert (stick / "ridelog" / said["logger"] / "00001.dump").is_file()
+
+
+def test_the_logs_are_those_of_the_settings(
+        logs: Path, stick: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "ridelog.yaml").write_text("log:\n  directory: log\n")
+    assert main(["export", "--config", str(tmp_path / "ridelog.yaml"), "--to", str(stick)]) == 0
+    assert "2 files copied" in capsys.readouterr().out
+
+
+def test_what_could_not_be_copied_is_told_with_its_reason(
+        logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (stick / "ridelog").write_text("a file where a folder should be\n")
+    assert main(["export", "--from", str(logs), "--to", str(stick)]) == 1
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("WRONG: 2 files NOT copied: ridelog/")
+    assert second.startswith("    00001-001.csv and 1 more: ridelog/")
+    assert first.endswith("on the stick: Not a directory. 0 files copied (0.0 MB), 0 were there")
+
+
+@pytest.mark.parametrize("arguments", [[], ["--to"], ["--to", "a", "--removed"], ["--to", "a", "--unmounted", "b"]])
+def test_wrong_use_is_status_2(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as leaving:
+        main(["export", *arguments])
+    assert leaving.value.code == 2
+
+
+def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path, stick: Path, note: Path) -> None:
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 0
+    assert told(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; leave it in"
+    assert main(["export", "--unmounted", str(stick), "--note", str(note)]) == 0
+    assert told(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; it may be pulled"
+    assert main(["export", "--removed", "--note", str(note)]) == 0
+    assert not note.exists()
+    assert main(["export", "--removed", "--note", str(note)]) == 0
+
+
+def test_a_stick_that_could_not_be_mounted_is_not_written_to(logs: Path, stick: Path, note: Path) -> None:
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--mounted", "--note", str(note)]) == 1
+    assert list(stick.iterdir()) == []
+    main(["export", "--unmounted", str(stick), "--note", str(note)])
+    assert told(note).startswith("stick sda1: WRONG, ")
+    assert told(note).endswith("expected one with FAT or exFAT; it may be pulled")
+
+
+def test_a_stick_that_is_still_mounted_must_stay(note: Path) -> None:
+    assert main(["export", "--unmounted", "/proc", "--note", str(note)]) == 1
+    assert told(note).endswith("leave it in")
+
+
+def test_a_copy_that_was_killed_is_not_called_complete(stick: Path, note: Path) -> None:
+    note.write_text('{"stick": "sda1", "state": "copying", "ok": true, "text": "copying, 1 of 9 files"}')
+    main(["export", "--unmounted", str(stick), "--note", str(note)])
+    assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+
+
+def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, tmp_path: Path) -> None:
+    (tmp_path / "ridelog.yaml").write_text("log: 7\n")
+    with pytest.raises(Exception, match="expected a mapping"):
+        main(["export", "--config", str(tmp_path / "ridelog.yaml"), "--to", str(stick), "--note", str(note)])
+    assert "expected a mapping" in told(note)

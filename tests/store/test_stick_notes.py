@@ -1,0 +1,84 @@
+"""Notes and the light. The light is a folder of plain files; the kernel's list of triggers is put in by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from logger.store.stick_notes import StickNote, StickState, read_note, read_notes, show_on_led, write_note
+
+COPYING = StickNote("sda1", "copying", True, "copying, 1 of 4 files")
+DONE = StickNote("sda1", "ready", True, "4 files copied; it may be pulled")
+FAILED = StickNote("sdb1", "ready", False, "no room; it may be pulled")
+
+
+@pytest.fixture
+def led(tmp_path: Path) -> Path:
+    folder = tmp_path / "leds" / "ACT"
+    folder.mkdir(parents=True)
+    (folder / "trigger").write_text("none kbd-scrolllock timer heartbeat [mmc0] default-on\n")
+    (folder / "max_brightness").write_text("255\n")
+    (folder / "brightness").write_text("0\n")
+    return folder
+
+
+@pytest.fixture
+def notes(tmp_path: Path) -> Path:
+    folder = tmp_path / "notes"
+    folder.mkdir()
+    return folder
+
+
+def put(notes: Path, *all_notes: StickNote) -> None:
+    for path in notes.glob("*.json"):
+        path.unlink()
+    for note in all_notes:
+        write_note(notes / f"{note.stick}.json", note)
+
+
+def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
+    put(notes, FAILED, COPYING)
+    assert read_notes(notes) == [COPYING, FAILED]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"stick": 1}', '{"stick":"a","state":"x","ok":true,"text":""}'])
+def test_what_is_no_note_is_none(notes: Path, text: str) -> None:
+    (notes / "sda1.json").write_text(text)
+    assert read_note(notes / "sda1.json") is None
+    assert read_notes(notes) == []
+    assert read_notes(notes / "missing") == []
+
+
+def shown(led: Path, notes: Path, *all_notes: StickNote) -> str:
+    put(notes, *all_notes)
+    show_on_led(led, notes)
+    return (led / "trigger").read_text()
+
+
+def test_the_light_goes_from_beating_to_steady_and_back_to_what_it_was(led: Path, notes: Path) -> None:
+    assert shown(led, notes, COPYING) == "heartbeat"
+    assert shown(led, notes, DONE) == "none"
+    assert (led / "brightness").read_text().strip() == "255"
+    assert shown(led, notes) == "mmc0"
+    assert list(notes.iterdir()) == []
+
+
+def test_with_two_sticks_the_light_shows_what_matters_more(led: Path, notes: Path) -> None:
+    assert shown(led, notes, COPYING, FAILED) == "heartbeat"
+    assert shown(led, notes, DONE, FAILED) == "timer"
+    assert (led / "delay_on").read_text() == (led / "delay_off").read_text() == "100"
+    assert shown(led, notes, DONE) == "none"
+    assert shown(led, notes) == "mmc0"
+
+
+@pytest.mark.parametrize("state", ["copying", "unmounting"])
+def test_a_stick_that_failed_beats_until_it_is_unmounted(led: Path, notes: Path, state: StickState) -> None:
+    assert shown(led, notes, StickNote("sda1", state, False, "x")) == "heartbeat"
+
+
+def test_a_light_that_is_not_there_is_no_fault(tmp_path: Path, notes: Path) -> None:
+    put(notes, COPYING)
+    show_on_led(tmp_path / "none", notes)
+    show_on_led(tmp_path / "none", tmp_path / "no notes")
+    assert read_notes(notes) == [COPYING]
