@@ -13,18 +13,19 @@ Anything else that is not as it should be is a ``DumpError`` that names file, li
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import zlib
 from binascii import unhexlify
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from drivers.disk import FileSystem
 from drivers.errors import DumpError
 
 VERSION = "1"
@@ -47,6 +48,8 @@ _SOURCE_OF = {name.encode(): name for name in SOURCES}
 _BLOCK_BYTES = 65536
 _GZIP_MAGIC = b"\x1f\x8b"
 _GZIP_WBITS = 31  # zlib: a window of 2^15 bytes with a gzip wrapper
+_MEMBER = bytes.fromhex("1f8b0800000000000003")  # how zlib begins a gzip member: no name, no time, Unix
+_TAIL_BYTES = 1 << 18
 
 
 class Event(NamedTuple):
@@ -199,20 +202,34 @@ class DumpReader:
 
 
 class DumpWriter:
-    """Records events into a new file, compressed when its name ends in ``.gz``.
+    """Records events into a new file, compressed when ``.gz`` is among the endings of its name.
 
-    Events are buffered until ``flush`` or until a block is full; a kill loses at most what came after the last
-    flush. Raises ``FileExistsError`` rather than overwrite a recording, and other ``OSError`` of the disk.
+    Events are kept back until ``flush`` or until a block is full; a kill loses at most what came after the last flush.
+    Each flush of a compressed file ends a gzip member, whose check value covers all that came since the one before:
+    so what is damaged in a file that was cut off can be told from what is not (``intact_bytes``). The price is a
+    fifth more bytes than one stream.
+
+    Raises ``FileExistsError`` rather than overwrite a recording, and other ``OSError`` of the disk. After one of those
+    nothing more can be recorded; ``abandon`` lets go of the file.
     """
 
-    def __init__(self, path: str | os.PathLike[str], header: DumpHeader) -> None:
+    def __init__(self, path: str | os.PathLike[str], header: DumpHeader, files: FileSystem | None = None) -> None:
         first = f"# ridelog-dump {VERSION} {json.dumps(asdict(header), allow_nan=False)}\n"
-        self._file = io.BufferedWriter(io.FileIO(path, "x"))
-        self._engine = zlib.compressobj(wbits=_GZIP_WBITS) if Path(path).suffix == ".gz" else None
+        self._files = files or FileSystem()
+        self._is_packed = ".gz" in Path(path).suffixes
+        self._engine: zlib._Compress | None = None
         self._pending = [first]
         self._pending_chars = 0
         self._last_us = 0
-        self.flush(sync=False)
+        self._descriptor: int | None = self._files.create(Path(path), new=True)
+        try:
+            self.flush(sync=True)
+            self._files.sync_directory(Path(path).parent)
+        except OSError:
+            self.abandon()
+            with suppress(OSError):
+                self._files.remove(Path(path))
+            raise
 
     def write(self, event: Event) -> None:
         """Add an event. Raises ``ValueError`` for one that no reader would accept: an unknown source, a time
@@ -227,33 +244,90 @@ class DumpWriter:
         self._pending.append(line)
         self._pending_chars += len(line)
         if self._pending_chars >= _BLOCK_BYTES:
-            self._hand_over()
+            self._put(self._packed())
 
     def flush(self, sync: bool) -> None:
         """Hand everything so far to the system; with ``sync`` wait until it is on the disk."""
-        self._hand_over()
+        data = self._packed()
         if self._engine is not None:
-            self._file.write(self._engine.flush(zlib.Z_SYNC_FLUSH))
-        self._file.flush()
-        if sync:
-            os.fsync(self._file.fileno())
+            data += self._engine.flush()
+            self._engine = None
+        self._put(data)
+        if sync and self._descriptor is not None:
+            self._files.sync(self._descriptor)
 
     def close(self) -> None:
         """End the recording and wait until it is on the disk. Closing twice does nothing."""
-        if self._file.closed:
-            return
-        self._hand_over()
-        if self._engine is not None:
-            self._file.write(self._engine.flush(zlib.Z_FINISH))
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
+        if self._descriptor is not None:
+            self.flush(sync=True)
+            descriptor, self._descriptor = self._descriptor, None
+            self._files.close(descriptor)
 
-    def _hand_over(self) -> None:
+    def abandon(self) -> None:
+        """Let go of the file as it stands, whatever the disk says."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            with suppress(OSError):
+                self._files.close(descriptor)
+
+    def _packed(self) -> bytes:
         text = "".join(self._pending).encode("ascii")
         self._pending.clear()
         self._pending_chars = 0
-        self._file.write(text if self._engine is None else self._engine.compress(text))
+        if not (self._is_packed and text):
+            return text
+        if self._engine is None:
+            self._engine = zlib.compressobj(wbits=_GZIP_WBITS)
+        return self._engine.compress(text)
+
+    def _put(self, data: bytes) -> None:
+        if self._descriptor is None:
+            raise ValueError("expected a recording that is open")
+        if data:
+            self._files.write(self._descriptor, data)
+
+
+def intact_bytes(path: Path) -> int:
+    """How far a compressed recording that was cut off is intact, from its begin to the end of a gzip member [bytes].
+
+    It is looked at from its end, for only what was not yet on the disk can be torn. Raises ``OSError``.
+    """
+    size = path.stat().st_size
+    looked = _TAIL_BYTES
+    with path.open("rb") as file:
+        while True:
+            file.seek(max(0, size - looked))
+            tail = file.read()
+            end = _last_member_end(tail)
+            if end or looked >= size:
+                return size - len(tail) + end if end else 0
+            looked *= 4
+
+
+def _last_member_end(tail: bytes) -> int:
+    """The end of the last intact gzip member of an unbroken row of them; 0 when there is none."""
+    begin = tail.find(_MEMBER)
+    while begin >= 0:
+        end = begin
+        while (after := _member_end(tail, end)) is not None:
+            end = after
+        if end > begin:
+            return end
+        begin = tail.find(_MEMBER, begin + 1)
+    return 0
+
+
+def _member_end(data: bytes, begin: int) -> int | None:
+    """Where the gzip member that begins here ends; None when it is cut off or does not fit its check value."""
+    engine = zlib.decompressobj(wbits=_GZIP_WBITS)
+    rest = data[begin:]
+    try:
+        while rest and not engine.eof:
+            engine.decompress(rest, _BLOCK_BYTES)
+            rest = engine.unconsumed_tail
+    except zlib.error:
+        return None
+    return len(data) - len(engine.unused_data) if engine.eof else None
 
 
 def _parse_header(path: Path, lines: list[bytes]) -> DumpHeader:

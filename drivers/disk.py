@@ -1,0 +1,63 @@
+"""The few ways in which recordings and logs change the disk.
+
+Problem. What happens to a file when the power goes, the card is full or dies can only be tested if every change to the
+disk can be watched, cut off or refused. Solution. Whoever writes in the car does so through a ``FileSystem``; a test
+hands in one that fails. Every method raises ``OSError`` for what the system refuses.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+class FileSystem:
+    """The disk as it is."""
+
+    def create(self, path: Path, new: bool = False) -> int:
+        """Open an empty file for writing; give its descriptor. ``new``: raise ``FileExistsError`` where one is."""
+        flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | (os.O_EXCL if new else os.O_TRUNC)
+        return os.open(path, flags, 0o644)
+
+    def write(self, descriptor: int, data: bytes) -> None:
+        """Hand all bytes to the system."""
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(descriptor, rest):]
+
+    def sync(self, descriptor: int) -> None:
+        """Wait until the file is on the disk. After an error nobody knows what of it is: never try again."""
+        os.fsync(descriptor)
+
+    def close(self, descriptor: int) -> None:
+        os.close(descriptor)
+
+    def cut(self, path: Path, size: int) -> None:
+        """Leave so many bytes of a file and wait until they are on the disk."""
+        descriptor = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
+        try:
+            os.ftruncate(descriptor, size)
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def rename(self, source: Path, target: Path) -> None:
+        """Give a file another name, in place of the file that had it."""
+        source.rename(target)
+
+    def remove(self, path: Path) -> None:
+        """Remove a file, if it is there."""
+        path.unlink(missing_ok=True)
+
+    def sync_directory(self, directory: Path) -> None:
+        """Wait until the names in a folder are on the disk."""
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def free_bytes(self, directory: Path) -> int:
+        """Room for files of this user on the disk that holds a folder."""
+        there = os.statvfs(directory)
+        return there.f_bavail * there.f_frsize
