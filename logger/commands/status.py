@@ -10,7 +10,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.service.config import find_config, load_config
-from logger.service.status import SensorStatus, ServiceStatus, process_exists, read_status, trouble
+from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
 from logger.store.stick_notes import FOLDER, StickNote, read_notes
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
@@ -48,8 +48,9 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
         return [fault or "", "", "What to do", *(f"  {line}" for line in (_START, _JOURNAL))]
     words = {"starting": "is starting", "standing": "is ready; the car stands", "recording": "is recording",
              "stopping": "is stopping"}
+    writes = f", but writes NOTHING: {status.storage.trouble}" if status.storage.trouble else ""
     lines = [
-        f"ridelog {words[status.state]}, up {_span(status.uptime_s)}",
+        f"ridelog {words[status.state]}{writes}, up {_span(status.uptime_s)}",
         "",
         _sensor_line("accelerometer", status.accelerometer, "samples"),
         _sensor_line("GPS", status.gps, _fix_words(status)),
@@ -64,13 +65,35 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
 
 def advice(status: ServiceStatus) -> list[str]:
     """What a person can do about what is wrong, most urgent first; one line that all is well when nothing is."""
-    steps = [*_sensor_advice("accelerometer", status.accelerometer), *_sensor_advice("GPS", status.gps)]
+    steps = [
+        *_storage_advice(status.storage),
+        *_sensor_advice("accelerometer", status.accelerometer),
+        *_sensor_advice("GPS", status.gps),
+    ]
     if status.gps.state == "ok" and not status.fix_valid:
         steps.append("GPS: no fix. Give the antenna a free view of the sky; the first fix can take some minutes.")
     if status.free_bytes is not None and status.free_bytes < _LITTLE_ROOM_BYTES:
         steps.append(f"Disk: {status.free_bytes / 1e6:.0f} MB left in {status.log_directory}. Copy the finished logs "
                      "away and delete them.")
     return steps or ["Nothing: all is well."]
+
+
+def _storage_advice(storage: StorageStatus) -> list[str]:
+    steps = []
+    if storage.trouble:
+        cure = ("Copy the logs away (plug in the USB stick, or ridelog export) and delete what was copied; if it says "
+                "so again, the card is dying: replace it")
+        steps.append(f"Log: not written for {_span(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
+                     f"wait in memory and are lost if the power goes. {cure}.")
+    if storage.rows_lost:
+        steps.append(f"Log: {storage.rows_lost} rows were lost while they could not be written.")
+    if storage.recording_trouble:
+        steps.append(f"Raw bytes: not recorded: {storage.recording_trouble}. Export the dumps and delete them, or set "
+                     "record_dump: false.")
+    if storage.dumps_lost:
+        steps.append(f"Raw bytes: {storage.dumps_lost} dumps were removed, unexported, to make room for logs. Export "
+                     "more often, or set record_dump: false.")
+    return steps
 
 
 def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:

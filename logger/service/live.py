@@ -4,6 +4,8 @@ Each source has a thread of its own that does nothing but look at its device at 
 got, with the time, into a queue. The main loop empties the queue twice a second, brings the events into
 order of time, records them if asked to, feeds the core, and tells systemd and the status file how things stand.
 So a slow card or a slow window never delays a sample, and a pipeline that hangs stops feeding the watchdog.
+What was written is synced at every second round: a row is on the disk half a second after it was made, or later where
+``sync_s`` allows it.
 """
 
 from __future__ import annotations
@@ -16,10 +18,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from drivers.dump import DumpWriter, Event
+from drivers.dump import Event
 from logger.service.core import Core
+from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
-from logger.store.rotation import SegmentLog
 from logger.units import US_PER_S
 
 LOOP_S = 0.5
@@ -113,8 +115,7 @@ class LiveService:
     def __init__(
         self,
         core: Core,
-        segment_log: SegmentLog,
-        recorder: DumpWriter | None,
+        storage: Storage,
         listeners: list[Listener],
         events: deque[Event],
         sync_s: float,
@@ -122,14 +123,14 @@ class LiveService:
         beat: Callable[[int], None],
     ) -> None:
         self._core = core
-        self._log = segment_log
-        self._recorder = recorder
+        self._storage = storage
         self._listeners = listeners
         self._events = events
         self._sync_us = round(sync_s * US_PER_S)
         self._beat_us = round(beat_s * US_PER_S)
         self._beat = beat
         self._floor_us = 0
+        self._unsynced_us: int | None = None
 
     def run(self, stop: threading.Event) -> None:
         """Until ``stop`` is set; then finish the current window and close the files."""
@@ -138,13 +139,12 @@ class LiveService:
             listener.start()
         gc.collect()
         gc.freeze()
-        synced_us = beat_us = monotonic_us()
+        beat_us = monotonic_us()
         while not stop.wait(LOOP_S):
             now_us = monotonic_us()
             self._move(now_us - HOLD_BACK_US)
-            if now_us - synced_us >= self._sync_us:
-                synced_us = now_us
-                self._sync()
+            self._sync(now_us)
+            self._storage.tend()
             if now_us - beat_us >= self._beat_us:
                 beat_us = now_us
                 self._beat(now_us)
@@ -155,7 +155,7 @@ class LiveService:
             listener.stop()
         self._move(monotonic_us())
         self._core.finish()
-        self._record(lambda recorder: recorder.close())
+        self._storage.close()
 
     def _move(self, until_us: int) -> None:
         """Take the events up to ``until_us``; later ones wait, for another source may still bring earlier ones.
@@ -177,22 +177,16 @@ class LiveService:
         if event.t_us < self._floor_us:
             event = event._replace(t_us=self._floor_us)
         self._floor_us = event.t_us
-        self._record(lambda recorder: recorder.write(event))
+        self._storage.record(event)
         self._core.feed(event)
 
-    def _sync(self) -> None:
-        self._log.sync()
-        self._record(lambda recorder: recorder.flush(sync=True))
-
-    def _record(self, act: Callable[[DumpWriter], None]) -> None:
-        """Do something with the recorder. A recording that cannot go on must not stop the log."""
-        if self._recorder is None:
-            return
-        try:
-            act(self._recorder)
-        except OSError as error:
-            log.error("recording stopped: %s", error)
-            self._recorder = None
+    def _sync(self, now_us: int) -> None:
+        """Sync in time: what was written since the last sync must not be older than ``sync_s`` in the next round."""
+        if self._unsynced_us is None:
+            self._unsynced_us = now_us
+        if now_us + LOOP_S * US_PER_S - self._unsynced_us > self._sync_us:
+            self._unsynced_us = None
+            self._storage.sync()
 
 
 def _time_of(event: Event) -> int:

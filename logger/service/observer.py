@@ -14,9 +14,9 @@ from logger.service.core import Core
 from logger.service.live import Deadlines, monotonic_us
 from logger.service.pipeline import Pipeline
 from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
+from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.shipped import version
-from logger.store.rotation import SegmentLog
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 HEALTH_LINE_US = 60 * US_PER_S
@@ -33,7 +33,7 @@ class Observer:
         self,
         config: Config,
         core: Core,
-        segment_log: SegmentLog,
+        storage: Storage,
         pipeline: Pipeline,
         accelerometer: Supervisor,
         gps: Supervisor,
@@ -42,7 +42,7 @@ class Observer:
     ) -> None:
         self._config = config
         self._core = core
-        self._log = segment_log
+        self._storage = storage
         self._pipeline = pipeline
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
@@ -82,11 +82,13 @@ class Observer:
         """The state in one line."""
         distance_km = self._pipeline.odometer.total_m / 1000.0
         sensors = ", ".join(f"{name} {part.state()}" for name, part in self._sensors.items())
-        return f"{sensors}, {self._core.rows} rows, {distance_km:.1f} km"
+        trouble = f", NOT WRITING: {self._storage.log.trouble}" if self._storage.log.trouble else ""
+        return f"{sensors}, {self._core.rows} rows, {distance_km:.1f} km{trouble}"
 
     def snapshot(self, now_us: int) -> ServiceStatus:
         """Everything that ``ridelog status`` shows."""
         fix = self._core.last_fix
+        storage = self._storage.status()
         return ServiceStatus(
             state=self._state(now_us),
             pid=os.getpid(),
@@ -99,11 +101,12 @@ class Observer:
             satellites=fix.satellites if fix else None,
             utc_known=self._core.utc_known,
             log_directory=str(self._config.log.directory),
-            current_file=self._log.path.name,
-            rows_written=self._core.rows,
+            current_file=self._storage.log.file_name,
+            rows_written=self._core.rows - storage.rows_waiting - storage.rows_lost,
             distance_m=self._pipeline.odometer.total_m,
             free_bytes=_free_bytes(str(self._config.log.directory)),
             last_window=self._core.last_record,
+            storage=storage,
             counters={
                 "missed_samples": self._deadlines.missed,
                 "late_samples": self._pipeline.late_samples,

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from drivers.dump import DumpWriter, Event, open_dump
+from drivers.dump import Event, open_dump
 from drivers.hardware import open_i2c, open_serial
 from drivers.ports import I2cBus
 from drivers.replay import RecordedBus
@@ -23,9 +23,10 @@ from logger.service.live import Deadlines, Listener, LiveService, gather, monoto
 from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
 from logger.service.sources import Bma220Source, SerialSource, Source
+from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.store.folder_lock import FolderLock
-from logger.store.rotation import SegmentLog, next_session, repair
+from logger.store.space import Limits
 from logger.store.vehicle_file import read_vehicle
 from logger.units import US_PER_S
 
@@ -35,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 def serve(config: Config, stop: threading.Event) -> None:
-    """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError for a failing card."""
+    """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError where no folder can be."""
     _make(config.log.directory)
     with FolderLock(config.log.directory):
         _serve(config, stop)
@@ -44,15 +45,12 @@ def serve(config: Config, stop: threading.Event) -> None:
 def _serve(config: Config, stop: threading.Event) -> None:
     sensor = assemble.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
-    directory = config.log.directory
-    for repaired in repair(directory):
-        log.info("repaired %s", repaired)
-    session = next_session(directory)
-    segment_log = SegmentLog(directory, session, assemble.sidecar(config, sensor, vehicle), config.log.max_file_bytes)
-    recorder = _recorder(config, session)
+    facts = assemble.sidecar(config, sensor, vehicle)
+    header = assemble.dump_header(config) if config.log.record_dump else None
+    storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, Limits(), monotonic_us)
     decoder = assemble.gps_decoder(config)
     pipeline = assemble.pipeline(config, sensor, vehicle)
-    core = Core(sensor.decoder, decoder, pipeline, segment_log)
+    core = Core(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
     deadlines = Deadlines(US_PER_S // (100 * sensor.oversample))
     accelerometer = Supervisor(_accelerometer(config), monotonic_us)
@@ -60,7 +58,7 @@ def _serve(config: Config, stop: threading.Event) -> None:
     pace = deadlines.wait if config.accelerometer.driver == "bma220" else gather
     listeners = [Listener(accelerometer, events, pace), Listener(gps, events, gather)]
     counters = {"accelerometer": sensor.counters, "gps": lambda: asdict(decoder.counters)}
-    observer = Observer(config, core, segment_log, pipeline, accelerometer, gps, counters, deadlines)
+    observer = Observer(config, core, storage, pipeline, accelerometer, gps, counters, deadlines)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
@@ -70,9 +68,8 @@ def _serve(config: Config, stop: threading.Event) -> None:
         notifier.status(observer.line())
 
     notifier.ready()
-    log.info("logging to %s, session %05d", directory, session)
     beat_s = min(LONGEST_BEAT_S, watchdog_interval_s() or LONGEST_BEAT_S)
-    LiveService(core, segment_log, recorder, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
+    LiveService(core, storage, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
     notifier.stopping()
     observer.remove()
     log.info("stopped: %d rows written", core.rows)
@@ -84,14 +81,13 @@ def _make(directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
     except (PermissionError, NotADirectoryError, FileExistsError) as error:
         raise BadInput(f"{directory}: expected a folder for the logs ({error.strerror})") from None
-    if not os.access(directory, os.W_OK | os.X_OK):
+    if not (os.access(directory, os.W_OK | os.X_OK) or _is_read_only(directory)):
         raise BadInput(f"{directory}: expected a folder that the service may write to")
 
 
-def _recorder(config: Config, session: int) -> DumpWriter | None:
-    if not config.log.record_dump:
-        return None
-    return DumpWriter(config.log.directory / f"{session:05d}.dump.gz", assemble.dump_header(config))
+def _is_read_only(directory: Path) -> bool:
+    """True for a disk that was mounted read-only, as a failing one is: that is no wrong setting, and may pass."""
+    return bool(os.statvfs(directory).f_flag & os.ST_RDONLY)
 
 
 def _accelerometer(config: Config) -> Source:

@@ -50,6 +50,32 @@ class SensorStatus:
 
 
 @dataclass(frozen=True)
+class StorageStatus:
+    """How the disk takes what the service writes.
+
+    trouble             why no rows can be written at the moment; empty: all is well
+    since_s             for how long [s]
+    rows_waiting        rows kept in memory until they can be written
+    rows_lost           rows that were given up, for more did not fit the memory
+    failures            how often the disk refused
+    recording_trouble   why no raw bytes are recorded though the settings want it
+    room_bytes          what may still be written: up to the quota, down to the floor of free space
+    exported_removed    files removed to make room, of which a stick holds a copy
+    dumps_lost          dumps removed to make room for logs though they had not been exported
+    """
+
+    trouble: str = ""
+    since_s: float = 0.0
+    rows_waiting: int = 0
+    rows_lost: int = 0
+    failures: int = 0
+    recording_trouble: str = ""
+    room_bytes: int = 0
+    exported_removed: int = 0
+    dumps_lost: int = 0
+
+
+@dataclass(frozen=True)
 class ServiceStatus:
     """All that ``ridelog status`` knows.
 
@@ -58,8 +84,9 @@ class ServiceStatus:
     updated_t_us    monotonic time of this snapshot [us]
     fix_valid       the receiver vouches for its last fix; None: there was none yet
     utc_known       rows carry true time
-    current_file    the open log file; None between drives
+    current_file    the open log file; None while none can be written
     rows_written    rows since the start of the service, in all files
+    storage         how the disk takes them
     distance_m      travelled since the start of the service [m]
     free_bytes      room left where the logs are; None: not known
     last_window     the newest row; None before the first
@@ -82,6 +109,7 @@ class ServiceStatus:
     distance_m: float = 0.0
     free_bytes: int | None = None
     last_window: WindowRecord | None = None
+    storage: StorageStatus = StorageStatus()
     counters: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -104,6 +132,7 @@ def read_status(path: Path) -> ServiceStatus | None:
             fields["last_window"] = WindowRecord(**{**window, "flags": tuple(window["flags"])})
         fields["accelerometer"] = _sensor(fields["accelerometer"])
         fields["gps"] = _sensor(fields["gps"])
+        fields["storage"] = StorageStatus(**fields["storage"])
         status = ServiceStatus(**fields)
     except FileNotFoundError:
         return None

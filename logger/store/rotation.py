@@ -6,23 +6,37 @@ have no UTC, and a Pi has no clock from which files could take their names.
 
 Solution. Names come from a session number that is never used again: ``<session>-<part>.csv.part`` while open,
 ``.csv`` when finished, with a sidecar ``.json`` beside it. A part is only ever appended to. It is finished by a
-rename: of itself, when nothing in it needs to change, else of a rewritten copy (UTC filled in, damaged lines left
-out) which is on the disk before it takes the name, and only then the part is removed. So at every instant there is
-either the part or the finished file, and ``repair`` at the next start makes the step that was missing.
+rename: of itself, when all of it was synced and nothing in it needs to change, else of a rewritten copy (UTC filled in,
+damaged lines left out) which is on the disk before it takes the name, and only then the part is removed. So at every
+instant there is either the part or the finished file, and ``repair`` at the next start makes the step that was missing.
 Every change to the disk goes through ``FileSystem``, so that tests can cut between any two of them.
+
+What is promised, whatever is cut and wherever (``tests/bench/crash.py`` tries it):
+
+1. A row that ``sync`` returned for is in the folder, once, in every later instant. The service syncs each row within
+   a second of its window being finished; a process that is killed loses no row at all that it had handed over.
+2. No damaged row is ever taken for good: a row counts only with its CRC-32.
+3. After the next start every file is finished and beside its sidecar, its rows follow one another without a gap but
+   where the disk itself lost them, and no session number is given twice.
+4. Where the disk refuses (full, failing, read-only), what was on it stays, and rows go on in a part of their own as
+   soon as it takes them: what a failed write or sync left behind is never counted as written.
+
+The disk has to keep its side: what fsync returned for stays, and a rename happens or does not. ext4 as on a Raspberry
+Pi does; FAT does not promise the second, nor that a cut leaves no old content of the disk in a new file.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.store.segment_log import HEADER, format_row, scan
 
@@ -34,43 +48,6 @@ _LOG_NAME = re.compile(r"(\d{5,})-(\d{3,})\.csv(\.part)?")
 _OWN_TEMPORARY = re.compile(r"(\d{5,}-\d{3,}\.(csv|json)|" + COUNTER_NAME + r")\.tmp")
 _SESSION_NAME = re.compile(r"(\d{5,})[-.]")
 _BLOCK_ROWS = 256
-
-
-class FileSystem:
-    """The few ways in which logs change the disk."""
-
-    def create(self, path: Path) -> int:
-        """Open an empty file for writing; give its descriptor."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
-
-    def write(self, descriptor: int, data: bytes) -> None:
-        """Hand all bytes to the system."""
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(descriptor, rest):]
-
-    def sync(self, descriptor: int) -> None:
-        """Wait until the file is on the disk."""
-        os.fsync(descriptor)
-
-    def close(self, descriptor: int) -> None:
-        os.close(descriptor)
-
-    def rename(self, source: Path, target: Path) -> None:
-        """Give a file another name, in place of the file that had it."""
-        source.rename(target)
-
-    def remove(self, path: Path) -> None:
-        """Remove a file, if it is there."""
-        path.unlink(missing_ok=True)
-
-    def sync_directory(self, directory: Path) -> None:
-        """Wait until the names in a folder are on the disk."""
-        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 @dataclass(frozen=True)
@@ -103,21 +80,27 @@ class Tally:
     unset            those of them without UTC
     damaged_lines    lines that are not intact; the torn one is not among them
     torn_tail        the file ends in the middle of a row
+    repeated         intact rows that stand in the next part too; they are not among ``rows``
     """
 
     rows: int = 0
     unset: int = 0
     damaged_lines: int = 0
     torn_tail: bool = False
+    repeated: int = 0
 
 
 @dataclass(frozen=True)
 class Repaired:
-    """What became of a part that was found open: the finished file, or None when it held no row."""
+    """What became of a part that was found open: the finished file, or None when it held no row.
+
+    problem    why the disk did not let it be finished; it is left as it is until the next repair
+    """
 
     part: Path
     finished: Path | None
     tally: Tally
+    problem: str = ""
 
 
 class SegmentLog:
@@ -128,28 +111,32 @@ class SegmentLog:
     sidecar      what a reader needs beside the rows (configuration, versions, scales); plain JSON values
     max_bytes    a part is finished before a row would make its rows longer than this
 
-    ``path`` is the open part. Raises ``OSError`` for what the disk refuses, ``FileExistsError`` also when files
-    of this session are there already.
+    ``path`` is the open part; ``rows_on_disk`` counts the rows that were synced, in all parts. Raises ``OSError`` for
+    what the disk refuses, ``FileExistsError`` also when files of this session are there already. After an ``OSError``
+    the open part is not to be trusted beyond its synced rows: ``go_on`` begins another, in which the rows that were
+    not synced have to be written again.
     """
 
     path: Path
     _tally: Tally
     _bytes: int
-    _descriptor: int
-    _dirty: bool
 
     def __init__(self, directory: Path, session: int, sidecar: dict[str, Any], max_bytes: int,
                  files: FileSystem | None = None) -> None:
         self._directory = directory
-        self._session = session
+        self.session = session
         self._given = sidecar
         self._max_bytes = max_bytes
         self._files = files or FileSystem()
         self._clock: ClockMap | None = None
         self._stored_clock: ClockMap | None = None
         self._without_utc: list[tuple[Path, Tally]] = []
+        self._left: list[Path] = []
         self._part = 0
-        self._closed = False
+        self._descriptor: int | None = None
+        self._dirty = False
+        self._rows_synced = 0
+        self.rows_on_disk = 0
         self._open_next()
 
     def append(self, record: WindowRecord) -> None:
@@ -157,8 +144,8 @@ class SegmentLog:
         row = f"{format_row(record)}\n".encode()
         if self._bytes and self._bytes + len(row) > self._max_bytes:
             self.rotate()
-        self._files.write(self._descriptor, row)
         self._dirty = True
+        self._do(self._files.write, row)
         self._bytes += len(row)
         self._tally = replace(self._tally, rows=self._tally.rows + 1,
                               unset=self._tally.unset + (record.utc_us is None))
@@ -166,8 +153,10 @@ class SegmentLog:
     def sync(self) -> None:
         """Wait until all rows are on the disk."""
         if self._dirty:
-            self._files.sync(self._descriptor)
+            self._do(self._files.sync)
             self._dirty = False
+            self.rows_on_disk += self._tally.rows - self._rows_synced
+            self._rows_synced = self._tally.rows
 
     def rotate(self) -> None:
         """Finish the part and open the next; a part without rows stays open."""
@@ -181,29 +170,44 @@ class SegmentLog:
         self._clock = clock
         if self._stored_clock is None or abs(clock.offset_us - self._stored_clock.offset_us) >= CLOCK_STEP_US:
             self._write_sidecar("open")
-        for path, tally in self._without_utc:
-            _fill_finished(self._files, path, tally, clock)
-        self._without_utc.clear()
+        self._fill_earlier()
+
+    def go_on(self, unsynced: Iterable[WindowRecord]) -> None:
+        """After an ``OSError``: leave the part as it stands, open the next, put the rows there that were not synced,
+        and finish what was left as far as the disk lets us (else ``repair`` does it). Raises ``OSError``: not yet."""
+        self._let_go()
+        self._open_next()
+        for record in unsynced:
+            self.append(record)
+        self.sync()
+        with suppress(OSError):
+            while self._left:
+                part = self._left[0]
+                finished = _repair_part(self._files, part).finished if part.exists() else _finished_path(part)
+                if finished is not None and finished.exists():
+                    self._without_utc.append((finished, take_tally(finished)))
+                self._left.pop(0)
+            self._fill_earlier()
 
     def close(self) -> None:
         """Finish the last part, or remove it when it has no rows. Closing twice does nothing."""
-        if self._closed:
+        if self._descriptor is None:
             return
-        self._closed = True
         if self._tally.rows:
             self._finish()
         else:
-            self._files.close(self._descriptor)
+            self._close_file()
             _remove_part(self._files, self.path)
 
     def _open_next(self) -> None:
         self._part += 1
-        self.path = self._directory / f"{self._session:05d}-{self._part:03d}.csv.part"
+        self.path = self._directory / f"{self.session:05d}-{self._part:03d}.csv.part"
         for taken in (self.path, _finished_path(self.path)):
             if taken.exists():
                 raise FileExistsError(f"{taken}: this session has been logged before")
         self._tally = Tally()
         self._bytes = 0
+        self._rows_synced = 0
         self._descriptor = self._files.create(self.path)
         self._files.write(self._descriptor, f"{HEADER}\n".encode())
         self._dirty = True
@@ -211,10 +215,37 @@ class SegmentLog:
 
     def _finish(self) -> None:
         self.sync()
-        self._files.close(self._descriptor)
+        self._close_file()
         finished = _finish_part(self._files, self.path, self._given, self._tally, self._clock)
         if self._clock is None and self._tally.unset:
             self._without_utc.append((finished, self._tally))
+
+    def _fill_earlier(self) -> None:
+        while self._clock is not None and self._without_utc:
+            _fill_finished(self._files, *self._without_utc[0], self._clock)
+            self._without_utc.pop(0)
+
+    def _let_go(self) -> None:
+        if self.path not in self._left:
+            self._left.append(self.path)
+        with suppress(OSError):
+            self._close_file()
+
+    def _close_file(self) -> None:
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            self._files.close(descriptor)
+
+    def _do(self, act: Callable[..., None], *what: bytes) -> None:
+        """Write to or sync the part. One that failed at it is never tried again: the system may by then have thrown
+        away what it could not write, and tell of success."""
+        if self._descriptor is None:
+            raise ValueError("expected an open log: go_on() after an error, and nothing after close()")
+        try:
+            act(self._descriptor, *what)
+        except OSError:
+            self._let_go()
+            raise
 
     def _write_sidecar(self, state: str) -> None:
         _store_sidecar(self._files, self.path, self._given, state, self._tally, self._clock)
@@ -239,14 +270,23 @@ def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
 
     Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
     session had learnt it. Repairing twice does nothing more. Must not run while a service writes to the folder.
-    Raises ``OSError``.
+    A part on which the disk fails does not keep the others from being finished. Raises ``OSError`` for the folder.
     """
     files = files or FileSystem()
     for path in list(directory.iterdir()):
         if _OWN_TEMPORARY.fullmatch(path.name):
             files.remove(path)
-    parts = sorted(path for path in directory.glob("*.csv.part") if LogName.of(path))
-    return [_repair_part(files, part) for part in parts]
+    done = []
+    for part in sorted(path for path in directory.glob("*.csv.part") if LogName.of(path)):
+        try:
+            done.append(_repair_part(files, part))
+        except OSError as error:
+            done.append(Repaired(part, None, Tally(), str(error)))
+    for sidecar in directory.glob("*.json"):
+        log = sidecar.with_suffix(".csv")
+        if LogName.of(log) and not log.exists() and not _open_path(log).exists() and _is_of_open_part(sidecar):
+            files.remove(sidecar)  # its part had not yet got its name
+    return done
 
 
 def read_sidecar(log: Path) -> dict[str, Any] | None:
@@ -262,7 +302,8 @@ def read_sidecar(log: Path) -> dict[str, Any] | None:
 
 
 def _repair_part(files: FileSystem, part: Path) -> Repaired:
-    tally = take_tally(part)
+    limit = _first_segment_after(part)
+    tally = take_tally(part, limit)
     finished = _finished_path(part)
     given = _sidecar_or_nothing(part)
     clock = _clock_of(given)
@@ -273,38 +314,62 @@ def _repair_part(files: FileSystem, part: Path) -> Repaired:
         files.remove(part)  # the cut came between the rename and this
         files.sync_directory(part.parent)
     elif tally.rows:
-        _finish_part(files, part, given, tally, clock)
+        _finish_copy(files, part, given, tally, clock, limit)
     else:
         _remove_part(files, part)
         return Repaired(part, None, tally)
     return Repaired(part, finished, tally)
 
 
-def take_tally(log: Path) -> Tally:
-    """Count what a log holds. Raises ``OSError``."""
-    rows = unset = damaged = 0
+def _first_segment_after(part: Path) -> int | None:
+    """The first segment that later parts of the session hold. Rows from there on were written again: the disk had
+    failed, and what it kept of them in this part is not to be trusted."""
+    own = LogName.of(part)
+    others = [(name.part, path) for path in part.parent.glob("*.csv*")
+              if own and (name := LogName.of(path)) and name.session == own.session and name.part > own.part]
+    for _, later in sorted(others):
+        with later.open("rb") as file:
+            for row in scan(file):
+                if row.record is not None:
+                    return row.record.segment
+    return None
+
+
+def take_tally(log: Path, limit: int | None = None) -> Tally:
+    """Count what a log holds; rows of segments from ``limit`` on are ``repeated``. Raises ``OSError``."""
+    rows = unset = damaged = repeated = 0
     torn_tail = False
     with log.open("rb") as file:
         for row in scan(file):
-            if row.record is not None:
+            torn_tail = row.torn
+            if row.record is None:
+                damaged += not row.torn
+            elif limit is not None and row.record.segment >= limit:
+                repeated += 1
+            else:
                 rows += 1
                 unset += row.record.utc_us is None
-            else:
-                damaged += not row.torn
-            torn_tail = row.torn
-    return Tally(rows, unset, damaged, torn_tail)
+    return Tally(rows, unset, damaged, torn_tail, repeated)
 
 
 def _finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None) -> Path:
-    """Turn a part that is on the disk into the finished file."""
+    """Turn a part that was written whole and synced into the finished file."""
+    if clock is not None and tally.unset:
+        return _finish_copy(files, part, given, tally, clock, None)
+    finished = _finished_path(part)
+    _store_sidecar(files, part, given, "finished", tally, clock)
+    files.rename(part, finished)
+    files.sync_directory(part.parent)
+    return finished
+
+
+def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None,
+                 limit: int | None) -> Path:
+    """Turn the good rows of a part into the finished file. They are written anew: of a part that was found open nobody
+    knows whether the disk holds what the system shows."""
     finished = _finished_path(part)
     filled = tally if clock is None else replace(tally, unset=0)
-    if filled == tally and not (tally.damaged_lines or tally.torn_tail):
-        _store_sidecar(files, part, given, "finished", tally, clock)
-        files.rename(part, finished)
-        files.sync_directory(part.parent)
-        return finished
-    _write_file(files, _temporary_path(finished), _kept_lines(part, clock))
+    _write_file(files, _temporary_path(finished), _kept_lines(part, clock, limit))
     _store_sidecar(files, part, given, "finished", filled, clock)
     files.rename(_temporary_path(finished), finished)
     files.sync_directory(part.parent)
@@ -322,12 +387,12 @@ def _fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: Clock
     _store_sidecar(files, finished, given, "finished", replace(tally, unset=0), clock)
 
 
-def _kept_lines(log: Path, clock: ClockMap | None) -> Iterator[bytes]:
-    """The text of a log with its intact rows only, UTC filled in, in blocks."""
+def _kept_lines(log: Path, clock: ClockMap | None, limit: int | None = None) -> Iterator[bytes]:
+    """The text of a log with its intact rows only, up to segment ``limit``, UTC filled in, in blocks."""
     lines = [HEADER]
     with log.open("rb") as file:
         for row in scan(file):
-            if row.record is None:
+            if row.record is None or (limit is not None and row.record.segment >= limit):
                 continue
             lines.append(row.text if clock is None or row.record.utc_us is not None
                          else format_row(_with_utc(row.record, clock)))
@@ -349,6 +414,7 @@ def _with_utc(record: WindowRecord, clock: ClockMap) -> WindowRecord:
 def _remove_part(files: FileSystem, part: Path) -> None:
     """Remove a part that has no rows. Its sidecar goes first, so that none is ever left alone."""
     files.remove(_sidecar_path(part))
+    files.sync_directory(part.parent)
     files.remove(part)
     files.sync_directory(part.parent)
 
@@ -380,6 +446,11 @@ def _sidecar_or_nothing(log: Path) -> dict[str, Any]:
         return {}
 
 
+def _is_of_open_part(sidecar: Path) -> bool:
+    said = _sidecar_or_nothing(sidecar).get("log")
+    return isinstance(said, dict) and said.get("state") == "open"
+
+
 def _clock_of(sidecar: dict[str, Any]) -> ClockMap | None:
     """The clock map that a sidecar holds, if any. That of an open part holds the session's newest."""
     stored = sidecar.get("clock_map")
@@ -395,14 +466,23 @@ def _replace_file(files: FileSystem, path: Path, blocks: Iterable[bytes]) -> Non
 
 
 def _write_file(files: FileSystem, path: Path, blocks: Iterable[bytes]) -> None:
-    """Write a file and wait until it is on the disk."""
+    """Write a file and wait until it is on the disk. What cannot be written whole is removed: it may fill the disk."""
     descriptor = files.create(path)
     try:
-        for block in blocks:
-            files.write(descriptor, block)
-        files.sync(descriptor)
-    finally:
-        files.close(descriptor)
+        try:
+            for block in blocks:
+                files.write(descriptor, block)
+            files.sync(descriptor)
+        finally:
+            files.close(descriptor)
+    except OSError:
+        with suppress(OSError):
+            files.remove(path)
+        raise
+
+
+def _open_path(finished: Path) -> Path:
+    return finished.with_name(finished.name + ".part")
 
 
 def _finished_path(part: Path) -> Path:

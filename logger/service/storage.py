@@ -1,0 +1,106 @@
+"""All that the service writes to the disk: rows, raw bytes if asked to, and the room for both.
+
+Nothing in here raises what the disk says; it is told by ``status`` and tried again. So the main loop goes on, and with
+it the sensors, the status file and the watchdog.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from drivers.disk import FileSystem
+from drivers.dump import DumpHeader, Event
+from logger.service.status import StorageStatus
+from logger.store.exported import exported_names
+from logger.store.lasting import LastingLog
+from logger.store.recording import Recording, repair_recordings
+from logger.store.rotation import SegmentLog, next_session, repair
+from logger.store.space import Limits, SpaceKeeper
+from logger.units import US_PER_S
+
+LOOK_US = 10 * US_PER_S
+log = logging.getLogger(__name__)
+
+
+class Storage:
+    """The log, the recording and the room in one folder, which exists.
+
+    facts     what lies beside each log file
+    header    of the raw dump; None: none is recorded
+    now_us    the monotonic clock
+    """
+
+    def __init__(self, directory: Path, facts: dict[str, Any], max_file_bytes: int, header: DumpHeader | None,
+                 limits: Limits, now_us: Callable[[], int], files: FileSystem | None = None) -> None:
+        self._directory = directory
+        self._facts = facts
+        self._max_file_bytes = max_file_bytes
+        self._now_us = now_us
+        self._files = files or FileSystem()
+        self._space = SpaceKeeper(directory, limits, exported_names, self._files)
+        self._looked_us = now_us()
+        self._look()
+        self.log = LastingLog(self._begin, now_us)
+        self._recording = (
+            Recording(directory, header, lambda: self.log.session, now_us, self._files) if header else None
+        )
+
+    def record(self, event: Event) -> None:
+        """Keep the raw bytes, if asked to."""
+        if self._recording is not None:
+            self._recording.write(event)
+
+    def sync(self) -> None:
+        """Wait until everything is on the disk, as far as it takes it."""
+        self.log.sync()
+        if self._recording is not None:
+            self._recording.flush()
+
+    def tend(self) -> None:
+        """To be called now and then: makes room, and tries again what failed."""
+        now_us = self._now_us()
+        if now_us - self._looked_us >= LOOK_US:
+            self._looked_us = now_us
+            self._look()
+        self.log.hold(self._space.why_no_logs)
+        self.log.tend()
+        if self._recording is not None:
+            self._recording.hold(self._space.why_no_dumps)
+            self._recording.tend()
+
+    def close(self) -> None:
+        """End the files."""
+        self.log.close()
+        if self._recording is not None:
+            self._recording.close()
+
+    def status(self) -> StorageStatus:
+        """How things stand."""
+        trouble = self.log.trouble
+        return StorageStatus(
+            trouble=trouble,
+            since_s=(self._now_us() - self.log.since_us) / US_PER_S if trouble else 0.0,
+            rows_waiting=self.log.waiting if trouble else 0,
+            rows_lost=self.log.rows_lost,
+            failures=self.log.failures,
+            recording_trouble=self._recording.trouble if self._recording is not None else "",
+            room_bytes=self._space.room_bytes,
+            exported_removed=self._space.exported_removed,
+            dumps_lost=self._space.dumps_lost,
+        )
+
+    def _begin(self) -> SegmentLog:
+        for repaired in repair(self._directory, self._files):
+            log.info("repaired %s", repaired)
+        repair_recordings(self._directory, self._files)
+        session = next_session(self._directory, self._files)
+        return SegmentLog(self._directory, session, self._facts, self._max_file_bytes, self._files)
+
+    def _look(self) -> None:
+        try:
+            self._space.look()
+        except OSError as error:
+            log.warning("room for logs: %s", error)

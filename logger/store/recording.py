@@ -1,0 +1,130 @@
+"""The raw dumps of the service: a file per session, more only where the disk or its room interrupts.
+
+Problem. A dump is bigger than all logs together and worth less: it must never stop the service, nor take the room of
+the logs. The power ends most of them in the middle of a block.
+
+Solution. A dump is called ``<session>[-<number>].dump.gz.part`` while it is written and loses the ``.part`` when it is
+ended. ``Recording`` lets go of a file that the disk refuses and begins another later; what is promised of a file is
+what was flushed before. ``repair_recordings`` cuts the dumps that were left open back to the last block that fits its
+check value.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from drivers.disk import FileSystem
+from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
+from logger.store.lasting import disk_words
+from logger.units import US_PER_S
+
+ENDING = ".dump.gz"
+RETRY_US = 60 * US_PER_S
+_OPEN_NAME = re.compile(r"\d{5,}(-\d+)?\.dump\.gz\.part")
+log = logging.getLogger(__name__)
+
+
+class Recording:
+    """Events in, whatever the disk does.
+
+    session    number of the session, None as long as there is none; nothing is recorded before
+
+    trouble    why nothing is recorded at the moment; empty: all is well
+    """
+
+    def __init__(self, directory: Path, header: DumpHeader, session: Callable[[], int | None],
+                 now_us: Callable[[], int], files: FileSystem) -> None:
+        self._directory = directory
+        self._header = header
+        self._session = session
+        self._now_us = now_us
+        self._files = files
+        self._writer: DumpWriter | None = None
+        self._path = directory
+        self._number = 0
+        self._held = ""
+        self._retry_us = 0
+        self.trouble = ""
+        self.tend()
+
+    def write(self, event: Event) -> None:
+        """Add an event."""
+        self._try(lambda writer: writer.write(event))
+
+    def flush(self) -> None:
+        """Wait until everything so far is on the disk."""
+        self._try(lambda writer: writer.flush(sync=True))
+
+    def hold(self, why: str) -> None:
+        """Record nothing more until told an empty ``why``: there is no room that may be used."""
+        if why and not self._held:
+            self.close()
+            log.warning("recording stopped: %s", why)
+        if why or self._held:
+            self.trouble, self._retry_us = why, 0
+        self._held = why
+
+    def tend(self) -> None:
+        """To be called now and then: begins a file when there is none and it is time."""
+        session = self._session()
+        if self._writer is not None or self._held or session is None or self._now_us() < self._retry_us:
+            return
+        self._number += 1
+        suffix = "" if self._number == 1 else f"-{self._number}"
+        self._path = self._directory / f"{session:05d}{suffix}{ENDING}.part"
+        try:
+            self._writer = DumpWriter(self._path, self._header, self._files)
+            self.trouble = ""
+        except OSError as error:
+            self._fail(error)
+
+    def close(self) -> None:
+        """End the file."""
+        self._try(DumpWriter.close)
+        if self._writer is not None:
+            self._writer = None
+            try:
+                _finish(self._files, self._path)
+            except OSError as error:
+                self._fail(error)
+
+    def _try(self, act: Callable[[DumpWriter], None]) -> None:
+        if self._writer is None:
+            return
+        try:
+            act(self._writer)
+        except OSError as error:
+            self._writer.abandon()
+            self._writer = None
+            self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        why = disk_words(error)
+        if why != self.trouble:
+            log.error("recording stopped: %s", why)
+        self.trouble = why
+        self._retry_us = self._now_us() + RETRY_US
+
+
+def repair_recordings(directory: Path, files: FileSystem) -> None:
+    """End the dumps that were left open, at the last block that is intact; one without any goes.
+
+    A file on which the disk fails is left as it is.
+    """
+    for part in sorted(path for path in directory.iterdir() if _OPEN_NAME.fullmatch(path.name)):
+        with suppress(OSError):
+            size = intact_bytes(part)
+            if size:
+                files.cut(part, size)
+                _finish(files, part)
+            else:
+                files.remove(part)
+
+
+def _finish(files: FileSystem, part: Path) -> None:
+    files.rename(part, part.with_name(part.name.removesuffix(".part")))
+    files.sync_directory(part.parent)

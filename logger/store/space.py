@@ -1,0 +1,132 @@
+"""Room on the disk: what goes when it runs short, and in which order.
+
+Problem. A card is shared with the system that runs the logger, and nobody looks at it for months. Something has to give
+way before the disk is full, and what cannot be brought back must not be what goes first.
+
+Solution. Room is what may still be written: up to the quota of the folder and down to the floor of free space. When it
+falls below a reserve, in this order and only as far as needed:
+
+1. the oldest exported files go, logs and dumps alike: a copy of them lies on a stick;
+2. no new raw bytes are recorded: the reserve belongs to the logs;
+3. when the reserve is used up too, the oldest dumps go that were not exported, each with a warning and counted;
+4. then nothing is written any more. A log that was not exported is never removed: its drive cannot be driven again,
+   while the drive that is not recorded now is told by ``ridelog status`` and can. The reserve holds the rows of
+   some 1,500 km, so whoever collects logs once a season never gets there.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.disk import FileSystem
+from logger.store.recording import ENDING
+
+RESERVE_BYTES = 50_000_000
+STEP_BYTES = 5_000_000
+"""When the reserve is down to this, dumps go; when logs were stopped they go on above it."""
+
+_FINISHED = re.compile(r"(\d{5,})-?(\d*)(\.csv|\.dump\.gz)")
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """quota_bytes    most bytes in the folder of the logs; None: no limit
+    floor_bytes      free space on its disk that is left to others
+    """
+
+    quota_bytes: int | None = None
+    floor_bytes: int = 200_000_000
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A finished log or dump, with its sidecar: names, bytes, whether a stick holds it too."""
+
+    paths: tuple[Path, ...]
+    size_bytes: int
+    is_dump: bool
+    is_exported: bool
+
+
+class SpaceKeeper:
+    """Looks after the room for one folder.
+
+    exported     gives the names of the files that lie on a stick
+
+    room_bytes         what may still be written, as of the last look; may be negative
+    exported_removed, dumps_lost    files removed to make room: exported ones, and dumps that were not
+    """
+
+    def __init__(self, directory: Path, limits: Limits, exported: Callable[[Path], set[str]],
+                 files: FileSystem) -> None:
+        self._directory = directory
+        self._limits = limits
+        self._exported = exported
+        self._files = files
+        self._logs_held = False
+        self._dumps_held = False
+        self.room_bytes = 0
+        self.exported_removed = 0
+        self.dumps_lost = 0
+
+    def look(self) -> None:
+        """Measure the room and make some where it is short. Raises ``OSError`` for a disk that fails."""
+        self.room_bytes = self._measure()
+        if self.room_bytes < RESERVE_BYTES:
+            kept = self._kept()
+            self._make_room(2 * RESERVE_BYTES, [file for file in kept if file.is_exported])
+            if self.room_bytes < STEP_BYTES:
+                self._make_room(2 * STEP_BYTES, [file for file in kept if file.is_dump and not file.is_exported])
+        self._dumps_held = self.room_bytes < (2 if self._dumps_held else 1) * RESERVE_BYTES
+        self._logs_held = self.room_bytes < (STEP_BYTES if self._logs_held else 0)
+
+    @property
+    def why_no_dumps(self) -> str:
+        """Why no raw bytes may be recorded; empty: they may."""
+        return "little room is left, and it is kept for the logs" if self._dumps_held else ""
+
+    @property
+    def why_no_logs(self) -> str:
+        """Why no rows may be written; empty: they may."""
+        return "no room is left, and nothing that could be removed" if self._logs_held else ""
+
+    def _measure(self) -> int:
+        room = self._files.free_bytes(self._directory) - self._limits.floor_bytes
+        if self._limits.quota_bytes is not None:
+            used = sum(path.stat().st_size for path in self._directory.iterdir() if path.is_file())
+            room = min(room, self._limits.quota_bytes - used)
+        return room
+
+    def _kept(self) -> list[_Kept]:
+        """The finished files, oldest first."""
+        exported = self._exported(self._directory)
+        found = []
+        for path in self._directory.iterdir():
+            name = _FINISHED.fullmatch(path.name)
+            if name is None:
+                continue
+            is_dump = name[3] == ENDING
+            paths = (path,) if is_dump else (path.with_suffix(".json"), path)  # a lone sidecar would stay for ever
+            size_bytes = sum(each.stat().st_size for each in paths if each.exists())
+            is_exported = all(each.name in exported for each in paths if each.exists())
+            found.append((int(name[1]), int(name[2] or 0), _Kept(paths, size_bytes, is_dump, is_exported)))
+        return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]
+
+    def _make_room(self, goal_bytes: int, files: list[_Kept]) -> None:
+        for kept in files:
+            if self.room_bytes >= goal_bytes:
+                return
+            for path in kept.paths:
+                self._files.remove(path)
+            self.room_bytes += kept.size_bytes
+            if kept.is_exported:
+                self.exported_removed += 1
+                log.info("removed %s to make room; it was exported", kept.paths[-1].name)
+            else:
+                self.dumps_lost += 1
+                log.warning("removed %s to make room for logs; it was NOT exported", kept.paths[-1].name)
