@@ -1,0 +1,204 @@
+"""A service's life on disk, cut at any instant: what was promised, and whether it was held.
+
+``Life`` drives the real storage of the service (log, sidecars, session counter, raw dump) with rows and bytes of its
+own and notes at each instant what had been promised by then. ``crash`` ends it after some change of the disk, lets the
+next start repair what is found, and compares.
+"""
+
+from __future__ import annotations
+
+import random
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from drivers.dump import DumpHeader, Event, open_dump
+from drivers.errors import DumpError
+from logger.records import WindowRecord
+from logger.service.storage import Storage
+from logger.store.recording import repair_recordings
+from logger.store.rotation import ClockMap, next_session, read_sidecar, repair
+from logger.store.segment_log import format_row, parse_row, read_log
+from logger.store.space import Limits
+from logger.store.verify import verify
+
+from faulty_disk import CrashModel, RecordingFiles
+
+FACTS = {"ridelog_version": "test", "sensor": {"driver": "bma220", "verified": True}}
+HEADER = DumpHeader(None, {"driver": "bma220", "range_g": 2}, {"baud": 9600}, "rav4-2009")
+OFFSET_US = 1_783_160_000_000_000
+
+
+def window(segment: int, utc: bool) -> WindowRecord:
+    """A row whose text is its own."""
+    t_us = 20_000_000 + segment * 500_000
+    return WindowRecord(
+        segment=segment, drive=1, t_us=t_us, utc_us=t_us + OFFSET_US if utc else None, duration_s=0.5,
+        distance_start_m=7.62 * segment, distance_end_m=7.62 * (segment + 1), lat_deg=50 + segment * 1e-5, lon_deg=14.0,
+        speed_mps=15.24, iri_m_per_km=2.0, iri_std_m_per_km=0.5, iri_rms_m_per_km=2.0, a_w_mps2=0.4, mtvv_mps2=0.5,
+        vdv_mps175=0.6, crest_factor=3.0, comfort="a_little_uncomfortable", iri_class="A", accel_rms_mps2=0.5,
+        samples=50, clipped_samples=0, flags=() if utc else ("time_unset",),
+    )
+
+
+@dataclass(frozen=True)
+class Promised:
+    """At one instant: rows and events handed over, and how many of them must survive a cut of the power."""
+
+    rows: int = 0
+    rows_safe: int = 0
+    events: int = 0
+    events_flushed: int = 0
+    clock_safe: bool = False
+
+
+class Life:
+    """The storage of one session, from its start to its end, at random: rows, syncs, files ending, UTC coming late."""
+
+    def __init__(self, folder: Path, seed: int, steps: int, max_file_bytes: int = 2500) -> None:
+        self.files = RecordingFiles(folder)
+        self.files.note = lambda: self.promised
+        self.promised = Promised()
+        self.utc_from = NEVER
+        rng = random.Random(seed)
+        storage = Storage(folder, FACTS, max_file_bytes, HEADER, Limits(floor_bytes=0), lambda: 0, self.files)
+        self.session = storage.log.session
+        clock_at = rng.randrange(steps)
+        for step in range(steps):
+            for _ in range(rng.randrange(4)):
+                self._record(storage, rng)
+            if step == clock_at:
+                self.utc_from = self.promised.rows + 1
+                storage.log.set_clock_map(ClockMap(OFFSET_US))
+                self.promised = replace(self.promised, clock_safe=True)
+            self._append(storage)
+            if rng.random() < 0.4:
+                storage.sync()
+                self.promised = replace(self.promised, rows_safe=self.promised.rows,
+                                        events_flushed=self.promised.events)
+            if rng.random() < 0.08:
+                storage.log.rotate()
+        storage.close()
+        self.promised = replace(self.promised, rows_safe=self.promised.rows, events_flushed=self.promised.events)
+
+    def _append(self, storage: Storage) -> None:
+        segment = self.promised.rows + 1
+        storage.log.append(window(segment, utc=segment >= self.utc_from))
+        self.promised = replace(self.promised, rows=segment)
+
+    def _record(self, storage: Storage, rng: random.Random) -> None:
+        storage.record(event_of(self.promised.events))
+        self.promised = replace(self.promised, events=self.promised.events + 1)
+
+
+NEVER = 10**9
+
+
+def event_of(number: int) -> Event:
+    """The events of a dump: each tells its number."""
+    return Event(10_000 * number, "nmea", b"%06d" % number * 10)
+
+
+@dataclass
+class Outcome:
+    """What a trial found, in numbers; ``wrong`` is empty when every promise was held."""
+
+    rows_promised: int = 0
+    rows_found: int = 0
+    events_promised: int = 0
+    events_found: int = 0
+    torn_or_damaged: int = 0
+    wrong: str = ""
+
+
+def crash(life: Life, count: int, power: bool, rng: random.Random, folder: Path, again: float = 0.3) -> Outcome:
+    """End the life after ``count`` changes, restart (with the share ``again`` of restarts cut off as well), compare.
+
+    ``folder`` is a name that is free.
+    """
+    before = life.files.journal[count].note if count < len(life.files.journal) else life.promised
+    assert isinstance(before, Promised)
+    model = CrashModel.after(life.files, count)
+    image = model.powerless(rng) if power else model.killed()
+    lossy = power
+    while rng.random() < again:
+        _lay_out(folder, image)
+        files = RecordingFiles(folder, None if lossy else model)
+        _restart(folder, files)
+        shutil.rmtree(folder)
+        model = CrashModel.after(files, rng.randint(0, len(files.journal)))
+        lossy = rng.random() < 0.7
+        power = power or lossy
+        image = model.powerless(rng) if lossy else model.killed()
+    _lay_out(folder, image)
+    outcome = Outcome(before.rows_safe if power else before.rows, 0, before.events_flushed, 0)
+    try:
+        outcome.torn_or_damaged = sum(read_log(path).damaged_lines for path in folder.glob("*.csv.part"))
+        number = _restart(folder, RecordingFiles(folder))
+        _compare(folder, life, before, number, outcome)
+    except (Broken, DumpError, ValueError) as broken:
+        outcome.wrong = str(broken)
+    shutil.rmtree(folder)
+    return outcome
+
+
+class Broken(AssertionError):
+    """A promise was not held."""
+
+
+def _hold(true: bool, promise: str) -> None:
+    if not true:
+        raise Broken(promise)
+
+
+def _lay_out(folder: Path, image: dict[str, bytes]) -> None:
+    folder.mkdir()
+    for name, data in image.items():
+        (folder / name).write_bytes(data)
+
+
+def _restart(folder: Path, files: RecordingFiles) -> int:
+    problems = [repaired.problem for repaired in repair(folder, files)]
+    _hold(not any(problems), f"repair: {problems}")
+    repair_recordings(folder, files)
+    return next_session(folder, files)
+
+
+def _compare(folder: Path, life: Life, before: Promised, number: int, outcome: Outcome) -> None:
+    logs = sorted(folder.glob("*.csv"))
+    dumps = sorted(folder.glob("*.dump.gz"))
+    expected = {"last-session", *(f"{log.stem}.{end}" for log in logs for end in ("csv", "json")),
+                *(dump.name for dump in dumps)}
+    _hold({path.name for path in folder.iterdir()} == expected, f"only finished files: {sorted(folder.iterdir())}")
+    if before.rows:
+        _hold(life.session is not None and number > life.session, f"session {number} was given twice")
+    contents = [read_log(log) for log in logs]
+    records = [record for content in contents for record in content.records]
+    outcome.rows_found = len(records)
+    _hold(not any(content.damaged_lines for content in contents), "a damaged line in a finished file")
+    segments = [record.segment for record in records]
+    first = min(outcome.rows_promised, len(records))
+    _hold(segments[:first] == list(range(1, outcome.rows_promised + 1)), "every promised row, once, in order")
+    _hold(segments == sorted(set(segments)), "the rows that came later once, in order")
+    _hold(not segments or segments[-1] <= before.rows + 1, "no row that was not written")
+    for record in records:
+        own = window(record.segment, utc=record.utc_us is not None)
+        _hold(record == parse_row(format_row(own)), f"row {record.segment} is as it was written")
+        _hold(record.utc_us is not None or not before.clock_safe, f"row {record.segment} has its UTC")
+    for log, content in zip(logs, contents, strict=True):
+        sidecar = read_sidecar(log)
+        _hold(sidecar is not None and sidecar["sensor"] == FACTS["sensor"], f"sidecar of {log.name}")
+        _hold(sidecar["log"]["rows"] == len(content.records), f"rows in the sidecar of {log.name}")
+    events = []
+    for dump in dumps:
+        with open_dump(dump) as reader:
+            events += list(reader)
+            _hold(not reader.torn_tail, f"{dump.name} ends well")
+    outcome.events_found = len(events)
+    _hold(events == [event_of(place) for place in range(len(events))], "events as they were recorded")
+    _hold(len(events) >= before.events_flushed, "as many events as were promised")
+    if logs or dumps:
+        is_whole = segments == list(range(1, len(segments) + 1))
+        bad = [problem for check in verify([folder]) for problem in check.problems
+               if is_whole or "gap: expected segment" not in problem]
+        _hold(not bad, f"ridelog verify: {bad}")
