@@ -85,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 @dataclass(frozen=True)
-class Drive:
-    """A drive as it was recorded, arrays (n,): samples at ``rate_hz``, distances that do not decrease.
+class Estimable:
+    """A drive ready for the estimator, arrays (n,): samples at ``rate_hz``, distances that do not decrease.
 
     relaid_m    the farthest that a distance was moved to make them so [m]; 0 where they are the file's
     """
@@ -97,37 +97,23 @@ class Drive:
     relaid_m: float
 
 
-def read_drive(run: Path) -> Drive:
+def read_estimable(run: Path) -> Estimable:
     """The drive of a run's folder, or of a file. BadInput ("file:line: expected ..., found ...") for what it cannot be.
     """
     import numpy as np
 
     from logger.estimation.whole_drive import laid_anew
-    from logger.store.bounded import read_bounded
-    from logger.store.drive_file import COLUMNS, DRIVE, MAX_SPEED_MPS
-    from logger.store.number_table import parse_columns
-    from logger.store.record_file import MAX_BYTES, MAX_MPS2, even_rate_hz
+    from logger.store.drive_file import DRIVE, MAX_SPEED_MPS, read_drive
 
-    file = str(run / DRIVE if run.is_dir() else run)
-    _, table = parse_columns(
-        read_bounded(file, MAX_BYTES), file,
-        lambda names: COLUMNS if all(names.count(name) == 1 for name in COLUMNS) else None,
-        f"a header with {','.join(COLUMNS)}, each once")
-    if len(table) < 2:
-        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
-    time_s, accel, speed_mps, distance_m = table.T.copy()
-    rate_hz = even_rate_hz(time_s, file)
-    if rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
-        raise BadInput(f"{file}: expected at least {_SLOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}")
-    for values, name, largest in ((accel, COLUMNS[1], MAX_MPS2), (speed_mps, COLUMNS[2], MAX_SPEED_MPS)):
-        if (wild := np.abs(values) > largest).any():
-            row = int(np.argmax(wild))
-            raise BadInput(f"{file}:{row + 2}: expected {name} within {largest:g}, found {values[row]:g}")
-    _check_way(distance_m, MAX_SPEED_MPS / rate_hz, file)
-    if (np.diff(distance_m) >= 0).all():
-        return Drive(rate_hz, accel, distance_m, 0.0)
-    relaid = laid_anew(distance_m, speed_mps, rate_hz)
-    return Drive(rate_hz, accel, relaid, float(np.abs(relaid - distance_m).max()))
+    drive = read_drive(run / DRIVE if run.is_dir() else run)
+    if drive.rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
+        raise BadInput(f"{drive.path}: expected at least {_SLOWEST_RATE_HZ:g} samples a second, "
+                       f"found {drive.rate_hz:.4g}")
+    _check_way(drive.distance_m, MAX_SPEED_MPS / drive.rate_hz, str(drive.path))
+    if (np.diff(drive.distance_m) >= 0).all():
+        return Estimable(drive.rate_hz, drive.accel_z_mps2, drive.distance_m, 0.0)
+    relaid = laid_anew(drive.distance_m, drive.speed_mps, drive.rate_hz)
+    return Estimable(drive.rate_hz, drive.accel_z_mps2, relaid, float(np.abs(relaid - drive.distance_m).max()))
 
 
 def _check_way(distance_m: Array, longest_m: float, file: str) -> None:
@@ -157,7 +143,7 @@ class Result:
 
     run: Path
     vehicle: Vehicle
-    drive: Drive
+    drive: Estimable
     noise_mps2: float
     step_mps2: float
     window_m: float
@@ -183,7 +169,7 @@ def estimate(run: Path, vehicle: Vehicle, noise_mps2: float, step_mps2: float, w
 
     structure = structure_of(vehicle)
     output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    drive = read_drive(run)
+    drive = read_estimable(run)
     profile = run / PROFILE
     track = track_of(read_profile(profile)) if run.is_dir() and profile.exists() else None
     sensor, readings, distance_m = on_grid(

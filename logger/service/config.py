@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from drivers.bma220 import Bma220Settings
 from drivers.errors import SettingsError
 from logger.errors import BadInput
-from logger.shipped import shipped, vehicle_file
+from logger.shipped import is_path, shipped, vehicle_file, vehicle_path
 from logger.store.yaml_lines import Node, load_mapping
 from logger.units import WINDOW_M
 
@@ -182,20 +182,14 @@ def _file_to_write(node: Node) -> Path:
     return path
 
 
-def _is_path(text: str) -> bool:
-    return "/" in text or text.endswith(".yaml")
-
-
 def _vehicle(node: Node) -> Path:
-    if _is_path(node.text()):
-        path = _path(node)
-        if not path.is_file():
-            raise node.wrong(f"a vehicle's file (there is no {path})")
-        return path
     try:
-        return vehicle_file(node.text())
+        path = vehicle_path(node.text(), beside=Path(node.file).parent.resolve())
     except BadInput as error:
         raise BadInput(f"{node.file}:{node.line}: {error}") from None
+    if not path.is_file():
+        raise node.wrong(f"a vehicle's file (there is no {path})")
+    return path
 
 
 def _i2c_bus(node: Node) -> int | Path:
@@ -211,7 +205,7 @@ def _i2c_bus(node: Node) -> int | Path:
 
 
 def _profile(node: Node) -> str:
-    return str(_path(node)) if _is_path(node.text()) else node.text()
+    return str(_path(node)) if is_path(node.text()) else node.text()
 
 
 def _calibration(node: Node) -> Calibration:

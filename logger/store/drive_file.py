@@ -8,7 +8,7 @@ as records and profiles are. Columns of other names are not read.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,25 +34,32 @@ _HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}], each once"
 
 
 @dataclass(frozen=True)
-class Run:
-    """A drive over a known road, arrays (n,).
+class Drive:
+    """What a recorder wrote down while it drove, arrays (n,).
 
-    path           the folder
+    path           of the file, or of a run's folder
+    rate_hz        samples a second
     time_s         evenly spaced [s]
     accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
     speed_mps      [m/s]
     distance_m     where the front tires stand on the track [m]
     lat_deg, lon_deg    None where they were not recorded
-    track          the road
     """
 
     path: Path
+    rate_hz: float
     time_s: Array
     accel_z_mps2: Array
     speed_mps: Array
     distance_m: Array
     lat_deg: Array | None
     lon_deg: Array | None
+
+
+@dataclass(frozen=True)
+class Run(Drive):
+    """A drive over a known road, ``track``."""
+
     track: Track
 
 
@@ -66,7 +73,13 @@ def read_run(folder: Path | str) -> Run:
     path = Path(folder)
     if not path.is_dir():
         raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE}")
-    file = str(path / DRIVE)
+    drive = replace(read_drive(path / DRIVE), path=path)
+    return Run(**vars(drive), track=track_of(read_profile(path / PROFILE)))
+
+
+def read_drive(path: Path | str) -> Drive:
+    """Read a ``drive.csv``. Times and errors as in ``read_run``."""
+    file = str(path)
     names, table = parse_columns(read_bounded(file, MAX_BYTES), file, _choose, _HEADER)
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
@@ -76,9 +89,8 @@ def read_run(folder: Path | str) -> Run:
     _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
     time_s = columns[TIME][0] + np.arange(len(table)) / rate_hz
     lat_deg, lon_deg = (columns.get(name) for name in PLACE)
-    return Run(
-        path, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg,
-        track_of(read_profile(path / PROFILE)),
+    return Drive(
+        Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg
     )
 
 
