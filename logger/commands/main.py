@@ -22,6 +22,8 @@ VERBS = {
     "status": "what the running service is doing",
     "verify": "check logs, dumps and exported sticks for damage and gaps",
     "export": "copy finished logs to a USB stick",
+    "install": "set up the service on this machine; --dry-run shows every step",
+    "uninstall": "undo install; logs and changed settings stay",
     "report": "make one web page of logs: map, plots, table",
     "iri": "exact IRI of a measured profile",
     "comfort": "ISO 2631 comfort and health values of an acceleration record",

@@ -3,7 +3,7 @@
 Problem. Somebody stands beside the car with a hand on the stick. They have no screen, or look once at ``ridelog
 status``; and there may be two sticks. Solution: a small file in memory per stick, written by its export and removed
 when the stick is; and one LED of the board that shows what matters most of all notes: it beats while any stick must
-stay, blinks fast when one of them did not get everything, and is steady when all may be pulled. When the last stick
+stay, blinks evenly when one of them did not get everything, and is steady when all may be pulled. When the last stick
 has gone the LED does again what it did before.
 """
 
@@ -90,8 +90,6 @@ def _show(led: Path, memory: Path, notes: list[StickNote]) -> None:
         (led / "brightness").write_text((led / "max_brightness").read_text("ascii"), "ascii")
     else:
         _trigger(led, "timer")
-        for phase in ("delay_on", "delay_off"):
-            (led / phase).write_text("100", "ascii")
 
 
 def _present_trigger(led: Path) -> str:

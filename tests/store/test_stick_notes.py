@@ -67,7 +67,6 @@ def test_the_light_goes_from_beating_to_steady_and_back_to_what_it_was(led: Path
 def test_with_two_sticks_the_light_shows_what_matters_more(led: Path, notes: Path) -> None:
     assert shown(led, notes, COPYING, FAILED) == "heartbeat"
     assert shown(led, notes, DONE, FAILED) == "timer"
-    assert (led / "delay_on").read_text() == (led / "delay_off").read_text() == "100"
     assert shown(led, notes, DONE) == "none"
     assert shown(led, notes) == "mmc0"
 

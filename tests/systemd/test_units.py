@@ -1,0 +1,158 @@
+"""Units and rules: checked by systemd's own tool where it is there, against the program's own settings everywhere."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from logger.commands import export as export_command
+from logger.commands import run as run_command
+from logger.service.config import MACHINE_CONFIG, Config
+from logger.service.live import HANG_US
+from logger.service.start import LONGEST_BEAT_S
+from logger.shipped import shipped
+from logger.store import stick_notes
+from logger.store.installation import PROGRAM, Installation
+
+SERVICE, EXPORT = "ridelog.service", "ridelog-export@.service"
+MOST_EXPOSURE = 1.5
+needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+
+
+def settings(unit: str) -> dict[str, list[str]]:
+    """Every value of every key of a unit, in order."""
+    found: dict[str, list[str]] = {}
+    for line in (shipped("systemd") / unit).read_text().splitlines():
+        if line and line[0] not in "#[":
+            key, _, value = line.partition("=")
+            found.setdefault(key, []).append(value)
+    return found
+
+
+@pytest.fixture
+def units(tmp_path: Path) -> list[Path]:
+    """Both units as they are installed, the template for one stick."""
+    for step in Installation(tmp_path, Path(sys.executable).with_name("ridelog"), lambda words: None).install():
+        if step.act is not None:
+            step.act()
+    folder = tmp_path / "etc/systemd/system"
+    shutil.copy(folder / EXPORT, folder / "ridelog-export@sda1.service")
+    return [folder / SERVICE, folder / "ridelog-export@sda1.service"]
+
+
+@needs_systemd
+def test_systemd_finds_nothing_wrong(units: list[Path]) -> None:
+    done = subprocess.run(["systemd-analyze", "verify", "--man=no", *units], capture_output=True, text=True)
+    assert [line for line in (done.stdout + done.stderr).splitlines() if "ridelog" in line] == []
+    assert done.returncode == 0
+
+
+@needs_systemd
+def test_systemd_would_find_something_wrong(units: list[Path]) -> None:
+    """The check can fail."""
+    text = units[0].read_text()
+    units[0].write_text(text.replace("WatchdogSec=20", "WatchdogSec=soon\nWachtdog=20"))
+    done = subprocess.run(["systemd-analyze", "verify", "--man=no", units[0]], capture_output=True, text=True)
+    assert len([line for line in (done.stdout + done.stderr).splitlines() if "ridelog.service" in line]) == 2
+
+
+@needs_systemd
+def test_exposure_is_low(units: list[Path]) -> None:
+    for unit in units:
+        done = subprocess.run(["systemd-analyze", "security", "--offline=true", "--no-pager", unit],
+                              capture_output=True, text=True, check=True)
+        level = re.search(r"exposure level for \S+: ([0-9.]+)", done.stdout)
+        assert level is not None
+        assert float(level[1]) <= MOST_EXPOSURE
+
+
+def command_lines(unit: str) -> list[list[str]]:
+    lines = [value for key in ("ExecStart", "ExecStopPost") for value in settings(unit).get(key, [])]
+    return [shlex.split(line.lstrip("-+")) for line in lines]
+
+
+def test_every_command_line_is_one_that_the_program_takes() -> None:
+    modules = {"run": run_command, "export": export_command}
+    ours = [line for unit in (SERVICE, EXPORT) for line in command_lines(unit) if line[0] == str(PROGRAM)]
+    assert len(ours) == 4
+    for line in ours:
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        modules[line[1]].add_arguments(parser)
+        parser.parse_args(line[2:])
+
+
+def test_no_unit_and_no_rule_runs_a_shell() -> None:
+    programs = {line[0] for unit in (SERVICE, EXPORT) for line in command_lines(unit)}
+    assert programs == {str(PROGRAM), "/usr/bin/mount", "/usr/bin/umount"}
+    rules = (shipped("systemd") / "90-ridelog.rules").read_text()
+    assert set(re.findall(r'RUN\+="(\S+)', rules)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
+
+
+def test_only_mounting_is_done_as_root() -> None:
+    privileged = [value.lstrip("-") for key in ("ExecStart", "ExecStopPost") for value in settings(EXPORT)[key]
+                  if "+" in value.split("/")[0]]
+    assert [value.split()[0] for value in privileged] == ["+/usr/bin/mount", "+/usr/bin/umount", "+/usr/bin/umount"]
+    assert not [value for value in settings(SERVICE)["ExecStart"] if "+" in value.split("/")[0]]
+    assert settings(SERVICE)["User"] == settings(EXPORT)["User"] == ["ridelog"]
+
+
+def test_the_stick_is_mounted_so_that_nothing_on_it_can_act() -> None:
+    mount = command_lines(EXPORT)[0]
+    options = set(mount[mount.index("-o") + 1].split(","))
+    assert {"nosuid", "nodev", "noexec", "uid=ridelog", "gid=ridelog"} <= options
+    assert mount[mount.index("-t") + 1] == "vfat,exfat"
+    assert mount[-1] == command_lines(EXPORT)[1][3] == command_lines(EXPORT)[2][-1]
+
+
+def test_folders_are_those_of_the_settings() -> None:
+    service, export, config = settings(SERVICE), settings(EXPORT), Config()
+    assert Path("/var/lib", *service["StateDirectory"]) == Path("/var/lib", *export["StateDirectory"])
+    assert Path("/var/lib", *service["StateDirectory"]) == config.log.directory
+    assert Path("/run", *service["RuntimeDirectory"]) == config.status_file.parent
+    assert Path("/run", *export["RuntimeDirectory"]) == stick_notes.FOLDER
+    assert str(MACHINE_CONFIG) in service["ExecStart"][0]
+
+
+def test_it_is_watched_and_never_given_up() -> None:
+    service = settings(SERVICE)
+    assert service["Type"] == ["notify"]
+    watchdog_s = float(service["WatchdogSec"][0])
+    assert 2 * LONGEST_BEAT_S < watchdog_s <= 60
+    assert watchdog_s > HANG_US / 1e6
+    assert service["Restart"] == ["always"]
+    assert "RestartPreventExitStatus" not in service
+    assert service["StartLimitIntervalSec"] == settings(EXPORT)["StartLimitIntervalSec"] == ["0"]
+
+
+def test_nothing_waits_for_a_clock_or_a_network() -> None:
+    ordered = " ".join(settings(SERVICE)["After"] + settings(SERVICE)["Wants"] + settings(EXPORT)["After"])
+    assert not {"time-sync.target", "time-set.target", "network.target", "network-online.target"} & set(ordered.split())
+
+
+def test_devices_are_those_of_i2c_and_serial_ports() -> None:
+    assert settings(SERVICE)["DevicePolicy"] == settings(EXPORT)["DevicePolicy"] == ["closed"]
+    assert {value.split()[0] for value in settings(SERVICE)["DeviceAllow"]} == {
+        "char-i2c", "char-ttyAMA", "char-ttyS", "char-ttyUSB", "char-ttyACM", "char-rfcomm"}
+    assert settings(EXPORT)["DeviceAllow"] == ["/dev/%i rw"]
+
+
+def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
+    lines = [line for line in (shipped("systemd") / "90-ridelog.rules").read_text().splitlines()
+             if line and not line.startswith("#")]
+    token = r'[A-Z]+(?:\{[A-Z_]+\})?(?:==|!=|\+=|=)"[^"]*"'
+    assert all(re.fullmatch(rf"{token}(, {token})*", line) for line in lines)
+    stick, light = lines
+    assert 'ENV{ID_FS_LABEL}=="RIDELOG|ridelog"' in stick
+    assert 'ENV{ID_BUS}=="usb"' in stick
+    started = re.search(r'ENV\{SYSTEMD_WANTS\}\+="([^"]*)"', stick)
+    assert started is not None
+    assert started[1].replace("%k", "") == EXPORT
+    assert 'KERNEL=="ACT"' in light
+    assert "--led /sys/class/leds/ACT" in settings(EXPORT)["ExecStart"][1]
