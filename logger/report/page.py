@@ -51,12 +51,13 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
     "gap": "samples of the accelerometer are missing",
     "clipped": "the accelerometer stood at the end of its range: the road is at least this rough",
-    "slow": "below the speed at which the roughness relation holds",
-    "fast": "above the speed at which the roughness relation holds",
+    "slow": "below the speed at which the r.m.s. relation holds",
+    "fast": "above the speed at which the r.m.s. relation holds",
     "stationary": "the car stood inside the window; that time is not in the averages",
     "time_unset": "the GPS had not told the time yet",
     "partial": "cut short by the end of a drive or of the recording",
-    "unsettled": "filters were still settling",
+    "unsettled": "too near to a start, an end or a hole in the readings",
+    "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
 
