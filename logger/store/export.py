@@ -34,8 +34,8 @@ FILES_PER_MANIFEST = 32
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
 
-_LOG = re.compile(r"(\d{5,})-(\d{3,})\.(csv|json)(\.part)?")
-_DUMP = re.compile(r"(\d{5,})(-\d{3,})?\.dump(\.gz)?")
+_LOG = re.compile(r"(\d{5,})-(\d{3,})\.(csv|json)")
+_DUMP = re.compile(r"(\d{5,})(?:-(\d+))?\.dump(\.gz)?")
 _STICK_IS_LOST = {
     errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOTCONN,
     errno.ENOMEDIUM, errno.ESHUTDOWN,
@@ -117,17 +117,16 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
 
 
 def finished_files(card: OpenFolder, dumps: bool) -> list[str]:
-    """Names of what can be exported, oldest first; each log is followed by its sidecar.
+    """Names of what can be exported, oldest first; each log is followed by its sidecar, recordings come last.
 
-    A recording belongs to its session, and is being written while a log of that session is open.
+    What is being written has a name that ends in ``.part``.
     """
     present = set(card.names())
     logs = sorted((int(match[1]), int(match[2]), match[0]) for name in present if (match := _LOG.fullmatch(name)))
-    opened = {session for session, _, name in logs if name.endswith(".part")}
-    finished = [name for _, _, name in logs
-                if not name.endswith(".part") and name.rpartition(".")[0] + ".csv" in present]
-    recordings = sorted((int(match[1]), name) for name in present if (match := _DUMP.fullmatch(name)))
-    return finished + [name for session, name in recordings if dumps and session not in opened]
+    finished = [name for _, _, name in logs if name.rpartition(".")[0] + ".csv" in present]
+    recordings = sorted((int(match[1]), int(match[2] or 0), name)
+                        for name in present if (match := _DUMP.fullmatch(name)))
+    return finished + [name for _, _, name in recordings if dumps]
 
 
 class _Export:
@@ -163,7 +162,7 @@ class _Export:
                 break
             if len(self._fresh) >= FILES_PER_MANIFEST:
                 self._settle()
-        reason = f"no room on the stick: {short / 1e6:.1f} MB more are needed"
+        reason = f"no room on the stick: {-(-short // 1000)} kB more are needed"
         self._failures += [Failure(name, reason) for name in missing[len(fitting):]]
         if (fault := self._settle()) is not None:
             self._give_up_unlisted(f"the manifest on the stick: {fault}")

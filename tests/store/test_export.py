@@ -105,7 +105,7 @@ def logs(tmp_path: Path) -> Path:
     """Two finished logs, an open one, a recording of each session, and what else lies in such a folder."""
     folder = tmp_path / "log"
     folder.mkdir()
-    for name in (*NAMES, "00003-001.csv.part", "00003-001.json", "00002.dump.gz", "00003.dump.gz", "last-session",
+    for name in (*NAMES, "00003-001.csv.part", "00003-001.json", "00002.dump.gz", "00003.dump.gz.part", "last-session",
                  "00004-001.csv.tmp", "notes.txt"):
         (folder / name).write_bytes(f"content of {name}\n".encode() * 10)
     return folder
@@ -197,10 +197,13 @@ def test_only_what_is_new_is_copied(logs: Path, stick: Path) -> None:
 
 
 def test_order_is_that_of_the_sessions_beyond_five_digits_too(tmp_path: Path) -> None:
-    for name in ("100000-001.csv", "99999-002.csv", "99999-001.csv", "99999-001.json", "00007.json", "99999-003.json"):
+    logs = ["99999-001.csv", "99999-001.json", "99999-002.csv", "100000-001.csv"]
+    dumps = ["99999.dump", "99999-2.dump.gz", "99999-10.dump.gz", "100000.dump.gz"]
+    for name in (*logs, *dumps, "00007.json", "99999-003.json", "100001.dump.gz.part", "100001-001.csv.part"):
         (tmp_path / name).touch()
     with OpenFolder.at(tmp_path) as folder:
-        assert finished_files(folder, False) == ["99999-001.csv", "99999-001.json", "99999-002.csv", "100000-001.csv"]
+        assert finished_files(folder, False) == logs
+        assert finished_files(folder, True) == logs + dumps
 
 
 def test_a_second_stick_gets_everything_too(logs: Path, stick: Path, tmp_path: Path) -> None:
