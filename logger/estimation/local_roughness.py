@@ -21,6 +21,7 @@ _COMMON = 8.0
 _TAKEN_OVER = 0.6  # of a new estimate, so that it does not overshoot
 _SMALLEST_LOG, _LARGEST_LOG = -3.0, 7.0
 _LEAST_SCATTER, _LARGEST_SCATTER = 1e-3, 1.0
+_CLASSES = 8
 _LOG_TABLE = np.linspace(_SMALLEST_LOG, _LARGEST_LOG, 21)
 
 
@@ -94,7 +95,9 @@ def mean_told(gain: Array, variance: Array) -> Array:
     """Share of each wave that the readings tell, mean over points of relative variance d (n,)."""
     if not len(variance):
         return gain / (1 + gain)
-    counts, edges = np.histogram(np.log(variance), bins=8)
-    strength = np.exp(0.5 * (edges[1:] + edges[:-1]))[:, None] * gain
+    logs = np.log(variance)
+    counts, edges = np.histogram(logs, bins=_CLASSES)
+    sums, _ = np.histogram(logs, bins=edges, weights=logs)
+    strength = np.exp(sums / np.maximum(counts, 1))[:, None] * gain
     mean: Array = (counts / counts.sum()) @ (strength / (1 + strength))
     return mean

@@ -1,5 +1,6 @@
 """Learning of spectrum and noise against exact log evidence, and on generated roads of known spectrum."""
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
 from logger.estimation.block import Block, Solution, TimeGrid
 from logger.estimation.car_response import CarResponse
+from logger.estimation.local_roughness import mean_told
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
@@ -57,17 +59,15 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
         g = gain * there.psd(n) / now.psd(n)
         return float(-np.log1p(g).sum() - (power / (1 + g)).sum()) + log_prior(there, before)
 
-    count = 1000
-    waves = np.sqrt(count * power * gain) / (1 + gain)
-    nothing = np.zeros(1)
-    found = learnt(Belief(now), Solution(waves + 0j, waves + 0j, nothing, nothing, gain), n, 1.0, count, before)
+    told = gain / (1 + gain)
+    found = learnt(Belief(now), told * power / (1 + gain), told, n, 1.0, before)  # the most probable waves have this
     h = 1e-4
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
     ]) / (2 * h)
     tilt = -np.log(np.maximum(n, FLATTENED_BELOW_CPM) / PIVOT_CPM)
     rows = np.stack([np.ones(400), tilt])
-    expected = (rows * (gain / (1 + gain)) ** 2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
+    expected = (rows * told**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
     if before is not None:
         expected += np.diag([0.3**-2, 0.1**-2])
     step = np.linalg.solve(expected, slope)
@@ -77,16 +77,32 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
     assert found.log_level_std == pytest.approx(np.sqrt(np.linalg.inv(expected)[0, 0]), rel=1e-6)
 
 
-def test_slope_is_that_of_the_exact_evidence_of_a_drive() -> None:
-    """log N(y; 0, B B' + noise) by dense algebra, its slope by differences; the level is put off on purpose."""
+def whitened(block: Block, solution: Solution, variance: np.ndarray) -> np.ndarray:
+    """Power of each wave of the innovations over their deviations, as ``learnt`` takes it."""
+    white = np.fft.irfft(solution.waves, block.count) / np.sqrt(variance)
+    return np.abs(np.fft.rfft(white)) ** 2 / block.count
+
+
+def patchy(block: Block) -> np.ndarray:
+    """A road whose variance goes up and down by a factor of four, with a rough metre in it."""
+    place = block.spacing_m * np.arange(block.count)
+    variance = 4.0 ** np.sin(place / 15.0)
+    variance[(place > 120) & (place < 121)] = 100.0
+    return variance
+
+
+@pytest.mark.parametrize("variance_of", [lambda block: np.ones(block.count), patchy])
+def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[Block], np.ndarray]) -> None:
+    """log N(y; 0, B D B' + noise) by dense algebra, its slope by differences; the level is put off on purpose."""
     rng = np.random.default_rng(3)
     block = a_block(1024, 25.0)
+    variance = variance_of(block)
     true, now = RoadSpectrum.of_iri(3.0), RoadSpectrum.of_iri(2.6, 2.05)
-    road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_deviations(true)
-    reading = block.driven(road) + rng.normal(0, NOISE_MPS2, 1024)
+    innovations = np.sqrt(variance) * rng.standard_normal(block.count)
+    reading = block.driven(np.fft.rfft(innovations) * block.wave_factors(true)) + rng.normal(0, NOISE_MPS2, 1024)
     unit = np.fft.rfft(np.eye(block.count), axis=1)
     # A apart from F, so that the matrix is built once: B B' = A S A'.
-    matrix = np.array([block.driven(row * block.wave_deviations(now)) for row in unit]).T
+    matrix = np.array([block.driven(row * block.wave_factors(now)) for row in unit]).T
     ratio = block.wave_number_cpm
 
     def log_posterior(level: float, waviness: float) -> float:
@@ -94,21 +110,21 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive() -> None:
         shape = np.sqrt(there.psd(ratio) / now.psd(ratio))
         scaled = np.fft.irfft(np.fft.rfft(matrix, axis=1) * shape, block.count, axis=1)
         drift = time_grid(1024).drift
-        covariance = scaled @ scaled.T + NOISE_MPS2**2 * np.eye(1024)
+        covariance = (scaled * variance) @ scaled.T + NOISE_MPS2**2 * np.eye(1024)
         covariance += drift @ np.diag(1 / time_grid(1024).drift_precision) @ drift.T
         return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * reading @ np.linalg.solve(covariance, reading)
                      + log_prior(there, None))
 
     weight = np.full(1024, NOISE_MPS2**-2)
-    solution = block.solve(reading, weight, now, 100)
+    solution = block.solve(reading, weight, now, variance, 400)
     share = block.seen_points(weight > 0) / block.count
-    found = learnt(Belief(now), solution, block.wave_number_cpm, share, block.count, None)
+    told = mean_told(solution.gain, variance[block.seen(weight > 0) > 0])
+    found = learnt(Belief(now), whitened(block, solution, variance), told, block.wave_number_cpm, share, None)
     step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
     h = 0.02
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
     ]) / (2 * h)
-    told = solution.gain / (1 + solution.gain)
     seen = solution.gain > 0
     tilt = -np.log(np.maximum(block.wave_number_cpm[seen], FLATTENED_BELOW_CPM) / PIVOT_CPM)
     rows = np.stack([np.ones(seen.sum()), tilt])
@@ -128,17 +144,20 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
     weight = np.full(count, NOISE_MPS2**-2)
     weight[:250] = 0.0
     share = block.seen_points(weight > 0) / block.count
-    scores, wavinesses = [], []
+    even, scores, wavinesses = np.ones(block.count), [], []
     for iri, waviness in ((1.0, 2.2), (3.0, 1.9), (9.0, 2.0)):
         true = RoadSpectrum.of_iri(iri, waviness)
         for _ in range(10):
-            road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_deviations(true)
+            road = np.fft.rfft(rng.standard_normal(block.count)) * block.wave_factors(true)
             reading = block.driven(road) + rng.normal(0, NOISE_MPS2, count)
             belief, waves = Belief(COMMON_ROAD), None
             for _ in range(8):
-                solution = block.solve(reading, weight, belief.spectrum, 8, waves)
+                solution = block.solve(reading, weight, belief.spectrum, even, 8, waves)
                 waves = solution.waves
-                belief = learnt(belief, solution, block.wave_number_cpm, share, block.count, None)
+                told = solution.gain / (1 + solution.gain)
+                belief = learnt(
+                    belief, whitened(block, solution, even), told, block.wave_number_cpm, share, None
+                )
             scores.append((belief.spectrum.log_level - true.log_level) / belief.log_level_std)
             wavinesses.append(belief.spectrum.waviness - waviness)
     assert abs(np.mean(scores)) < 0.6
@@ -167,8 +186,8 @@ def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
 
 def test_nothing_read_leaves_what_roads_are_like() -> None:
     block = a_block(1024, 15.0)
-    solution = block.solve(np.zeros(1024), np.zeros(1024), COMMON_ROAD, 4)
-    found = learnt(Belief(COMMON_ROAD), solution, block.wave_number_cpm, 0.0, block.count, None)
+    waves = np.zeros(len(block.wave_number_cpm))
+    found = learnt(Belief(COMMON_ROAD), waves, waves, block.wave_number_cpm, 0.0, None)
     assert found.spectrum == COMMON_ROAD
     assert found.log_level_std == pytest.approx(1.8)
     assert with_noise(found, np.zeros(1024), np.zeros(1024), 0.0).log_noise == pytest.approx(0.0, abs=0.2)

@@ -1,5 +1,6 @@
 """The solution of a block against time-domain simulation, dense linear algebra and the textbook Wiener filter."""
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -42,7 +43,20 @@ def a_block(name: str = "rav4-2009", count: int = 1024, speeds_mps: list[float] 
 def a_road(block: Block, rng: np.random.Generator, spectrum: RoadSpectrum = ROAD) -> np.ndarray:
     """rfft of a random road of the spectrum on the block's grid."""
     white = np.fft.rfft(rng.standard_normal(block.count))
-    return white * block.wave_deviations(spectrum)
+    return white * block.wave_factors(spectrum)
+
+
+def even(block: Block) -> np.ndarray:
+    """As rough everywhere."""
+    return np.ones(block.count)
+
+
+def uneven(block: Block) -> np.ndarray:
+    """Relative variances of a road with smooth and rough stretches and a pothole."""
+    place = SPACING_M * np.arange(block.count)
+    variance = 4.0 ** np.sin(place / 9.0)
+    variance[(place > 60) & (place < 61)] = 300.0
+    return variance
 
 
 def weights(count: int, deviation: float = 0.06) -> np.ndarray:
@@ -97,9 +111,9 @@ def test_the_transpose_is_one(name: str) -> None:
 
 def dense(block: Block, spectrum: RoadSpectrum) -> np.ndarray:
     """B (t, count) by driving over every unit of white road."""
-    deviation = block.wave_deviations(spectrum)
+    factor = block.wave_factors(spectrum)
     unit = np.fft.rfft(np.eye(block.count), axis=1)
-    return np.array([block.driven(row * deviation) for row in unit]).T
+    return np.array([block.driven(row * factor) for row in unit]).T
 
 
 @cache
@@ -114,30 +128,34 @@ def small_problem() -> tuple[Block, np.ndarray, np.ndarray, np.ndarray]:
     return block, matrix, reading + rng.normal(0, 0.06, 640), weight
 
 
-def test_the_solution_is_that_of_dense_algebra_with_drift() -> None:
+@pytest.mark.parametrize(("variance_of", "steps"), [(even, 200), (uneven, 700)])
+def test_the_solution_is_that_of_dense_algebra_with_drift(
+    variance_of: Callable[[Block], np.ndarray], steps: int
+) -> None:
     block, matrix, reading, weight = small_problem()
+    variance = variance_of(block)
     grid = time_grid("rav4-2009", 640)
     both = np.hstack([matrix, grid.drift])
-    precision = np.concatenate([np.ones(block.count), grid.drift_precision])
+    precision = np.concatenate([1 / variance, grid.drift_precision])
     exact = np.linalg.solve(both.T @ (weight[:, None] * both) + np.diag(precision), both.T @ (weight * reading))
-    found = block.solve(reading, weight, ROAD, 200)
+    found = block.solve(reading, weight, ROAD, variance, steps)
     assert np.fft.irfft(found.waves, block.count) == pytest.approx(exact[:block.count], abs=1e-6)
     assert found.drift_mps2 == pytest.approx(grid.drift @ exact[block.count:], abs=1e-6)
     assert found.fitted_mps2 == pytest.approx(both @ exact, abs=1e-6)
-    assert found.road == pytest.approx(found.waves * block.wave_deviations(ROAD))
+    assert found.road == pytest.approx(found.waves * block.wave_factors(ROAD))
 
 
 def test_more_steps_get_nearer_and_going_on_is_no_start_anew() -> None:
     """In the Golden Car's slope on the whole block, against the settled solution."""
     block, _, reading, weight = small_problem()
-    exact = block.solve(reading, weight, ROAD, 200)
+    exact = block.solve(reading, weight, ROAD, even(block), 200)
 
     def off(waves: np.ndarray) -> float:
-        slopes = (waves - exact.waves) * block.wave_deviations(ROAD) * golden_car_slope(block.wave_number_cpm)
+        slopes = (waves - exact.waves) * block.wave_factors(ROAD) * golden_car_slope(block.wave_number_cpm)
         return float(np.linalg.norm(slopes))
 
-    few, more, most = (block.solve(reading, weight, ROAD, steps).waves for steps in (8, 16, 40))
-    further = block.solve(reading, weight, ROAD, 8, few).waves
+    few, more, most = (block.solve(reading, weight, ROAD, even(block), steps).waves for steps in (8, 16, 40))
+    further = block.solve(reading, weight, ROAD, even(block), 8, few).waves
     none = off(np.zeros_like(few))
     assert 0.25 * none > off(few) > off(more) > off(most) and off(most) < 0.02 * none
     assert off(further) < 0.7 * off(few)
@@ -151,17 +169,19 @@ def test_what_an_earlier_block_found_is_a_head_start(hop: int) -> None:
     earlier, later = (Block(time_grid("rav4-2009", count), distance_m[part], SPACING_M, ALIGN_M) for part in parts)
     whole = Block(time_grid("rav4-2009", count + hop), distance_m, SPACING_M, ALIGN_M)
     reading = whole.driven(a_road(whole, rng)) + rng.normal(0, 0.06, count + hop)
-    found = [block.solve(reading[part], weights(count), ROAD, 60).waves
+    found = [block.solve(reading[part], weights(count), ROAD, even(block), 60).waves
              for block, part in zip((earlier, later), parts, strict=True)]
     start = later.carried_over(earlier, found[0])
     assert start.shape == found[1].shape
     inside = slice(*((distance_m[[hop + 500, hop + count - 300]] - later.start_m) / SPACING_M).astype(int))
 
     def slope(waves: np.ndarray) -> np.ndarray:
-        golden = golden_car_slope(later.wave_number_cpm) * later.wave_deviations(ROAD)
+        golden = golden_car_slope(later.wave_number_cpm) * later.wave_factors(ROAD)
         return np.fft.irfft(waves * golden, later.count)[inside]
 
-    cold, warm = (later.solve(reading[parts[1]], weights(count), ROAD, 4, one).waves for one in (None, start))
+    cold, warm = (
+        later.solve(reading[parts[1]], weights(count), ROAD, even(later), 4, one).waves for one in (None, start)
+    )
     assert np.std(slope(warm) - slope(found[1])) < 0.5 * np.std(slope(cold) - slope(found[1]))
 
 
@@ -177,13 +197,13 @@ def test_blocks_that_do_not_overlap_hand_nothing_over() -> None:
 def test_readings_without_weight_change_no_bit(garbage: float) -> None:
     block, _, reading, weight = small_problem()
     other = np.where(weight > 0, reading, garbage)
-    one, two = block.solve(reading, weight, ROAD, 6), block.solve(other, weight, ROAD, 6)
+    one, two = (block.solve(row, weight, ROAD, uneven(block), 6) for row in (reading, other))
     assert (one.waves == two.waves).all() and (one.fitted_mps2 == two.fitted_mps2).all()
 
 
 def test_no_readings_give_the_flat_road() -> None:
     block, _, reading, _ = small_problem()
-    found = block.solve(reading, np.zeros(640), ROAD, 6)
+    found = block.solve(reading, np.zeros(640), ROAD, uneven(block), 6)
     assert not found.waves.any() and not found.fitted_mps2.any() and not found.gain.any()
 
 
@@ -194,7 +214,7 @@ def test_at_a_steady_speed_it_is_the_wiener_filter(speed_mps: float) -> None:
     count = 2048 if speed_mps > 10 else 8192  # the wheelbase's notches are filled from far along the road
     block = Block(time_grid("rav4-2009", count), way(count, [speed_mps] * 2), SPACING_M, ALIGN_M)
     reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, count)
-    found = block.solve(reading, np.full(count, 0.06**-2), ROAD, 40)
+    found = block.solve(reading, np.full(count, 0.06**-2), ROAD, even(block), 40)
 
     f_hz = np.fft.rfftfreq(count, 1 / RATE_HZ)
     seen = (f_hz > 0) & (f_hz <= 42.0)
@@ -215,7 +235,7 @@ def test_at_a_steady_speed_it_is_the_wiener_filter(speed_mps: float) -> None:
 def test_gain_is_the_information_of_a_steady_speed() -> None:
     """Signal over noise of each wave, |H|^2 S / N."""
     block = a_block(speeds_mps=[20.0, 20.0])
-    gain = block.solve(np.zeros(1024), np.full(1024, 0.06**-2), ROAD, 1).gain
+    gain = block.solve(np.zeros(1024), np.full(1024, 0.06**-2), ROAD, even(block), 1).gain
     middle = (block.wave_number_cpm > 0.01) & (block.wave_number_cpm < 1.5)
     n = block.wave_number_cpm[middle]
     power = np.abs(body_acceleration_response(car("rav4-2009"), n * 20.0, 20.0)) ** 2
@@ -242,7 +262,7 @@ def test_seen_points_and_seen_places() -> None:
 def test_a_car_that_stands_all_the_time() -> None:
     block = Block(time_grid("rav4-2009", 640), np.full(640, 50.0), SPACING_M, ALIGN_M)
     assert not block.moving.any()
-    found = block.solve(np.full(640, 9.81), weights(640), ROAD, 6)
+    found = block.solve(np.full(640, 9.81), weights(640), ROAD, even(block), 6)
     assert np.isfinite(found.road).all() and found.fitted_mps2 == pytest.approx(np.full(640, 9.81), abs=1e-3)
 
 
@@ -253,10 +273,10 @@ def test_a_place_that_jumps_costs_no_short_waves() -> None:
     block = Block(time_grid("rav4-2009", 2048), distance_m, SPACING_M, ALIGN_M)
     reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, 2048)
     jumped = Block(time_grid("rav4-2009", 2048), distance_m + 4.0 * (np.arange(2048) > 1200), SPACING_M, ALIGN_M)
+    roads = [one.solve(reading, weights(2048), ROAD, even(one), 30).road for one in (block, jumped)]
     slopes = [
-        np.fft.irfft(one.solve(reading, weights(2048), ROAD, 30).road * golden_car_slope(one.wave_number_cpm),
-                     one.count)
-        for one in (block, jumped)
+        np.fft.irfft(road * golden_car_slope(one.wave_number_cpm), one.count)
+        for one, road in zip((block, jumped), roads, strict=True)
     ]
     before = slice(*((distance_m[[500, 1000]] - block.start_m) / SPACING_M).astype(int))
     assert np.std(slopes[0][before] - slopes[1][before]) < 0.05 * np.std(slopes[0][before])

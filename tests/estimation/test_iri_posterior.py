@@ -22,6 +22,7 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_acceleration_response, body_point
 
 SPACING_M, POINTS, COUNT = 0.1524, 50, 50 * 2560
+WINDOW_M = SPACING_M * POINTS
 RATE_HZ = 100.0
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 CAR = CarResponse(RAV4, body_point(RAV4))
@@ -74,7 +75,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     louder = errors.at(speed_mps, raised(spectrum), deviation**2)
     numbers = range(COUNT // POINTS - 1)
     windows = [slice(number * POINTS, (number + 1) * POINTS + 1) for number in numbers]
-    estimates = [window_iri(found[w], np.zeros(POINTS + 1), knowledge, louder, 0.0) for w in windows]
+    estimates = [window_iri(found[w], np.zeros(POINTS + 1), knowledge, louder, 0.0, WINDOW_M) for w in windows]
     exact = np.array([1000 * np.trapezoid(np.abs(true[w])) / POINTS for w in windows])
     estimate = np.array([one.iri_m_per_km for one in estimates])
     std = np.array([one.own_std_m_per_km for one in estimates])
@@ -91,8 +92,8 @@ def test_the_levels_error_moves_all_windows_alike() -> None:
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
     dull, louder = errors.at(5.0, spectrum, 0.3**2), errors.at(5.0, raised(spectrum), 0.3**2)
     flat, unseen = np.zeros(POINTS + 1), np.zeros(POINTS + 1)
-    found = window_iri(flat, unseen, dull, louder, 0.2)
-    more = window_iri(flat, unseen, louder, louder, 0.2)
+    found = window_iri(flat, unseen, dull, louder, 0.2, WINDOW_M)
+    more = window_iri(flat, unseen, louder, louder, 0.2, WINDOW_M)
     rise = (more.iri_m_per_km - found.iri_m_per_km) / (raised(spectrum).log_level - spectrum.log_level)
     assert found.shared_std_m_per_km == pytest.approx(0.2 * rise, rel=1e-9)
     assert found.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * dull.left), rel=1e-6)
@@ -102,7 +103,7 @@ def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
     spectrum = RoadSpectrum.of_iri(3.0)
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
     known = errors.at(20.0, spectrum, 0.05**2)
-    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), known, known, 0.0)
+    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), known, known, 0.0, WINDOW_M)
     assert blind.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * known.variance), rel=1e-6)
     assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre
 
