@@ -58,7 +58,7 @@ def test_systemd_finds_nothing_wrong(units: list[Path]) -> None:
 def test_systemd_would_find_something_wrong(units: list[Path]) -> None:
     """The check can fail."""
     text = units[0].read_text()
-    units[0].write_text(text.replace("WatchdogSec=20", "WatchdogSec=soon\nWachtdog=20"))
+    units[0].write_text(text.replace("WatchdogSec=30", "WatchdogSec=soon\nWachtdog=20"))
     done = subprocess.run(["systemd-analyze", "verify", "--man=no", units[0]], capture_output=True, text=True)
     assert len([line for line in (done.stdout + done.stderr).splitlines() if "ridelog.service" in line]) == 2
 
