@@ -33,6 +33,7 @@ VERBS = {
     "estimate": "IRI and profile of the road from a drive's acceleration, beside what is possible",
     "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
+    "hil": "play a recorded dump into serial ports for the running service, and check its log",
 }
 EXIT_INTERRUPTED = 130
 EXIT_PIPE_CLOSED = 141

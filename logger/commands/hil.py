@@ -1,0 +1,208 @@
+"""Hardware in the loop: play a recorded drive into serial ports for a running service, then check what it logged.
+
+The bytes go out at the times at which they came. At the other end of the wires (two USB-serial adapters, or
+pseudo-terminals) a service that has just been started listens. Its log is compared with a replay of the same bytes
+under the same settings. With ports and --log: play, then compare. With ports alone: only play, for a service on
+another machine. With --log alone: only compare, with a copy of its folder.
+
+The readings of a BMA220 are sent as a bridge microcontroller would send them: as lines, profile `lines`.
+Exit status 1 when the log does not agree, or the bytes were sent too late to tell.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from drivers.dump import DumpReader, open_dump
+from drivers.hardware import open_serial
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.records import WindowRecord
+from logger.service.agreement import Agreement, Difference, compare, read_sessions
+from logger.service.config import Config, find_config, load_config
+from logger.service.hil import Sent, Wired, expected_rows, send, wired
+
+LATE_MS = 50.0
+LATE_WHY = "the service itself waits as long between two looks at a port"
+WRITTEN_S = 2.0
+_MOVED_M = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog hil``."""
+    parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
+    parser.add_argument("--nmea-port", metavar="PORT", help="serial port wired to that of the service's GPS")
+    parser.add_argument("--pasco-port", metavar="PORT", help="serial port wired to that of its accelerometer")
+    parser.add_argument("--log", metavar="DIR", type=Path, help="folder of the service's logs, or a copy of it")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service (default: those of 'run')")
+    parser.add_argument("--seconds", metavar="N", type=float, help="only the first N seconds of the recording")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog hil``."""
+    if (args.nmea_port is None) != (args.pasco_port is None):
+        raise BadInput("expected --nmea-port and --pasco-port, or neither")
+    if args.nmea_port is None and args.log is None:
+        raise BadInput("expected two ports to play into, --log DIR to compare with, or all three")
+    if args.seconds is not None and not args.seconds > 0:
+        raise BadInput(f"--seconds {args.seconds:g}: expected more than 0")
+    config = load_config(find_config(args.config))
+    expected = _expected(args, config) if args.log is not None else None
+    sent = _play(args, config) if args.nmea_port is not None else None
+    if sent is not None and expected is not None:
+        time.sleep(WRITTEN_S)
+    agreement = compare(expected, read_sessions(args.log)) if expected is not None else None
+    result = Result(_is_bridged(args), sent, agreement)
+    print(json.dumps(result.as_json()) if args.json else result.text())
+    return EXIT_DONE if result.ok else EXIT_CHECK_FAILED
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was sent and what was found; None: not asked for. ``bridged``: sent as lines, though a BMA220's."""
+
+    bridged: bool
+    sent: Sent | None
+    agreement: Agreement | None
+
+    @property
+    def in_time(self) -> bool:
+        """What was sent came early enough to judge the service by it."""
+        return self.sent is None or self.sent.late_ms[1] <= LATE_MS
+
+    @property
+    def ok(self) -> bool:
+        """All that was asked for is well."""
+        return self.in_time and (self.agreement is None or self.agreement.ok)
+
+    def as_json(self) -> dict[str, Any]:
+        """Named fields, units in the names."""
+        return {"ok": self.ok, "bridged_to_lines": self.bridged, "sent": _sent_json(self.sent, self.in_time),
+                "agreement": _agreement_json(self.agreement)}
+
+    def text(self) -> str:
+        """For a person."""
+        lines = []
+        if self.bridged:
+            lines.append("The BMA220's readings go as lines x,y,z in g: no serial port can stand in for its I2C bus.")
+        if self.sent is not None:
+            size = ", ".join(f"{count} bytes of {source}" for source, count in self.sent.size_bytes.items())
+            half, most, longest = self.sent.late_ms
+            lines += [f"Sent {self.sent.duration_s:.0f} s: {size}.",
+                      f"  late: {half:.1f} ms in the middle, {most:.1f} ms in 99 of 100, {longest:.1f} ms at most "
+                      f"(99 of 100 may be late by {LATE_MS:g} ms: {LATE_WHY}){'' if self.in_time else '  TOO LATE'}"]
+        if self.agreement is not None:
+            lines += _agreement_text(self.agreement)
+            lines.append("The log AGREES with the replay." if self.agreement.ok else
+                         "The log does NOT AGREE with the replay.")
+        else:
+            lines.append("Compare when its log is here: ridelog hil DUMP --log DIR --config FILE, with its settings.")
+        return "\n".join(lines)
+
+
+def _is_bridged(args: argparse.Namespace) -> bool:
+    with open_dump(args.dump) as reader:
+        return reader.header.accelerometer["driver"] == "bma220"
+
+
+def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
+    """What the service should log; fails before anything is played when the comparison could not be made."""
+    if not args.log.is_dir():
+        raise BadInput(f"{args.log}: expected the folder of the service's logs")
+    if args.nmea_port is not None and not list(args.log.glob("*.csv.part")):
+        raise BadInput(f"{args.log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
+    with open_dump(args.dump) as reader:
+        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1")
+    if not any(row.utc_us is not None for row in expected):
+        raise BadInput(f"{args.dump}: expected GPS fixes with date and time in it, by which its rows are found")
+    return expected
+
+
+def _play(args: argparse.Namespace, config: Config) -> Sent:
+    bauds = {"pasco": config.accelerometer.pasco.baud, "nmea": config.gps.baud}
+    names = {"pasco": args.pasco_port, "nmea": args.nmea_port}
+    with ExitStack() as stack:
+        reader = stack.enter_context(open_dump(args.dump))
+        recording = _wired(args, reader)
+        ports = {}
+        for source, name in names.items():
+            ports[source] = open_serial(name, bauds[source])
+            stack.callback(ports[source].close)
+            print(f"{source} to {name} at {bauds[source]} baud", file=sys.stderr)
+        try:
+            return send(recording.events, ports, _now_us, time.sleep, _tell)
+        finally:
+            print(file=sys.stderr)
+
+
+def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
+    return wired(reader.header, reader, args.seconds, f"{args.dump}:1")
+
+
+def _tell(played_s: float) -> None:
+    print(f"\rplaying: {played_s:.0f} s", end="", file=sys.stderr, flush=True)
+
+
+def _now_us() -> int:
+    return time.monotonic_ns() // 1000
+
+
+def _sent_json(sent: Sent | None, in_time: bool) -> dict[str, Any] | None:
+    if sent is None:
+        return None
+    half, most, longest = sent.late_ms
+    return {"duration_s": sent.duration_s, "size_bytes": dict(sent.size_bytes), "late_p50_ms": half,
+            "late_p99_ms": most, "late_max_ms": longest, "late_p99_tolerance_ms": LATE_MS, "in_time": in_time}
+
+
+def _agreement_json(agreement: Agreement | None) -> dict[str, Any] | None:
+    if agreement is None:
+        return None
+    fields = asdict(agreement)
+    for name in ("clock_shift_s", "moved_before_m"):
+        fields[name] = _number(fields[name])
+    fields["differences"] = [
+        {"quantity": each.tolerance.quantity, "unit": each.tolerance.unit, "compared": each.compared,
+         "p95": _number(each.p95), "largest": _number(each.largest), "tolerance": each.tolerance.least,
+         "or_share": each.tolerance.share, "of": each.tolerance.of, "outside": each.outside, "ok": each.ok,
+         "why": each.tolerance.why}
+        for each in agreement.differences
+    ]
+    return {"ok": agreement.ok, **fields}
+
+
+def _number(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _agreement_text(agreement: Agreement) -> list[str]:
+    if agreement.session is None:
+        return [f"No row of this drive is in the log: {agreement.expected} were expected.",
+                "  Is the service up, are its ports the other ends of the wires, and is TX on RX?"]
+    lines = [f"Session {agreement.session:05d}: {agreement.matched} of {agreement.expected} expected rows found, "
+             f"{len(agreement.missing)} missing, {agreement.pending} not written yet, {len(agreement.surplus)} not "
+             f"expected, {agreement.flags_differ} with other flags."]
+    if abs(agreement.moved_before_m) > _MOVED_M:
+        lines.append(f"  The service had counted {agreement.moved_before_m:.0f} m before, so its windows begin "
+                     "elsewhere: start it anew for each play.")
+    for words, segments in (("missing", agreement.missing), ("not expected", agreement.surplus)):
+        if segments:
+            lines.append(f"  {words}: segments {', '.join(map(str, segments[:10]))}{' ...' if segments[10:] else ''}")
+    lines.append(f"  {'':9} {'95 of 100':>9} {'largest':>8}        {'outside':>7}   may be")
+    return lines + [_difference_text(difference) for difference in agreement.differences]
+
+
+def _difference_text(difference: Difference) -> str:
+    tolerance = difference.tolerance
+    share = f" or {tolerance.share:.0%} of {tolerance.of}" if tolerance.of else ""
+    return (f"  {tolerance.quantity:9} {difference.p95:9.3f} {difference.largest:8.3f} {tolerance.unit:6} "
+            f"{difference.outside:7d}   {tolerance.least:g}{share}: {tolerance.why}"
+            f"{'' if difference.ok else '  TOO MANY OUTSIDE'}")
