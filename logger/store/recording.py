@@ -24,7 +24,7 @@ from logger.units import US_PER_S
 
 ENDING = ".dump.gz"
 RETRY_US = 60 * US_PER_S
-_OPEN_NAME = re.compile(r"\d{5,}(-\d+)?\.dump\.gz\.part")
+_OPEN_NAME = re.compile(r"\d{5,}(-\d{3,})?\.dump\.gz\.part")
 log = logging.getLogger(__name__)
 
 
@@ -74,7 +74,7 @@ class Recording:
         if self._writer is not None or self._held or session is None or self._now_us() < self._retry_us:
             return
         self._number += 1
-        suffix = "" if self._number == 1 else f"-{self._number}"
+        suffix = "" if self._number == 1 else f"-{self._number:03d}"
         self._path = self._directory / f"{session:05d}{suffix}{ENDING}.part"
         try:
             self._writer = DumpWriter(self._path, self._header, self._files)

@@ -12,7 +12,15 @@ import pytest
 from logger.commands.status import screen
 from logger.errors import BadInput
 from logger.records import WindowRecord
-from logger.service.status import SensorStatus, ServiceStatus, process_exists, read_status, trouble, write_status
+from logger.service.status import (
+    SensorStatus,
+    ServiceStatus,
+    StorageStatus,
+    process_exists,
+    read_status,
+    trouble,
+    write_status,
+)
 
 WINDOW = WindowRecord(
     segment=7, drive=1, t_us=12_000_000, utc_us=None, duration_s=0.4, distance_start_m=45.72, distance_end_m=53.34,
@@ -87,10 +95,19 @@ def test_the_screen_of_a_healthy_service_says_so() -> None:
     ({"gps": SensorStatus("nmea", "/dev/serial0", "retrying", 9.0)}, "cable"),
     ({"fix_valid": None}, "view of the sky"),
     ({"free_bytes": 1_000_000}, "1 MB left"),
+    ({"storage": StorageStatus("the disk is full", 70.0, 12)}, "12 rows wait in memory"),
+    ({"storage": StorageStatus(rows_lost=3)}, "3 rows were lost"),
+    ({"storage": StorageStatus(recording_trouble="little room")}, "not recorded: little room"),
+    ({"storage": StorageStatus(dumps_lost=2)}, "2 dumps were removed"),
 ])
 def test_the_screen_says_what_to_do_next(change: dict[str, object], step: str) -> None:
     lines = screen(replace(STATUS, **change), None)
     assert any(step in line for line in lines[lines.index("What to do"):])
+
+
+def test_a_service_that_cannot_write_says_so_in_the_first_line() -> None:
+    lines = screen(replace(STATUS, storage=StorageStatus("the disk has become read-only", 70.0, 12)), None)
+    assert lines[0] == "ridelog is recording, but writes NOTHING: the disk has become read-only, up 1 h 2 min"
 
 
 def test_without_a_service_the_screen_says_how_to_start_one() -> None:

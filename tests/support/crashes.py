@@ -2,11 +2,12 @@
 
 ``Life`` drives the real storage of the service (log, sidecars, session counter, raw dump) with rows and bytes of its
 own and notes at each instant what had been promised by then. ``crash`` ends it after some change of the disk, lets the
-next start repair what is found, and compares.
+next start repair what is found, and compares. ``outage`` lets the disk refuse for a while and come back.
 """
 
 from __future__ import annotations
 
+import errno
 import random
 import shutil
 from dataclasses import dataclass, replace
@@ -22,11 +23,15 @@ from logger.store.segment_log import format_row, parse_row, read_log
 from logger.store.space import Limits
 from logger.store.verify import verify
 
-from faulty_disk import CrashModel, RecordingFiles
+from faulty_disk import CrashModel, RecordingFiles, RefusingFiles
 
 FACTS = {"ridelog_version": "test", "sensor": {"driver": "bma220", "verified": True}}
 HEADER = DumpHeader(None, {"driver": "bma220", "range_g": 2}, {"baud": 9600}, "rav4-2009")
 OFFSET_US = 1_783_160_000_000_000
+ERRORS = (errno.ENOSPC, errno.EIO, errno.EROFS)
+KINDS = ("create", "write", "sync", "close", "rename", "remove", "sync_directory")
+WHOLE_DISK = Limits(floor_bytes=0)
+OUTAGE_STEPS = 60
 
 
 def window(segment: int, utc: bool) -> WindowRecord:
@@ -61,7 +66,7 @@ class Life:
         self.promised = Promised()
         self.utc_from = NEVER
         rng = random.Random(seed)
-        storage = Storage(folder, FACTS, max_file_bytes, HEADER, Limits(floor_bytes=0), lambda: 0, self.files)
+        storage = Storage(folder, FACTS, max_file_bytes, HEADER, WHOLE_DISK, lambda: 0, self.files)
         self.session = storage.log.session
         clock_at = rng.randrange(steps)
         for step in range(steps):
@@ -108,6 +113,7 @@ class Outcome:
     events_promised: int = 0
     events_found: int = 0
     torn_or_damaged: int = 0
+    told: bool = False
     wrong: str = ""
 
 
@@ -189,16 +195,104 @@ def _compare(folder: Path, life: Life, before: Promised, number: int, outcome: O
         sidecar = read_sidecar(log)
         _hold(sidecar is not None and sidecar["sensor"] == FACTS["sensor"], f"sidecar of {log.name}")
         _hold(sidecar["log"]["rows"] == len(content.records), f"rows in the sidecar of {log.name}")
-    events = []
-    for dump in dumps:
-        with open_dump(dump) as reader:
-            events += list(reader)
-            _hold(not reader.torn_tail, f"{dump.name} ends well")
-    outcome.events_found = len(events)
-    _hold(events == [event_of(place) for place in range(len(events))], "events as they were recorded")
-    _hold(len(events) >= before.events_flushed, "as many events as were promised")
+    recorded = events(folder)
+    outcome.events_found = len(recorded)
+    _hold(recorded == list(range(len(recorded))), "events from the first on, without a gap")
+    _hold(len(recorded) >= before.events_flushed, "as many events as were promised")
     if logs or dumps:
         is_whole = segments == list(range(1, len(segments) + 1))
-        bad = [problem for check in verify([folder]) for problem in check.problems
-               if is_whole or "gap: expected segment" not in problem]
+        bad = [problem for problem in problems(folder) if is_whole or "gap: expected segment" not in problem]
         _hold(not bad, f"ridelog verify: {bad}")
+
+
+class Service:
+    """The storage of a running service, with a clock of its own: a row and two events each half second."""
+
+    def __init__(self, folder: Path, files: RefusingFiles, limits: Limits = WHOLE_DISK,
+                 max_file_bytes: int = 2500) -> None:
+        folder.mkdir(exist_ok=True)
+        self.folder = folder
+        self.now_us = 0
+        self.rows = 0
+        self.events = 0
+        self.storage = Storage(folder, FACTS, max_file_bytes, HEADER, limits, lambda: self.now_us, files)
+
+    def step(self) -> None:
+        """One round of the main loop."""
+        self.now_us += 500_000
+        for _ in range(2):
+            self.storage.record(event_of(self.events))
+            self.events += 1
+        self.rows += 1
+        self.storage.log.append(window(self.rows, utc=False))
+        if self.rows % 2:
+            self.storage.sync()
+        self.storage.tend()
+
+    def wait(self) -> None:
+        """Nothing happens for longer than anything is waited for."""
+        for _ in range(3):
+            self.now_us += 61_000_000
+            self.storage.sync()
+            self.storage.tend()
+
+
+def outage(folder: Path, error: int, kinds: tuple[str, ...], begin: int, length: int) -> Outcome:
+    """A drive during which the disk refuses changes of these kinds for ``length`` rounds from round ``begin`` on."""
+    files = RefusingFiles()
+    files.error = error
+    service = Service(folder, files)
+    outcome = Outcome(rows_promised=OUTAGE_STEPS, events_promised=2 * begin - 4)
+    for step in range(OUTAGE_STEPS):
+        if step == 20:
+            service.storage.log.set_clock_map(ClockMap(OFFSET_US))
+        files.refuses = lambda kind, bad=begin <= step < begin + length: bad and kind in kinds
+        service.step()
+        outcome.told |= bool(service.storage.status().trouble)
+    service.wait()
+    is_well = service.storage.status().trouble == "" and service.storage.log.waiting == 0
+    service.storage.close()
+    lost = service.storage.status().rows_lost
+    restart(folder)  # finishes what the failing disk did not let be finished
+    records = [record for path in sorted(folder.glob("*.csv")) for record in read_log(path).records]
+    outcome.rows_found = len(records)
+    try:
+        _hold(is_well and not lost, "all is well after the outage")
+        _hold([record.segment for record in records] == list(range(1, OUTAGE_STEPS + 1)), "every row, once, in order")
+        _hold(all(record.utc_us == record.t_us + OFFSET_US for record in records), "every row has its UTC")
+        _hold(not list(folder.glob("*.part")), "only finished files")
+        _hold(problems(folder) == [], f"ridelog verify: {problems(folder)}")
+        recorded = events(folder)
+        outcome.events_found = len(recorded)
+        _hold(recorded == sorted(set(recorded)), "events once, in order")
+        _hold(len(recorded) >= outcome.events_promised, "every event before the outage")
+    except (Broken, DumpError, ValueError) as broken:
+        outcome.wrong = str(broken)
+    return outcome
+
+
+def restart(folder: Path) -> None:
+    """Start and stop again on a disk that is well."""
+    Storage(folder, FACTS, 2500, None, WHOLE_DISK, lambda: 0).close()
+
+
+def problems(folder: Path) -> list[str]:
+    """What ``ridelog verify`` says is wrong."""
+    return [problem for check in verify([folder]) for problem in check.problems]
+
+
+def segments(folder: Path, pattern: str = "*.csv") -> list[int]:
+    """Segments of the intact rows in these files."""
+    return [record.segment for path in sorted(folder.glob(pattern)) for record in read_log(path).records]
+
+
+def events(folder: Path) -> list[int]:
+    """Numbers of the events in all dumps, in order of their names. Raises Broken for one that ends in the middle."""
+    numbers = []
+    for path in sorted(folder.glob("*.dump.gz"), key=lambda path: path.name.split(".")[0]):
+        with open_dump(path) as reader:
+            found = list(reader)
+            _hold(all(event == event_of(event.t_us // 10_000) for event in found), "events as they were recorded")
+            numbers += [event.t_us // 10_000 for event in found]
+            _hold(not reader.torn_tail, f"{path.name} ends well")
+    return numbers
