@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import threading
 import time
 from collections import deque
@@ -11,7 +12,7 @@ import pytest
 from drivers.dump import Event
 from drivers.errors import NotPresent
 from logger.service import live
-from logger.service.live import Deadlines, Listener, monotonic_us
+from logger.service.live import Deadlines, Listener, LiveService, monotonic_us
 from logger.service.supervisor import Supervisor
 
 
@@ -46,6 +47,34 @@ def test_a_device_that_never_returns_is_noticed_and_does_not_hold_up_the_end(mon
     assert time.monotonic() - began_s < 1.0
     device.release.set()
     listener.join()
+
+
+class Syncs:
+    """A storage that notes when it was synced."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def sync(self) -> None:
+        self.count += 1
+
+
+@pytest.mark.parametrize(("sync_s", "longest_s"), [(1.0, 1.0), (0.1, 0.0), (3.0, 3.0)])
+def test_what_was_written_is_synced_before_it_is_as_old_as_the_settings_allow(sync_s: float, longest_s: float) -> None:
+    storage = Syncs()
+    service = LiveService(None, storage, [], deque(), sync_s, 2.0, lambda now_us: None)  # type: ignore[arg-type]
+    rng = random.Random(4)
+    now_us, oldest_us, ages_us = 0, None, []
+    for _ in range(200):
+        now_us += 500_000 + rng.randrange(3_000)  # a round, and what it wrote
+        oldest_us = now_us if oldest_us is None else oldest_us
+        before = storage.count
+        service._sync(now_us)
+        if storage.count > before:
+            ages_us.append(now_us - oldest_us)
+            oldest_us = None
+    assert max(ages_us) <= longest_s * 1e6
+    assert storage.count <= 200 * 0.5 / max(sync_s, 0.5) + 1  # and not more often than that needs
 
 
 def test_deadlines_that_are_missed_are_counted_and_skipped() -> None:
