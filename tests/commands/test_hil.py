@@ -31,7 +31,7 @@ from logger.units import STANDARD_GRAVITY_MPS2
 
 from replaying import rows_of
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 PIECE_S = 25
 BMA220 = DumpHeader(None, {"driver": "bma220", "range_g": 4, "vertical_axis": "-z"}, {"baud": 9600}, "rav4-2009")
 
