@@ -26,7 +26,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from drivers.disk import FileSystem
-from drivers.errors import DumpError
+from drivers.errors import DumpError, shortened
 
 VERSION = "1"
 SOURCES = ("bma220", "pasco", "nmea")
@@ -339,7 +339,7 @@ def _parse_header(path: Path, lines: list[bytes]) -> DumpHeader:
     if len(words) != 4 or words[:2] != [b"#", b"ridelog-dump"] or len(lines[0]) > LINE_BYTES:
         raise refuse('the first line of a recorded dump, "# ridelog-dump 1 {...}"')
     if words[2] != VERSION.encode():
-        raise refuse(f"dump version {VERSION}, found {words[2].decode('ascii', 'replace')}")
+        raise refuse(f"dump version {VERSION}, found {shortened(words[2].decode('ascii', 'replace'))}")
     try:
         fields = json.loads(words[3])
     except (ValueError, RecursionError):

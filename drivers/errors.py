@@ -41,3 +41,8 @@ class SettingsError(DriverError):
 
 class DumpError(DriverError):
     """A recorded dump that cannot be read."""
+
+
+def shortened(text: str, longest: int = 80) -> str:
+    """A piece of a bad input in quotes, fit for one line of complaint whatever it holds."""
+    return ascii(text if len(text) <= longest else text[:longest] + "...")

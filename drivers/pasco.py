@@ -16,15 +16,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import combinations, pairwise
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import yaml
+from yaml import YAMLError
+from yaml.constructor import SafeConstructor
 
-from drivers.errors import SettingsError
+from drivers.errors import SettingsError, shortened
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
+from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
 from drivers.readings import AccelerationBlock
 
 STANDARD_GRAVITY_MPS2 = 9.80665
@@ -45,8 +48,8 @@ class Calibration:
     one_g_raw: Triple
 
     def __post_init__(self) -> None:
-        if any(one == zero for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)):
-            raise SettingsError("calibration: expected different counts at 0 g and at 1 g on every axis")
+        if not all(1 <= abs(one - zero) < inf for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)):
+            raise SettingsError("calibration: expected a count or more between 0 g and 1 g on every axis")
 
     @property
     def mps2_per_count(self) -> Triple:
@@ -130,7 +133,7 @@ def shipped_profiles() -> list[str]:
 def load_profile(name_or_path: str | Path) -> Profile:
     """A shipped profile by its name, or a user's own by its path (ending in .yaml or .yml).
 
-    Raises SettingsError naming file, key and what was expected.
+    Raises SettingsError naming file, line, key and what was expected.
     """
     place = str(name_or_path)
     if place.endswith((".yaml", ".yml")):
@@ -139,35 +142,42 @@ def load_profile(name_or_path: str | Path) -> Profile:
                 text = file.read(PROFILE_BYTES_MAX + 1)
         except OSError as error:
             raise SettingsError(f"{place}: expected a readable profile file ({error.strerror})") from error
+        except ValueError:
+            raise SettingsError(f"{shortened(place)}: expected the name of a file") from None
     elif place in shipped_profiles():
         place += ".yaml"
         text = resources.files("drivers.profiles").joinpath(place).read_bytes()
     else:
         known = ", ".join(shipped_profiles())
-        raise SettingsError(f"profile {place!r}: expected one of {known}, or the path of a .yaml file")
+        raise SettingsError(f"profile {shortened(place)}: expected one of {known}, or the path of a .yaml file")
     if len(text) > PROFILE_BYTES_MAX:
         raise SettingsError(f"{place}: expected at most {PROFILE_BYTES_MAX} bytes")
     try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
-        raise SettingsError(f"{place}{line}: expected YAML") from error
-    return _profile(_Keys(place, "", content))
+        top = compose_plain(text.decode())
+        lines = dict(lines_of(top)) if top is not None else {}
+        content = SafeConstructor().construct_document(top) if top is not None else None
+    except NotPlainError as error:
+        raise SettingsError(f"{place}:{error.line}: {error}") from None
+    except (YAMLError, ValueError, OverflowError):  # dates and the like that cannot be; text that is no UTF-8
+        raise SettingsError(f"{place}: expected YAML in UTF-8, with numbers and words as values") from None
+    return _profile(_Keys(place, "", content, lines))
 
 
 class _Keys:
     """The keys of one mapping in a profile file: each asked for once, none left over."""
 
-    def __init__(self, place: str, path: str, content: object) -> None:
+    def __init__(self, place: str, path: str, content: object, lines: Mapping[str, int]) -> None:
         self._place = place
         self._path = path
+        self._lines = lines
+        self._line = lines.get(path.rstrip("."), 1)
         if not isinstance(content, Mapping):
-            raise SettingsError(f"{place}: {path.rstrip('.') or 'file'}: expected keys with values")
+            raise SettingsError(f"{place}:{self._line}: {path.rstrip('.') or 'file'}: expected keys with values")
         self._content: dict[Any, Any] = dict(content)
 
     def wrong(self, key: str, expected: str) -> SettingsError:
-        return SettingsError(f"{self._place}: {self._path}{key}: expected {expected}")
+        line = self._lines.get(f"{self._path}{key}", self._line)
+        return SettingsError(f"{self._place}:{line}: {self._path}{key}: expected {expected}")
 
     def _take(self, key: str, expected: str) -> Any:
         if key not in self._content:
@@ -175,7 +185,7 @@ class _Keys:
         return self._content.pop(key)
 
     def inner(self, key: str) -> _Keys:
-        return _Keys(self._place, f"{self._path}{key}.", self._take(key, "keys with values"))
+        return _Keys(self._place, f"{self._path}{key}.", self._take(key, "keys with values"), self._lines)
 
     def text(self, key: str) -> str:
         value = self._take(key, "text")
@@ -230,7 +240,7 @@ class _Keys:
 
     def finish(self) -> None:
         for key in self._content:
-            raise self.wrong(str(key), "no such key")
+            raise self.wrong(shortened(str(key))[1:-1], "no such key")
 
 
 def _profile(keys: _Keys) -> Profile:
@@ -264,8 +274,8 @@ def _frame_layout(keys: _Keys) -> FrameLayout:
         raise keys.wrong("valid_raw", "the lower count first")
     axis = keys.choice("upright_axis", [*AXES, "none"])
     zero, one = (keys.numbers(key, 3, -32768, 65535) for key in ("zero_g_raw", "one_g_raw"))
-    if any(a == b for a, b in zip(zero, one, strict=True)):
-        raise keys.wrong("one_g_raw", "other counts than those of zero_g_raw")
+    if any(abs(a - b) < 1 for a, b in zip(zero, one, strict=True)):
+        raise keys.wrong("one_g_raw", "counts that differ by one or more from those of zero_g_raw")
     layout = FrameLayout(
         length_bytes=length,
         sync=sync,

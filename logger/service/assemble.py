@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers.bma220 import Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.dump import DumpHeader
-from drivers.errors import SettingsError
+from drivers.errors import SettingsError, shortened
 from drivers.nmea import NmeaDecoder
 from drivers.pasco import FrameLayout, PascoDecoder, Profile, load_profile
 from logger.dsp.fixed_point import FixedFilter
@@ -155,7 +155,7 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
             raise BadInput(f"{place}: recorded with a calibration of its own; expected its settings, --config FILE")
     range_g, oversample = (says.get(key, getattr(chip, key)) for key in ("range_g", "oversample"))
     if axis not in AXES:
-        raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {axis!r}")
+        raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {shortened(str(axis))}")
     if type(range_g) is not int or type(oversample) is not int:
         raise BadInput(f"{place}: expected whole numbers for 'range_g' and 'oversample'")
     if not isinstance(profile, str):
@@ -177,10 +177,14 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
 
 def _vehicle_file(name: str, place: str) -> Path:
     path = vehicle_file(name) if name in vehicle_names() else Path(name)
-    if not path.is_file():
+    try:
+        known = path.is_file()
+    except OSError:  # a name that can be none
+        known = False
+    if not known:
         raise BadInput(
-            f"{place}: the recording's vehicle {name!r} is not known here; expected --vehicle FILE.yaml or one of: "
-            f"{', '.join(vehicle_names())}"
+            f"{place}: the recording's vehicle {shortened(name)} is not known here; expected --vehicle FILE.yaml or "
+            f"one of: {', '.join(vehicle_names())}"
         )
     return path
 

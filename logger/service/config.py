@@ -10,7 +10,7 @@ shipped ``config/ridelog.yaml`` is the documentation, and holds every key with i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -31,6 +31,8 @@ _RANGES_G = ("2", "4", "8", "16")
 _BANDWIDTHS_HZ = ("32", "64", "125", "250", "500", "1000")
 _BAUDS = ("1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200", "230400", "460800", "921600")
 _DUMP = "dump:"
+_LARGEST_COUNT = 65536
+_LEAST_STEP_G = 0.1
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,12 @@ def _or_none(word: str, read: Read) -> Read:
 
 
 def _path(node: Node) -> Path:
-    return Path(node.file).parent.resolve() / node.text()
+    path = Path(node.file).parent.resolve() / node.text()
+    try:
+        path.exists()
+    except OSError as error:
+        raise node.wrong(f"a path that can be ({error.strerror})") from None
+    return path
 
 
 def _file_to_write(node: Node) -> Path:
@@ -187,17 +194,17 @@ def _vehicle(node: Node) -> Path:
         path = vehicle_path(node.text(), beside=Path(node.file).parent.resolve())
     except BadInput as error:
         raise BadInput(f"{node.file}:{node.line}: {error}") from None
-    if not path.is_file():
-        raise node.wrong(f"a vehicle's file (there is no {path})")
+    if not _path(replace(node, content=str(path))).is_file():
+        raise node.wrong("a vehicle's file (there is no such file)")
     return path
 
 
 def _i2c_bus(node: Node) -> int | Path:
     text = node.content
     if isinstance(text, str) and text.startswith(_DUMP):
-        path = Path(node.file).parent.resolve() / text.removeprefix(_DUMP)
+        path = _path(replace(node, content=text.removeprefix(_DUMP)))
         if not path.is_file():
-            raise node.wrong(f"a recorded dump (there is no file {path})")
+            raise node.wrong("a recorded dump (there is no such file)")
         return path
     if not node.plain or not isinstance(text, str) or not text.isdigit():
         raise node.wrong("the number of an I2C bus from 0 to 255, or dump:FILE")
@@ -218,11 +225,13 @@ def _calibration(node: Node) -> Calibration:
 
 def _counts_at_0_and_1_g(node: Node) -> tuple[float, float]:
     """Two points of an axis, extended to the counts at 0 and at 1 g."""
-    values = [item.number() for item in node.items()]
-    if len(values) != 4 or values[0] == values[2] or values[1] == values[3]:
-        raise node.wrong("two different points [raw, g, raw, g]")
+    values = [item.number(-_LARGEST_COUNT, _LARGEST_COUNT) for item in node.items()]
+    if len(values) != 4 or abs(values[3] - values[1]) < _LEAST_STEP_G:
+        raise node.wrong(f"two different points [raw, g, raw, g], {_LEAST_STEP_G} g or more apart")
     first_raw, first_g, second_raw, second_g = values
     counts_per_g = (second_raw - first_raw) / (second_g - first_g)
+    if abs(counts_per_g) < 1:
+        raise node.wrong("two different points [raw, g, raw, g], a count per g or more apart")
     zero_g_raw = first_raw - first_g * counts_per_g
     return zero_g_raw, zero_g_raw + counts_per_g
 

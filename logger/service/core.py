@@ -20,6 +20,9 @@ from logger.store.rotation import ClockMap
 
 STEP_US = 500_000
 IDLE_US = 120_000_000
+STEP_BYTES = 1_000_000
+"""More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
+
 log = logging.getLogger(__name__)
 
 
@@ -53,6 +56,7 @@ class Core:
         self._fixes: list[Fix] = []
         self._next_step_us: int | None = None
         self._last_event_us = 0
+        self._step_bytes = 0
         self._drive = pipeline.drive
         self._offset_us: int | None = None
         self.rows = 0
@@ -71,6 +75,10 @@ class Core:
         elif t_us >= self._next_step_us:
             self.advance(t_us)
         self._last_event_us = t_us
+        self._step_bytes += len(data)
+        if self._step_bytes > STEP_BYTES:
+            self.bad_events += 1
+            return
         if source == "nmea":
             self._fixes += self._gps.feed(t_us, data)
             return
@@ -91,6 +99,7 @@ class Core:
                 self._pipeline.skip_to(self._next_step_us)
             step_us = self._next_step_us
             self._next_step_us += STEP_US
+            self._step_bytes = 0
             block = self._take_block()
             self._write(self._pipeline.step(step_us, block, self._take_fixes()))
             if self._pipeline.drive != self._drive:

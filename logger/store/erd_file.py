@@ -21,14 +21,17 @@ that can be no elevations in it are refused. Units are never guessed: a file tha
 from __future__ import annotations
 
 import re
+from array import array
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
+from logger.store.bounded import read_bounded
+from logger.store.number_table import refuse_long_lines, shown
 from logger.units import FOOT_M
 
 Array = npt.NDArray[np.float64]
@@ -36,9 +39,14 @@ Array = npt.NDArray[np.float64]
 MAX_CHANNELS = 1000
 MAX_SAMPLES = 50_000_000
 MAX_HEADER_LINES = 10_000
+MAX_HEADER_BYTES = 1024 * 1024
+MAX_NUMBERS = 50_000_000
+SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
 MAX_LINE = 64 * 1024
 HIGHEST_M = 10_000.0
 
+_BLOCK_BYTES = 1024 * 1024
+_FIELD_CHARS = 20
 _BINARY = {0: "<i2", 1: "<f4", 2: "<f8"}
 _TEXT = 5
 _UNITS_M = {
@@ -88,14 +96,14 @@ class ErdFile:
             return (left[0], right[0])
         if len(self.names) == 2 and not any(self.names):
             return (0, 1)
-        names = ", ".join(self.names[:8]) + (" ..." if len(self.names) > 8 else "")
+        names = shown(", ".join(self.names))
         raise BadInput(f"{self.place}: expected one channel, or one named left and one named right, found {names}")
 
     def _unit_m(self, channel: int) -> float:
         unit_m = _UNITS_M.get(self.units[channel].lower().rstrip("."))
         if unit_m is None:
-            raise BadInput(f"{self.place}: expected elevations in m, mm, ft or in, found {self.units[channel]!r} for "
-                           f"channel {channel + 1} (UNITSNAM)")
+            raise BadInput(f"{self.place}: expected elevations in m, mm, ft or in, found {shown(self.units[channel])} "
+                           f"for channel {channel + 1} (UNITSNAM)")
         return unit_m
 
 
@@ -117,7 +125,9 @@ def parse_erd(data: bytes, path: Path | str) -> ErdFile:
         numbers = _binary_numbers(data[header.size:], Path(path), layout)
     values = _shaped(numbers, layout, str(path))
     if layout.key == 0:
-        values = values * header.factors("GAIN", 1.0, layout.channels) + header.factors("OFFSET", 0.0, layout.channels)
+        gain, offset = header.factors("GAIN", 1.0, layout.channels), header.factors("OFFSET", 0.0, layout.channels)
+        with np.errstate(over="ignore"):  # numbers that are none are refused below
+            values = values * gain + offset
     finite = np.isfinite(values).all(axis=1)
     if not finite.all():
         raise BadInput(f"{path}: expected finite numbers, found none in sample {int(np.argmin(finite)) + 1}")
@@ -153,7 +163,7 @@ class _Header:
             self.lines += 1
             if text.upper() == "END":
                 return
-            if end < 0 or self.lines == MAX_HEADER_LINES:
+            if end < 0 or self.lines == MAX_HEADER_LINES or self.size > MAX_HEADER_BYTES:
                 raise BadInput(f"{file}:{self.lines}: expected a line END after the header")
             if self.lines == 2:
                 self._second = text
@@ -166,18 +176,18 @@ class _Header:
 
     def layout(self) -> _Layout:
         """What the second line says."""
-        fields = [field for field in re.split(r"[,\s]+", self._second) if field]
+        fields = [field[:_FIELD_CHARS] for field in re.split(r"[,\s]+", self._second) if field]
         expected = f"{self._file}:2: expected channels, samples, records, bytes, key, step"
         try:
             channels, samples, records, record_bytes, key = map(int, fields[:5])
             step = float(fields[5])
         except (ValueError, IndexError):
-            raise BadInput(f"{expected}, found {self._second[:60]!r}") from None
+            raise BadInput(f"{expected}, found {shown(self._second)}") from None
         if not 1 <= channels <= MAX_CHANNELS:
             raise BadInput(f"{expected}, found {channels} channels")
         if not (samples == -1 or 1 <= samples <= MAX_SAMPLES):
             raise BadInput(f"{expected}, found {samples} samples")
-        if not (isfinite(step) and step > 0):
+        if not SHORTEST_STEP <= step <= LONGEST_STEP:
             raise BadInput(f"{expected} above 0, found a step of {step:g}")
         if key not in _BINARY and key != _TEXT:
             raise BadInput(f"{expected} with key 0, 1, 2 (binary) or 5 (text), found key {key}")
@@ -188,7 +198,7 @@ class _Header:
         line, text = self._texts.get("XUNITS", (2, ""))
         unit_m = _UNITS_M.get(text.strip().lower().rstrip("."))
         if unit_m is None:
-            raise BadInput(f"{self._file}:{line}: expected XUNITS m, mm, ft or in, found {text.strip()[:40]!r}")
+            raise BadInput(f"{self._file}:{line}: expected XUNITS m, mm, ft or in, found {shown(text.strip())}")
         return unit_m
 
     def labels(self, keyword: str, width: int, count: int) -> tuple[str, ...]:
@@ -203,7 +213,7 @@ class _Header:
             return columns
         if count > 1 and len(words) != count:
             raise BadInput(f"{self._file}:{line}: expected {count} entries of {width} columns after {keyword}, "
-                           f"found {text.strip()[:40]!r}")
+                           f"found {shown(text.strip())}")
         return words if count > 1 else (text.strip(),)
 
     def factors(self, keyword: str, absent: float, count: int) -> Array:
@@ -217,28 +227,40 @@ class _Header:
             numbers = []
         if len(numbers) != count or not all(map(isfinite, numbers)):
             raise BadInput(f"{self._file}:{line}: expected {count} numbers after {keyword}, "
-                           f"found {text.strip()[:40]!r}")
+                           f"found {shown(text.strip())}")
         return np.array(numbers)
 
 
 def _text_numbers(body: bytes, file: str, first_line: int) -> Array:
-    words = body.replace(b",", b" ").split()
-    try:
-        numbers = np.fromiter(map(float, words), float, len(words))
-    except ValueError:
-        numbers = np.array([np.nan])
-    if np.isfinite(numbers).all():
-        return numbers
-    for line, text in enumerate(body.split(b"\n"), start=first_line):
+    """The numbers of whole lines, a block at a time: as words they take many times the memory of the file."""
+    refuse_long_lines(body, file, first_line)
+    numbers = array("d")
+    start = 0
+    while start < len(body) and len(numbers) <= MAX_NUMBERS:
+        end = body.find(b"\n", start + _BLOCK_BYTES) + 1 or len(body)
+        block = body[start:end]
+        try:
+            values = array("d", map(float, block.replace(b",", b" ").split()))
+        except ValueError:
+            values = array("d", (nan,))
+        if b"_" in block or not np.isfinite(values).all():
+            raise _odd_word(block, file, first_line + body.count(b"\n", 0, start))
+        numbers.extend(values)
+        start = end
+    return np.frombuffer(numbers)
+
+
+def _odd_word(block: bytes, file: str, first_line: int) -> BadInput:
+    for line, text in enumerate(block.split(b"\n"), start=first_line):
         for word in text.replace(b",", b" ").split():
             if not _is_number(word):
-                raise BadInput(f"{file}:{line}: expected numbers, found {word[:40].decode('latin-1')!r}")
-    return numbers
+                return BadInput(f"{file}:{line}: expected numbers, found {shown(word.decode('latin-1'))}")
+    raise AssertionError("a block of good numbers")
 
 
 def _is_number(word: bytes) -> bool:
     try:
-        return isfinite(float(word))
+        return b"_" not in word and isfinite(float(word))
     except ValueError:
         return False
 
@@ -251,11 +273,13 @@ def _binary_numbers(body: bytes, path: Path, layout: _Layout) -> Array:
         if not found:
             raise BadInput(f"{path}: expected its binary numbers in {beside[0].name} or {beside[1].name} beside it")
         source = found[0]
-        body = source.read_bytes()
+        body = read_bounded(source, MAX_NUMBERS * 8)
     kind = np.dtype(_BINARY[layout.key])
     row_bytes = layout.channels * kind.itemsize
     rows = len(body) // row_bytes if layout.samples is None else layout.samples
     wanted = rows * row_bytes
+    if rows * layout.channels > MAX_NUMBERS:
+        raise BadInput(f"{source}: expected at most {MAX_NUMBERS} numbers, found {rows * layout.channels}")
     if len(body) != wanted and not (len(body) > wanted and len(body) == layout.stored_bytes):
         raise BadInput(f"{source}: expected {wanted} bytes of numbers, found {len(body)}")
     with np.errstate(invalid="ignore"):  # numbers that are none are refused by the caller
@@ -264,7 +288,9 @@ def _binary_numbers(body: bytes, path: Path, layout: _Layout) -> Array:
 
 def _shaped(numbers: Array, layout: _Layout, file: str) -> Array:
     rows, rest = divmod(len(numbers), layout.channels)
+    if len(numbers) > MAX_NUMBERS:
+        raise BadInput(f"{file}:2: expected at most {MAX_NUMBERS} numbers, found more")
     if rest or rows == 0 or (layout.samples is not None and rows != layout.samples):
         wanted = "rows of" if layout.samples is None else f"{layout.samples} samples of"
-        raise BadInput(f"{file}: expected {wanted} {layout.channels} numbers, found {len(numbers)} numbers")
+        raise BadInput(f"{file}:2: expected {wanted} {layout.channels} numbers, found {len(numbers)} numbers")
     return numbers.reshape(rows, layout.channels)

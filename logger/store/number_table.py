@@ -4,24 +4,28 @@ Problem: a profile or a record is hundreds of thousands of lines, from many hand
 reading it at once tells nothing about the one line that is wrong.
 
 Solution: NumPy reads the table at once, and only when that fails, or a value is not finite, are the lines looked at one
-by one to name the one at fault.
+by one to name the one at fault. No line may be longer than ``LINE_BYTES``: a million columns, or a line without an end,
+would take many times the memory of the file.
 """
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Iterator
 from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
 
+from drivers.errors import shortened
 from logger.errors import BadInput
 
 Array = npt.NDArray[np.float64]
 Names = tuple[str, ...]
 
+LINE_BYTES = 64 * 1024
 SHOWN = 40
 _NUMBER = re.compile(rb"[ \t]*[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?[ \t]*\r?")
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -36,6 +40,7 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
     Raises BadInput ("file:line: expected ..., found ...").
     """
     data = data.removeprefix(_BYTE_ORDER_MARK).rstrip()
+    refuse_long_lines(data, file)
     first = data.split(b"\n", 1)[0].decode("ascii", "replace").strip()
     names = tuple(name.strip() for name in first.split(","))
     wanted = choose(names)
@@ -57,20 +62,43 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
 
 def shown(text: str) -> str:
     """A piece of a bad file, short enough for a line of complaint."""
-    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...") if text else "nothing"
+    return shortened(text, SHOWN) if text else "nothing"
+
+
+def refuse_long_lines(data: bytes, file: str, first_line: int = 1) -> None:
+    """Raises BadInput for a line that fills a block of ``LINE_BYTES``, as one of twice that length does somewhere."""
+    for start in range(0, len(data) - LINE_BYTES, LINE_BYTES):
+        if data.find(b"\n", start, start + LINE_BYTES) < 0:
+            line = first_line + data.count(b"\n", 0, start)
+            raise BadInput(f"{file}:{line}: expected lines of at most {LINE_BYTES} bytes")
 
 
 def _by_line(data: bytes, file: str, names: Names, wanted: Names) -> Array:
     places = {name: names.index(name) for name in wanted}
-    table = []
-    for line, text in enumerate(data.split(b"\n")[1:], start=2):
+    table = array("d")
+    for line, text in enumerate(_lines(data), start=1):
+        if line == 1:
+            continue
         fields = text.split(b",")
         if len(fields) != len(names):
             found = shown(text.decode("ascii", "replace").strip())
-            raise BadInput(f"{file}:{line}: expected {len(names)} fields ({','.join(names)}), found {found}")
+            raise BadInput(f"{file}:{line}: expected {len(names)} fields ({_listed(names)}), found {found}")
         for name, place in places.items():
             if not _NUMBER.fullmatch(fields[place]) or not isfinite(float(fields[place])):
                 found = shown(fields[place].decode("ascii", "replace").strip())
                 raise BadInput(f"{file}:{line}: expected a number for {name}, found {found}")
-        table.append([float(fields[place]) for place in places.values()])
-    return np.array(table)
+            table.append(float(fields[place]))
+    return np.frombuffer(table).reshape(-1, len(wanted))
+
+
+def _lines(data: bytes) -> Iterator[bytes]:
+    start = 0
+    while (end := data.find(b"\n", start)) >= 0:
+        yield data[start:end]
+        start = end + 1
+    yield data[start:]
+
+
+def _listed(names: Names) -> str:
+    text = ",".join(names)
+    return text if len(text) <= 2 * SHOWN and text.isascii() and text.isprintable() else shown(text)

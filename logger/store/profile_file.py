@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
 MAX_BYTES = 512 * 1024 * 1024
+FARTHEST_M = 1e9
 WIDEST_BRIDGED_M = 1.0
 """A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
 # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
@@ -82,6 +83,9 @@ def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
         if (wild := np.abs(track) > HIGHEST_M).any():
             sample = int(np.argmax(wild))
             raise BadInput(f"{place(sample)}: expected elevations within {HIGHEST_M:g} m, found {track[sample]:g}")
+    if (far := np.abs(distance) > FARTHEST_M).any():
+        sample = int(np.argmax(far))
+        raise BadInput(f"{place(sample)}: expected distances within {FARTHEST_M:g} m, found {distance[sample]:g}")
     if len(distance) < 2:
         raise BadInput(f"{place(1)}: expected at least two samples, found the end of the file")
     steps = np.diff(distance)

@@ -25,6 +25,9 @@ HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
 # Beyond this something else than an acceleration has been written, and its fourth power may not be a number.
 MAX_MPS2 = 1e6
+# Seconds since 1970, and more; and no accelerometer is read faster.
+MAX_TIME_S = 1e10
+MAX_RATE_HZ = 1e6
 # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
 _ROUNDING_S = 0.00101
 _ROUNDING_STEPS = 0.2
@@ -78,9 +81,12 @@ def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
 
 def even_rate_hz(t_s: Array, file: str) -> float:
     """The rate of the times; BadInput with the line where they leave an even grid."""
+    if (far := np.abs(t_s) > MAX_TIME_S).any():
+        sample = int(np.argmax(far))
+        raise BadInput(f"{file}:{sample + 2}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
     steps = np.diff(t_s)
-    if (steps <= 0).any():
-        sample = int(np.argmax(steps <= 0)) + 1
+    if (early := steps < 1.0 / MAX_RATE_HZ).any():
+        sample = int(np.argmax(early)) + 1
         raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found {t_s[sample]:.10g}")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)
     tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)

@@ -30,7 +30,9 @@ LINE_BYTES = 4096
 _EPOCH = datetime(1970, 1, 1)
 _MICROSECOND = timedelta(microseconds=1)
 _UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
-_SECONDS = re.compile(r"(-?)(\d+)\.(\d{6})")
+_SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,14})\.([0-9]{6})")
+_COUNT = re.compile(r"0|-?[1-9][0-9]{0,17}")
+_SHOWN = 40
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
 
 
@@ -58,7 +60,7 @@ def _read_utc(text: str) -> int | None:
     if not text:
         return None
     if not _UTC.fullmatch(text):
-        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text!r}")
+        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text[:_SHOWN]!a}")
     return (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
 
 
@@ -70,20 +72,29 @@ def _write_seconds(t_us: int) -> str:
 def _read_seconds(text: str) -> int:
     match = _SECONDS.fullmatch(text)
     if not match:
-        raise BadRow(f"expected seconds with six decimals, found {text!r}")
+        raise BadRow(f"expected seconds with six decimals, found {text[:_SHOWN]!a}")
     t_us = int(match[2]) * US_PER_S + int(match[3])
+    if match[1] and not t_us:
+        raise BadRow(f"expected seconds with six decimals, found {text!a}")
     return -t_us if match[1] else t_us
 
 
-def _read_float(text: str) -> float:
-    value = float(text)
-    if not isfinite(value):
-        raise BadRow(f"expected a finite number, found {text!r}")
-    return value
+def _read_count(text: str) -> int:
+    if not _COUNT.fullmatch(text):
+        raise BadRow(f"expected a whole number, found {text[:_SHOWN]!a}")
+    return int(text)
 
 
 def _seconds_of_us(name: str, attribute: str) -> Column:
     return Column(name, attribute, _write_seconds, _read_seconds)
+
+
+def _read_decimal(text: str, pattern: str) -> float:
+    """A number as the pattern writes it, and in no other way."""
+    value = float(text)
+    if not isfinite(value) or pattern % value != text:
+        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {text[:_SHOWN]!a}")
+    return value
 
 
 def _number(name: str, decimals: int) -> Column:
@@ -94,7 +105,7 @@ def _number(name: str, decimals: int) -> Column:
         return "" if value is None or not isfinite(value) else pattern % value
 
     def read(text: str) -> float | None:
-        return _read_float(text) if text else None
+        return _read_decimal(text, pattern) if text else None
 
     return Column(name, name, write, read)
 
@@ -108,11 +119,11 @@ def _known_number(name: str, decimals: int) -> Column:
             raise ValueError(f"{name} is {value}, expected a finite number")
         return pattern % value
 
-    return Column(name, name, write, _read_float)
+    return Column(name, name, write, lambda text: _read_decimal(text, pattern))
 
 
 def _count(name: str) -> Column:
-    return Column(name, name, lambda value: f"{value:d}", int)
+    return Column(name, name, lambda value: f"{value:d}", _read_count)
 
 
 def _word(name: str) -> Column:
@@ -171,8 +182,8 @@ def parse_row(text: str) -> WindowRecord:
     try:
         return WindowRecord(**{column.attribute: column.read(field)
                                for column, field in zip(COLUMNS, fields, strict=True)})
-    except ValueError as error:
-        raise BadRow(str(error)) from None
+    except ValueError as error:  # a number or a date that is none
+        raise BadRow(str(error)[:2 * _SHOWN]) from None
 
 
 class Row(NamedTuple):
@@ -223,16 +234,22 @@ class LogContent:
 
 def read_log(path: Path) -> LogContent:
     """Read a whole log, open or finished. Raises ``OSError``; damage is counted, not raised."""
+    records, damaged_lines = [], 0
     with path.open("rb") as file:
-        rows = list(scan(file))
-    records = tuple(row.record for row in rows if row.record is not None)
-    return LogContent(records, len(rows) - len(records))
+        for row in scan(file):
+            if row.record is None:
+                damaged_lines += 1
+            else:
+                records.append(row.record)
+    return LogContent(tuple(records), damaged_lines)
 
 
 def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
     """The intact rows inside a damaged line: those whose newline was lost."""
     start = 0
     for end in _ROW_END.finditer(line):
+        if line.count(b",", start, end.end()) != len(COLUMNS):
+            continue
         row = line[start:end.end()].decode("ascii", "replace")
         try:
             record = parse_row(row)

@@ -16,16 +16,16 @@ from pathlib import Path
 
 import yaml
 
+from drivers.errors import shortened
+from drivers.plain_yaml import NotPlainError, compose_plain
 from logger.errors import BadInput
 from logger.store.bounded import read_bounded
 
 MAX_BYTES = 256 * 1024
-MAX_DEPTH = 12
 
 _NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
 _INTEGER = re.compile(r"[-+]?(?:0[xX][0-9a-fA-F]{1,16}|0|[1-9][0-9]{0,17})")
 _NULLS = ("", "~", "null", "Null", "NULL")
-_KNOWN_TAG = "tag:yaml.org,2002:"
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Node:
         if isinstance(self.content, str):
             if self.plain and self.content in _NULLS:
                 return "nothing"
-            return repr(self.content if len(self.content) <= 40 else self.content[:40] + "...")
+            return shortened(self.content, 40)
         return "a list" if isinstance(self.content, tuple) else "a mapping"
 
     def is_null(self) -> bool:
@@ -67,7 +67,8 @@ class Node:
         required, known = tuple(required), (*required, *optional)
         for key, node in self.content.items():
             if known and key not in known:
-                raise BadInput(f"{self.file}:{node.line}: expected one of the keys {', '.join(known)}, found {key!r}")
+                raise BadInput(f"{self.file}:{node.line}: expected one of the keys {', '.join(known)}, "
+                               f"found {shortened(key)}")
         for key in required:
             if key not in self.content:
                 raise BadInput(f"{self.file}:{self.line}: expected the key {key!r} here, it is missing")
@@ -139,17 +140,9 @@ def load_mapping(path: Path | str) -> Node:
 def parse_mapping(text: str, file: str) -> Node:
     """The same for text at hand; ``file`` is the name that complaints carry."""
     try:
-        _refuse_aliases_and_depth(text, file)
-        top = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.reader.ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
-        raise BadInput(f"{file}:{line}: expected text without control characters") from None
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"{file}:{mark.line + 1}" if mark else file
-        raise BadInput(f"{where}: expected YAML ({error.problem or error.context})") from None
-    except (ValueError, OverflowError) as error:  # PyYAML lets these out for impossible escapes and versions
-        raise BadInput(f"{file}: expected YAML ({error})") from None
+        top = compose_plain(text)
+    except NotPlainError as error:
+        raise BadInput(f"{file}:{error.line}: {error}") from None
     if top is None:
         raise BadInput(f"{file}:1: expected a mapping (key: value lines), found nothing")
     node = _convert(top, file, 1)
@@ -157,23 +150,7 @@ def parse_mapping(text: str, file: str) -> Node:
     return node
 
 
-def _refuse_aliases_and_depth(text: str, file: str) -> None:
-    depth = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        line = event.start_mark.line + 1 if event.start_mark else 1
-        if isinstance(event, yaml.AliasEvent):
-            raise BadInput(f"{file}:{line}: expected values written out, found the alias *{event.anchor}")
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if depth > MAX_DEPTH:
-            raise BadInput(f"{file}:{line}: expected at most {MAX_DEPTH} levels of nesting")
-
-
 def _convert(node: yaml.Node, file: str, line: int) -> Node:
-    if not node.tag.startswith(_KNOWN_TAG) or "python/" in node.tag:
-        raise BadInput(f"{file}:{line}: expected a plain value, found the tag {node.tag}")
     if isinstance(node, yaml.ScalarNode):
         return Node(file, line, node.value, plain=node.style is None)
     if isinstance(node, yaml.SequenceNode):
@@ -184,6 +161,6 @@ def _convert(node: yaml.Node, file: str, line: int) -> Node:
         if not isinstance(key, yaml.ScalarNode):
             raise BadInput(f"{file}:{key_line}: expected a word as key")
         if key.value in content:
-            raise BadInput(f"{file}:{key_line}: expected each key once, {key.value!r} stands here again")
+            raise BadInput(f"{file}:{key_line}: expected each key once, {shortened(key.value)} stands here again")
         content[key.value] = _convert(value, file, key_line)
     return Node(file, line, content)

@@ -241,7 +241,7 @@ def test_endless_line_is_refused(tmp_path: Path) -> None:
     [
         ("", "the first line of a recorded dump"),
         ("t_s,accel_z_mps2\n", "the first line of a recorded dump"),
-        ("# ridelog-dump 2 {}\n", "dump version 1, found 2"),
+        ("# ridelog-dump 2 {}\n", "dump version 1, found '2'"),
         ("# ridelog-dump 1 {\n", "a JSON object"),
         ("# ridelog-dump 1 []\n", "a JSON object"),
         ("# ridelog-dump 1 " + "[" * 50_000 + "\n", "a JSON object"),

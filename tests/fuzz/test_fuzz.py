@@ -1,0 +1,40 @@
+"""A short seeded run of the fuzzer over every reader, and what must take neither time nor memory however large it is.
+
+``tests/bench/fuzz.py`` runs the same for as long as one likes.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import huge_inputs
+import pytest
+from fuzz_targets import TARGETS, Workshop
+from fuzzing import fuzz
+
+INPUTS = {"vehicle_yaml": 250, "config_yaml": 300, "pasco_profile_yaml": 250, "pasco_ps2119": 300}
+MEMORY_MB = 150
+HUGE_GB = 0.02
+LONGEST_S = 20.0
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_damaged_input_is_refused_in_one_line_or_read_as_it_stands(name: str) -> None:
+    with Workshop() as folder:
+        tally = fuzz(TARGETS[name](folder), seed=1, inputs=INPUTS.get(name, 500))
+    assert not tally.failures, tally.failures[:3]
+    assert tally.accepted > 0
+    assert tally.memory_mb < MEMORY_MB
+
+
+def test_what_is_huge_outside_or_inside_takes_little_time_and_memory(tmp_path: Path) -> None:
+    command = [sys.executable, huge_inputs.__file__, str(tmp_path), str(HUGE_GB)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = [line.split("\t") for line in done.stdout.splitlines()]
+    assert len(rows) > 25
+    for name, _, seconds, _ in rows:
+        assert float(seconds) < LONGEST_S, name
+    assert int(rows[-1][3]) < MEMORY_MB
