@@ -1,0 +1,126 @@
+"""The numbers of a vehicle that a fit may change, by the names that its file gives them.
+
+Problem: a vehicle is a frozen record with parts in it, a fit moves a list of numbers, and a person names some of them.
+Solution: a name is the path to a number in the vehicle's file, with dots: ``sprung_mass_kg``,
+``front.suspension_damping_n_s_per_m``. ``both.`` in place of ``front.`` or ``rear.`` stands for the two axles, which
+then get the same value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from logger.vehicle.vehicle import Axle, Vehicle
+
+BOTH, AXLES, SENSOR = "both", ("front", "rear"), "sensor"
+_BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m", "contact_patch_m")
+_AXLE = ("cg_distance_m", "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
+         "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
+_PLACE = {"half_car": ("ahead_m",), "full_car": ("ahead_m", "left_m")}
+# How far from its start a number may go when nothing else is said: a factor, and limits for places on the car [m].
+_FACTOR = 20.0
+_LENGTH_FACTOR = 3.0
+_FARTHEST_M = 3.0
+_LONGEST_PATCH_M = 1.0
+
+
+@dataclass(frozen=True)
+class Free:
+    """A number that a fit may change: where it starts, and the bounds it stays between.
+
+    ValueError unless low < high and the start lies between them.
+    """
+
+    name: str
+    start: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.start <= self.high or not self.low < self.high:
+            raise ValueError(f"{self.name}: expected a start between its bounds, found {self.start:g} and "
+                             f"{self.low:g} to {self.high:g}")
+
+    @property
+    def positive(self) -> bool:
+        """Whether it is a size, which moves by factors, and not a place, which moves by differences."""
+        return self.low > 0
+
+
+def names(vehicle: Vehicle) -> list[str]:
+    """Every name that this vehicle's model has a use for; the joint ones last."""
+    body = [name for name in _BODY if getattr(vehicle, name) is not None]
+    axle = [name for name in _AXLE if _used(vehicle, name)]
+    single = [*body, *(f"front.{name}" for name in axle)]
+    joint: list[str] = []
+    if vehicle.rear is not None:
+        single += [f"rear.{name}" for name in axle]
+        joint = [f"{BOTH}.{name}" for name in axle]
+    return single + [f"{SENSOR}.{name}" for name in _PLACE.get(vehicle.model, ())] + joint
+
+
+def read(vehicle: Vehicle, name: str) -> float:
+    """The number of that name; of a joint one the mean of the two axles.
+
+    ValueError, which lists the names there are, for another name.
+    """
+    _check(vehicle, name)
+    part, _, leaf = name.rpartition(".")
+    if part == BOTH:
+        return sum(float(getattr(_axle(vehicle, axle), leaf)) for axle in AXLES) / len(AXLES)
+    return float(getattr(getattr(vehicle, part) if part else vehicle, leaf))
+
+
+def changed(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
+    """The same vehicle with other numbers. ValueError as ``read``."""
+    for name, value in values.items():
+        _check(vehicle, name)
+        part, _, leaf = name.rpartition(".")
+        whole: dict[str, Any] = {leaf: value}
+        if part == SENSOR:
+            whole = {SENSOR: replace(vehicle.sensor, **whole)}
+        elif part:
+            axles = AXLES if part == BOTH else (part,)
+            whole = {axle: replace(_axle(vehicle, axle), **whole) for axle in axles}
+        vehicle = replace(vehicle, **whole)
+    return vehicle
+
+
+def free(
+    vehicle: Vehicle, name: str, start: float | None = None, bounds: tuple[float, float] | None = None
+) -> Free:
+    """A free number of a vehicle: from its present value, within a factor of 20, unless something else is said.
+
+    Lengths along the car stay within a factor of 3, the sensor within 3 m of the centre of gravity. ValueError as
+    ``read`` and ``Free``, and for a size whose start is 0 and which so has no bounds of its own.
+    """
+    value = read(vehicle, name) if start is None else start
+    return Free(name, value, *(_bounds(name, value) if bounds is None else bounds))
+
+
+def _bounds(name: str, value: float) -> tuple[float, float]:
+    if name.startswith(f"{SENSOR}."):
+        return -_FARTHEST_M, _FARTHEST_M
+    factor = _LENGTH_FACTOR if name.endswith("_m") else _FACTOR
+    high = value * factor
+    return value / factor, min(high, _LONGEST_PATCH_M) if name == "contact_patch_m" else high
+
+
+def _used(vehicle: Vehicle, leaf: str) -> bool:
+    """Whether the vehicle's model feels this number of its axles."""
+    if leaf == "cg_distance_m":
+        return vehicle.rear is not None
+    return leaf != "anti_roll_stiffness_n_m_per_rad" or vehicle.model == "full_car"
+
+
+def _axle(vehicle: Vehicle, name: str) -> Axle:
+    axle = vehicle.front if name == "front" else vehicle.rear
+    assert axle is not None
+    return axle
+
+
+def _check(vehicle: Vehicle, name: str) -> None:
+    if name not in (known := names(vehicle)):
+        raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}")
