@@ -95,12 +95,14 @@ class PipelineConfig:
 
 @dataclass(frozen=True)
 class LogConfig:
-    """Where the logs go, when a file is full, and how long a row may stay off the disk."""
+    """Where the logs go, when a file is full, how long a row may stay off the disk, and the room that may be used."""
 
     directory: Path = Path("/var/lib/ridelog")
     max_file_bytes: int = 4_000_000
     record_dump: bool = False
     sync_s: float = 1.0
+    quota_bytes: int | None = None
+    keep_free_bytes: int = 200_000_000
 
 
 @dataclass(frozen=True)
@@ -293,6 +295,8 @@ _log = _section(LogConfig, {
     "max_file_bytes": _whole(10_000, 1_000_000_000),
     "record_dump": Node.boolean,
     "sync_s": _number(0.1, 60),
+    "quota_bytes": _or_none("null", _whole(200_000_000, 10**15)),
+    "keep_free_bytes": _whole(0, 10**15),
 })
 
 

@@ -47,7 +47,8 @@ def _serve(config: Config, stop: threading.Event) -> None:
     vehicle = read_vehicle(config.vehicle)
     facts = assemble.sidecar(config, sensor, vehicle)
     header = assemble.dump_header(config) if config.log.record_dump else None
-    storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, Limits(), monotonic_us)
+    limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
+    storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us)
     decoder = assemble.gps_decoder(config)
     pipeline = assemble.pipeline(config, sensor, vehicle)
     core = Core(sensor.decoder, decoder, pipeline, storage.log)
