@@ -187,7 +187,6 @@ class SegmentLog:
                 if finished is not None and finished.exists():
                     self._without_utc.append((finished, take_tally(finished)))
                 self._left.pop(0)
-            self._fill_earlier()
 
     def close(self) -> None:
         """Finish the last part, or remove it when it has no rows. Closing twice does nothing."""

@@ -10,9 +10,10 @@ import pytest
 
 from logger.service.storage import LOOK_US
 from logger.store import lasting, space
+from logger.store.rotation import SegmentLog
 from logger.store.space import Limits
 
-from crashes import ERRORS, KINDS, Service, events, outage, problems, restart, segments
+from crashes import ERRORS, FACTS, KINDS, Service, events, outage, problems, restart, segments, window
 from faulty_disk import RefusingFiles
 
 
@@ -65,6 +66,40 @@ def test_a_failed_sync_is_never_taken_for_good_by_the_next_one(tmp_path: Path) -
     assert service.storage.log.file_name != part
     assert segments(tmp_path / "log", "*-001.csv") == [1, 2, 3, 4, 5]
     assert segments(tmp_path / "log", "*-002.csv.part") == [6, 7]
+
+
+@pytest.mark.parametrize("kind", ["write", "sync"])
+def test_a_part_that_failed_takes_nothing_more(tmp_path: Path, kind: str) -> None:
+    files = RefusingFiles()
+    log = SegmentLog(tmp_path, 1, FACTS, 100_000, files)
+    log.append(window(1, utc=True))
+    log.sync()
+    files.refuses = lambda asked: asked == kind
+    with pytest.raises(OSError, match="error"):
+        log.append(window(2, utc=True))
+        log.sync()
+    files.refuses = lambda asked: False
+    with pytest.raises(ValueError, match="go_on"):
+        log.append(window(2, utc=True))
+    with pytest.raises(ValueError, match="go_on"):
+        log.sync()
+    assert log.rows_on_disk == 1
+
+
+@pytest.mark.parametrize("kind", ["write", "sync"])
+def test_an_outage_leaves_no_file_open_and_nothing_half_written(tmp_path: Path, kind: str) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    files = RefusingFiles()
+    service = Service(tmp_path / "log", files)
+    for round_number in range(40):
+        files.refuses = lambda asked, bad=round_number % 8 >= 6: bad and asked == kind
+        service.now_us += 30_000_000
+        service.step()
+        assert not list(service.folder.glob("*.tmp"))
+    files.refuses = lambda asked: False
+    service.wait()
+    service.storage.close()
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_memory_for_rows_is_bounded_and_what_was_lost_is_counted(

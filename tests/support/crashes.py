@@ -273,7 +273,7 @@ def outage(folder: Path, error: int, kinds: tuple[str, ...], begin: int, length:
 
 def restart(folder: Path) -> None:
     """Start and stop again on a disk that is well."""
-    Storage(folder, FACTS, 2500, None, WHOLE_DISK, lambda: 0).close()
+    Storage(folder, FACTS, 2500, None, WHOLE_DISK, lambda: 0, RefusingFiles()).close()
 
 
 def problems(folder: Path) -> list[str]:

@@ -31,13 +31,12 @@ SECTOR = 512
 class RefusingFiles(FileSystem):
     """A disk that refuses changes with ``error`` while ``refuses`` says so of their kind (``write``, ``sync`` ...).
 
-    A write that is refused has left its first half. ``free`` overrides the free space.
+    A write that is refused has left its first half. Nothing waits for the disk.
     """
 
     def __init__(self) -> None:
         self.error = errno.EIO
         self.refuses: Callable[[str], bool] = lambda kind: False
-        self.free: int | None = None
         self.refused = 0
 
     def _ask(self, kind: str) -> None:
@@ -59,7 +58,6 @@ class RefusingFiles(FileSystem):
 
     def sync(self, descriptor: int) -> None:
         self._ask("sync")
-        super().sync(descriptor)
 
     def close(self, descriptor: int) -> None:
         super().close(descriptor)
@@ -67,7 +65,7 @@ class RefusingFiles(FileSystem):
 
     def cut(self, path: Path, size: int) -> None:
         self._ask("cut")
-        super().cut(path, size)
+        os.truncate(path, size)
 
     def rename(self, source: Path, target: Path) -> None:
         self._ask("rename")
@@ -79,10 +77,6 @@ class RefusingFiles(FileSystem):
 
     def sync_directory(self, directory: Path) -> None:
         self._ask("sync_directory")
-        super().sync_directory(directory)
-
-    def free_bytes(self, directory: Path) -> int:
-        return super().free_bytes(directory) if self.free is None else self.free
 
 
 @dataclass(frozen=True)
