@@ -4,13 +4,19 @@
 
 The parts: exact (positions known exactly; every speed and sensor, and the limit), wrong (a car that is not the one in
 the file), gps (the whole pipeline with a receiver of 1 Hz), drives (town and highway), long (windows of 100 ft), cost.
-Roads, cars and instruments come from tests/support/measured_drives.py, seeds from 90000 up. Exit 1 when a goal is
-missed.
+Roads, cars and instruments come from tests/support/measured_drives.py, seeds from 910000 up, which nothing else uses.
+Exit 1 when a goal is missed.
 
 R2 is 1 - mean((estimate - exact)^2) / var(exact) over the windows of all roads of a row, IRI 1 to 10. Windows without
-an estimate are left out and counted. "in 1" and "in 2" are the shares of windows whose exact IRI lies within one and
-two of their standard errors: 0.68 and 0.95 where those are right. "limit" is an estimator that knows the spectrum of
-the road and how its level changes, the noise and the car; "r.m.s." the dissertation's relation (Fig 6.6), computed.
+an estimate are left out; "given" is the share of the others. "in 1" and "in 2" are the shares of windows whose exact
+IRI lies within one and two of their standard errors: 0.68 and 0.95 where those are right. "limit" is an estimator that
+knows the spectrum of the road and how its level changes, the noise and the car. Right of the bar stands the
+dissertation's relation (Fig 6.6, computed) beside ours, on those windows that have both; the relation has none where
+the car crept, and a standing car makes a window partial.
+
+Goals: with exact positions R2, bias and trend. A trend is the change of the bias from 10 to 70 mph, by a straight line;
+it may not be more than the bias itself may be. Coverage counts as right within 0.05 at one standard error and 0.03 at
+two. With a receiver, R2 from 20 mph up. What the rest costs are figures without a goal.
 
 The BMA220's noise of 0.1 m/s2 is taken for readings at 100 Hz behind its filter of 32 Hz. With 8 readings per sample,
 the most that the driver takes, its filter is 8 times as wide and the noise per reading sqrt(8) times as large.
@@ -35,6 +41,8 @@ from pathlib import Path
 import numpy as np
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
+from logger.estimation.limit import Limits, pooled_r2
+from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor import Sensor
 from logger.estimation.stream import RoadEstimator
 from logger.roads.from_acceleration import RmsRelation, rms_relation
@@ -72,7 +80,7 @@ from measured_drives import (
 
 Array = np.ndarray
 
-FIRST_SEED = 90_000
+FIRST_SEED = 910_000
 MPH = (10, 20, 30, 40, 50, 60, 70)
 LEVELS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0)
 WAVINESS = (2.0, 1.8, 2.4)
@@ -83,6 +91,7 @@ PASCO = Accelerometer("PASCO", 0.05, 0.01 * 9.80665)
 BMA220 = Accelerometer("BMA220", 0.1, 9.80665 / 16, counts=(-32, 31))
 BMA220_FAST = Accelerometer("BMA220 x8", 0.1 * sqrt(8), 9.80665 / 16, oversample=8, counts=(-32, 31))
 SENSORS = (PASCO, BMA220, BMA220_FAST)
+BIAS_GOAL_PERCENT = {PASCO: 2.0, BMA220: 5.0}
 
 
 @dataclass(frozen=True)
@@ -121,6 +130,17 @@ def pooled(parts: Sequence[Windows]) -> Windows:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """Our figures and those of the r.m.s. relation, on the windows that have both."""
+
+    count: int
+    r2: float
+    bias: float
+    rms_r2: float
+    rms_bias: float
+
+
+@dataclass(frozen=True)
 class Score:
     """Figures of some windows."""
 
@@ -130,10 +150,9 @@ class Score:
     bias: float
     in_one: float
     in_two: float
-    rms_r2: float
-    rms_bias: float
     limit_r2: float
     worst_level_r2: float
+    beside: Beside
 
 
 def r2(found: Array, exact: Array) -> float:
@@ -141,37 +160,46 @@ def r2(found: Array, exact: Array) -> float:
     return float(1 - np.mean((found - exact) ** 2) / np.var(exact)) if len(exact) > 2 else float("nan")
 
 
+def bias(found: Array, exact: Array) -> float:
+    """How far the mean is off the mean of the exact values, as a share of it."""
+    return float(found.mean() / exact.mean() - 1) if len(exact) else float("nan")
+
+
 def score(windows: Windows) -> Score:
     """The figures, over the windows that have an estimate."""
     known = windows.chosen(np.isfinite(windows.estimate))
-    if len(known.exact) < 3:
-        return Score(len(known.exact) / max(len(windows.exact), 1), len(known.exact), *[float("nan")] * 8)
+    both = known.chosen(np.isfinite(known.rms))
     off = np.abs(known.estimate - known.exact) / known.std
     levels = [known.chosen(known.level == level) for level in np.unique(known.level)]
     return Score(
-        answered=len(known.exact) / len(windows.exact),
+        answered=len(known.exact) / max(len(windows.exact), 1),
         count=len(known.exact),
         r2=r2(known.estimate, known.exact),
-        bias=float(known.estimate.mean() / known.exact.mean() - 1),
-        in_one=float(np.mean(off <= 1)),
-        in_two=float(np.mean(off <= 2)),
-        rms_r2=r2(known.rms, known.exact),
-        rms_bias=float(known.rms.mean() / known.exact.mean() - 1),
+        bias=bias(known.estimate, known.exact),
+        in_one=float(np.mean(off <= 1)) if len(off) else float("nan"),
+        in_two=float(np.mean(off <= 2)) if len(off) else float("nan"),
         limit_r2=r2(known.limit, known.exact),
-        worst_level_r2=min(r2(one.estimate, one.exact) for one in levels),
+        worst_level_r2=min((r2(one.estimate, one.exact) for one in levels), default=float("nan")),
+        beside=Beside(len(both.exact), r2(both.estimate, both.exact), bias(both.estimate, both.exact),
+                      r2(both.rms, both.exact), bias(both.rms, both.exact)),
     )
 
 
-HEADING = (f"{'':26s} {'R2':>7s} {'limit':>7s} {'r.m.s.':>7s} {'bias':>7s} {'r.m.s.':>7s} {'in 1':>6s} {'in 2':>6s} "
-           f"{'given':>6s} {'windows':>8s}  R2 within the worst level")
+HEADING = (f"{'':36s}{'R2':>8s}{'limit':>8s}{'bias':>8s}{'in 1':>7s}{'in 2':>7s}{'given':>7s}{'windows':>8s}"
+           f"{'worst level':>12s} |{'windows':>8s}{'R2':>8s}{'r.m.s.':>8s}{'bias':>8s}{'r.m.s.':>8s}")
 
 
 def print_score(name: str, found: Score) -> None:
-    """One row under HEADING."""
-    print(f"{name:26s} {found.r2:7.4f} {found.limit_r2:7.4f} {found.rms_r2:7.4f} {found.bias:+7.2%} "
-          f"{found.rms_bias:+7.2%} {found.in_one:6.3f} {found.in_two:6.3f} {found.answered:6.3f} {found.count:8d}  "
-          f"{found.worst_level_r2:.3f}",
-          flush=True)
+    """One row under HEADING; "worst level" is R2 within the roads of that level alone."""
+    def given(value: float, form: str, width: int) -> str:
+        return f"{format(value, form) if np.isfinite(value) else '-':>{width}s}"
+
+    beside = found.beside
+    print(f"{name:36s}" + given(found.r2, ".4f", 8) + given(found.limit_r2, ".4f", 8) + given(found.bias, "+.2%", 8)
+          + given(found.in_one, ".3f", 7) + given(found.in_two, ".3f", 7)
+          + f"{found.answered:7.3f}{found.count:8d}" + given(found.worst_level_r2, ".3f", 12)
+          + f" |{beside.count:8d}" + given(beside.r2, ".4f", 8) + given(beside.rms_r2, ".4f", 8)
+          + given(beside.bias, "+.2%", 8) + given(beside.rms_bias, "+.2%", 8), flush=True)
 
 
 # --- one drive with exact positions ----------------------------------------------------------------------------------
@@ -211,7 +239,7 @@ def on_grid(drive: Drive, sensor: Accelerometer, rng: np.random.Generator) -> tu
     """Readings at 100 Hz, and which of them have a reading in them that stood at an end of the range."""
     readings, clipped = sensor.read(drive.accel_mps2, rng)
     thin = thinned(readings, sensor.oversample)
-    return thin, clipped[: len(thin) * sensor.oversample].reshape(len(thin), -1).any(axis=1)
+    return thin, np.any(clipped[: len(thin) * sensor.oversample].reshape(len(thin), -1), axis=1)
 
 
 class Spent:
@@ -242,13 +270,16 @@ def estimates(
     return {one.number: (one.iri_m_per_km, one.iri_std_m_per_km) for one in found}
 
 
-def by_rms(readings: Array, number: Array, speed_mps: float, count: int) -> Array:
-    """The dissertation's relation on windows 0 ... count - 1."""
+def by_rms(readings: Array, number: Array, speed_mps: Array, count: int) -> Array:
+    """The dissertation's relation on windows 0 ... count - 1, at the mean speed of each; nan outside its speeds."""
     high_pass = BlockFilter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_HZ))
     high_pass.reset(float(readings[:PUSH].mean()))
-    squares = np.bincount(number, high_pass.process(readings) ** 2, count)[:count]
-    samples = np.bincount(number, minlength=count)[:count]
-    return np.asarray(relation().iri(np.sqrt(squares / np.maximum(samples, 1)), np.full(count, speed_mps)))
+
+    def mean(values: Array) -> Array:
+        samples = np.bincount(number, minlength=count)[:count]
+        return np.asarray(np.bincount(number, values, count)[:count] / np.maximum(samples, 1))
+
+    return np.asarray(relation().iri(np.sqrt(mean(high_pass.process(readings) ** 2)), mean(speed_mps)))
 
 
 def exact_drive(
@@ -265,11 +296,12 @@ def exact_drive(
     begin_m = place_m[0] + numbers * window_m
     found = estimates(told(sensor), readings, clipped, travelled_m, window_m, spent)
     nothing = (np.nan, np.nan)
-    estimate, std = np.array([found.get(number, nothing) for number in numbers]).T
+    estimate, std = np.array([found.get(number, nothing) for number in numbers.tolist()]).T
     limit = np.full(len(numbers), np.nan)
     if with_limit:
         limit = known_best(car, drive, sensor, readings)(begin_m, begin_m + window_m)
-    rms = by_rms(readings, (travelled_m / window_m).astype(int), drive.speed_mps[0], numbers[-1] + 1)[numbers]
+    speed_mps = np.full(len(readings), drive.speed_mps[0])
+    rms = by_rms(readings, (travelled_m / window_m).astype(int), speed_mps, numbers[-1] + 1)[numbers]
     return Windows(road.iri(begin_m, begin_m + window_m), estimate, std, rms, limit,
                    np.full(len(numbers), road.level_m_per_km))
 
@@ -387,23 +419,38 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
                 print_score(f"  {mph} mph, {kind} roads", score(pooled([one for is_, one in parts if is_ == kind])))
             scores.append(score(pooled([one for _, one in parts])))
             print_score(f"{mph} mph, all roads", scores[-1])
+        print("limit as ridelog estimate prints it, ISO roads of waviness 2:  " + "  ".join(
+            f"{mph:g} mph {limit:.4f}" for mph, limit in zip(extent.mph, told_limits(sensor, extent), strict=True)))
         print(f"estimator: {1000 * spent.taken_s / spent.driven_s:.2f} ms per second of drive")
         for mph, found in zip(extent.mph, scores, strict=True):
             exact_goals(figures, sensor, mph, found)
-        trend = np.polyfit(extent.mph, [100 * found.bias for found in scores], 1)[0] * 60
-        figures.at_most(f"{sensor.name}: trend of bias, 10 to 70 mph", abs(trend), 2.0, "%")
+        trend, rms_trend = (60 * np.polyfit(extent.mph, [100 * value for value in values], 1)[0]
+                            for values in zip(*((one.bias, one.beside.rms_bias) for one in scores), strict=True))
+        print(f"{sensor.name}: bias changes by {trend:+.2f} % from 10 to 70 mph; that of the r.m.s. relation by "
+              f"{rms_trend:+.1f} %")
+        if sensor in BIAS_GOAL_PERCENT:
+            figures.at_most(f"{sensor.name}: size of that trend", abs(trend), BIAS_GOAL_PERCENT[sensor], "%")
+
+
+def told_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
+    """The product's own limit at each speed, over the levels driven."""
+    structure = half_car.structure(rav4())
+    limits = Limits(structure, body_point(structure), told(sensor), WINDOW_M)
+    return [pooled_r2([limits.at(mph * MPH_MPS, RoadSpectrum.of_iri(level)) for level in extent.levels])
+            for mph in extent.mph]
 
 
 def exact_goals(figures: Figures, sensor: Accelerometer, mph: float, found: Score) -> None:
-    """The goals of one sensor at one speed."""
+    """The goals of one sensor at one speed. With oversampling only the standard errors have any."""
     name = f"{sensor.name}, {mph:g} mph"
     if sensor is PASCO:
         figures.at_least(f"{name}: R2 (0.95, or 0.01 off limit)", found.r2, min(0.95, found.limit_r2 - 0.01), "")
-    else:
+    if sensor is BMA220:
         figures.at_least(f"{name}: R2", found.r2, 0.80 if mph < 20 else 0.90, "")
-    figures.at_most(f"{name}: size of bias", 100 * abs(found.bias), 2.0 if sensor is PASCO else 5.0, "%")
-    figures.at_most(f"{name}: coverage of 1 std off 0.68", abs(found.in_one - 0.683), 0.05, "")
-    figures.at_most(f"{name}: coverage of 2 std off 0.95", abs(found.in_two - 0.954), 0.03, "")
+    if sensor in BIAS_GOAL_PERCENT:
+        figures.at_most(f"{name}: size of bias", 100 * abs(found.bias), BIAS_GOAL_PERCENT[sensor], "%")
+    figures.at_most(f"{name}: in 1 off 0.683", abs(found.in_one - 0.683), 0.05, "")
+    figures.at_most(f"{name}: in 2 off 0.954", abs(found.in_two - 0.954), 0.03, "")
 
 
 # --- 3: another car, a receiver, town and highway --------------------------------------------------------------------
@@ -422,6 +469,8 @@ def altered(vehicle: Vehicle, share: float, rng: np.random.Generator) -> Vehicle
             suspension_damping_n_s_per_m=off(one.suspension_damping_n_s_per_m),
         )
 
+    if vehicle.rear is None or vehicle.pitch_inertia_kg_m2 is None:
+        raise ValueError("expected a half car")
     front, rear = axle(vehicle.front), axle(vehicle.rear)
     ahead_m = off(front.cg_distance_m)
     return replace(
@@ -431,29 +480,34 @@ def altered(vehicle: Vehicle, share: float, rng: np.random.Generator) -> Vehicle
     )
 
 
-def wrong(figures: Figures, extent: Extent, sensor: Accelerometer = PASCO) -> None:
-    """What it costs when the car is not the one in the file."""
+def wrong(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (PASCO, BMA220)) -> None:
+    """What it costs when the car is not the one in the file: the same roads and noise with each car."""
     cars = {
         "the car of the file": [rav4()],
         "parameters 10 % off": [
             altered(rav4(), 0.1, np.random.default_rng(FIRST_SEED + draw)) for draw in range(extent.draws)
         ],
-        "a passenger, 37.5 kg": [with_load(rav4(), 37.5)],
-        "a passenger, 75 kg": [with_load(rav4(), 75.0)],
+        "a passenger, 37.5 kg a side": [with_load(rav4(), 37.5)],
+        "two passengers, 75 kg a side": [with_load(rav4(), 75.0)],
     }
-    print(f"\n{sensor.name}, exact positions, another car than the estimator believes")
-    for name, drawn in cars.items():
-        print(name)
+    for sensor in sensors:
+        print(f"\n{sensor.name}, exact positions, another car than the estimator believes")
         print(HEADING)
-        for mph in extent.mph[:: 2 if len(extent.mph) > 3 else 1]:
-            found = []
-            for number, car in enumerate(drawn):
-                parts = [exact_drive(car, road, mph, sensor, seed=number)
-                         for road in roads(tuple(extent.levels[::2]), extent.windows * WINDOW_M, number)]
-                found.append(pooled(parts))
-                if len(drawn) > 1:
-                    print_score(f"  {mph} mph, draw {number}", score(found[-1]))
-            print_score(f"{mph} mph", score(pooled(found)))
+        for mph in extent.mph:
+            right: Score | None = None
+            for name, drawn in cars.items():
+                found = [pooled([exact_drive(car, road, mph, sensor, seed=number)
+                                 for number, road in enumerate(roads(tuple(extent.levels[::2]),
+                                                                     extent.windows * WINDOW_M))]) for car in drawn]
+                for number, one in enumerate(found if len(drawn) > 1 else []):
+                    print_score(f"  draw {number}", score(one))
+                cost_of = score(pooled(found))
+                print_score(f"{mph} mph, {name}", cost_of)
+                right = right or cost_of
+                if cost_of is not right:
+                    off = sqrt(np.mean([(score(one).bias - right.bias) ** 2 for one in found]))
+                    print(f"  it costs {right.r2 - cost_of.r2:.4f} of R2; bias {cost_of.bias - right.bias:+.2%}"
+                          + (f", r.m.s. of the draws {off:.2%}" if len(found) > 1 else ""), flush=True)
 
 
 @dataclass(frozen=True)
@@ -494,7 +548,8 @@ def logged_drive(
         records += pipeline.step(now_us, block_of(t_us[part], readings[part], clipped[part]), fixes[begin:sent])
     records += pipeline.finish()
     whole = [one for one in records if one.lat_deg is not None and "partial" not in one.flags]
-    middle_m = np.array([place_of(one.lat_deg) for one in whole])
+    latitudes = [one.lat_deg for one in whole if one.lat_deg is not None]
+    middle_m = np.array([place_of(lat_deg) for lat_deg in latitudes])
     edges_us = np.array([[one.t_us, one.t_us + one.duration_s * US_PER_S] for one in whole])
     begin_m, end_m = np.interp(edges_us, t_us, drive.place_m).T
 
@@ -538,7 +593,7 @@ def gps(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (PA
                     parts = [logged_drive(drive, sensor, receiver, feet * FOOT_M, told_latency_s, seed)
                              for seed, drive in enumerate(found_drives)]
                     found = print_logged(f"{mph} mph", parts)
-                    if name == "0.8 m slow error" and mph >= 20 and sensor is PASCO:
+                    if name == "0.8 m slow error" and mph >= 20:
                         goal = 0.8 if feet == 25 else 0.95
                         figures.at_least(f"{sensor.name}, GPS, {feet} ft, {mph} mph: R2", found.r2, goal, "")
 
@@ -579,10 +634,11 @@ def varied_exact(drive: Drive, sensor: Accelerometer, seed: int, window_m: float
     place_m = drive.place_m[:: sensor.oversample][: len(readings)]
     numbers = np.arange(int(place_m[-1] / window_m))
     found = estimates(told(sensor), readings, clipped, place_m, window_m)
-    estimate, std = np.array([found.get(number, (np.nan, np.nan)) for number in numbers]).T
-    nothing = np.full(len(numbers), np.nan)
-    return Windows(drive.road.iri(numbers * window_m, (numbers + 1) * window_m), estimate, std, nothing, nothing,
-                   np.full(len(numbers), drive.road.level_m_per_km))
+    estimate, std = np.array([found.get(number, (np.nan, np.nan)) for number in numbers.tolist()]).T
+    speed_mps = drive.speed_mps[:: sensor.oversample][: len(readings)]
+    rms = by_rms(readings, (place_m / window_m).astype(int), speed_mps, len(numbers))
+    return Windows(drive.road.iri(numbers * window_m, (numbers + 1) * window_m), estimate, std, rms,
+                   np.full(len(numbers), np.nan), np.full(len(numbers), drive.road.level_m_per_km))
 
 
 # --- 4: 100 ft, 5: cost ----------------------------------------------------------------------------------------------
@@ -590,7 +646,9 @@ def varied_exact(drive: Drive, sensor: Accelerometer, seed: int, window_m: float
 
 def long(figures: Figures, extent: Extent) -> None:
     """Fig 6.12 and 6.13: windows of 100 ft."""
-    print("\nPASCO, exact positions, windows of 100 ft (Fig 6.12, 6.13 are the r.m.s. relation at 40 mph)")
+    print("\nPASCO, exact positions, windows of 100 ft. Fig 6.12 and 6.13 show the r.m.s. relation at 40 mph on one\n"
+          "measured profile; they are pictures, and the text prints no number for them: it says (6.3.1) that the\n"
+          "relation is accurate at 40 mph, too high at lower speeds and too low at higher ones.")
     print(HEADING)
     for mph in extent.mph:
         parts = [exact_drive(rav4(), road, mph, PASCO, 100 * FOOT_M, seed, with_limit=True)
@@ -608,13 +666,14 @@ def cost(figures: Figures, extent: Extent) -> None:
             spent = Spent()
             exact_drive(rav4(), road, mph, sensor, spent=spent)
             per_s = 1000 * spent.taken_s / spent.driven_s
-            print(f"{sensor.name}, {mph} mph: {per_s:.2f} ms per second of drive", flush=True)
+            print(f"{sensor.name}, {mph} mph: {per_s:.2f} ms per second of drive, {per_s / 10:.2f} % of this core",
+                  flush=True)
     dump = resources.files("logger.demo") / "drive.dump.gz"
     ridelog = Path(sys.executable).with_name("ridelog")
     speeds = []
     for _ in range(3):
         with tempfile.TemporaryDirectory() as out:
-            command = [ridelog, "replay", str(dump), "--out", out, "--json"]
+            command = [str(ridelog), "replay", str(dump), "--out", out, "--json"]
             outcome = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
             speeds.append(outcome["played_s"] / outcome["wall_s"])
     figures.at_least("replay with the estimator, median of 3", sorted(speeds)[1], 150, "x real")

@@ -60,7 +60,7 @@ class Road:
     @property
     def wave_number_cpm(self) -> Array:
         """(n // 2 + 1,) [cycle/m]."""
-        return np.fft.rfftfreq(len(self.elevation_m), SPACING_M)
+        return np.asarray(np.fft.rfftfreq(len(self.elevation_m), SPACING_M), dtype=np.float64)
 
     @cached_property
     def _slope_up_to(self) -> Array:
@@ -220,7 +220,7 @@ def road_response(vehicle: Vehicle, wave_number_cpm: Array, speed_mps: float) ->
     return (front + rear * later) * np.sinc(wave_number_cpm * vehicle.contact_patch_m)
 
 
-def recorder_response(f_hz: Array) -> Array:
+def recorder_response(f_hz: npt.ArrayLike) -> Array:
     """The recorder's filter: 1 up to 38 Hz, half a cosine down to nothing at 50 Hz."""
     part = np.clip((np.asarray(f_hz) - FLAT_HZ) / (SHUT_HZ - FLAT_HZ), 0.0, 1.0)
     return 0.5 * (1 + np.cos(np.pi * part))
