@@ -99,6 +99,8 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
 def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     if sensor.state == "ok":
         return []
+    if sensor.state == "doubtful":
+        return [f"{name}: {sensor.last_error} (at {sensor.place})."]
     error = f" It said: {sensor.last_error}." if sensor.last_error else ""
     if sensor.driver == "bma220":
         check = "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"

@@ -23,6 +23,7 @@ HEALTH_LINE_US = 60 * US_PER_S
 RECENT_US = 15 * US_PER_S
 GRAVITY_TOLERANCE_G = 0.4
 LOOKS_WITHOUT_GRAVITY = 5
+UNREADABLE_S = 10.0
 log = logging.getLogger(__name__)
 
 
@@ -56,6 +57,8 @@ class Observer:
         self._failed = False
         self._without_gravity = 0
         self._gravity_advice: str | None = None
+        self._progress = {"accelerometer": Progress(), "gps": Progress()}
+        self._started_anew_us = self._began_us
 
     def write(self, now_us: int) -> None:
         """Renew the status file; once a minute a line in the log."""
@@ -69,6 +72,7 @@ class Observer:
                 log.warning("status file %s: %s", self._config.status_file, error.strerror)
             self._failed = True
         self._look_at_gravity()
+        self._look_at_stillness(now_us)
         if now_us - self._told_us >= HEALTH_LINE_US:
             self._told_us = now_us
             log.info("%s", self.line())
@@ -135,6 +139,22 @@ class Observer:
             self._gravity_advice = f"axis {word} does not feel 1 g ({axes} g): check vertical_axis, range and mounting"
             log.warning("accelerometer: %s", self._gravity_advice)
 
+    def _look_at_stillness(self, now_us: int) -> None:
+        """Start an accelerometer anew that drives and says nothing new; not more than once a minute."""
+        frozen_s = self._pipeline.stillness.frozen_s
+        if frozen_s and now_us - self._started_anew_us >= HEALTH_LINE_US:
+            self._started_anew_us = now_us
+            log.warning("accelerometer: %s; starting it anew", _frozen(frozen_s))
+            self._sensors["accelerometer"].start_anew(_frozen(frozen_s))
+
+    def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
+        """What is wrong with a sensor that speaks; None: nothing."""
+        doubt = self._progress[name].look(now_us, state == "ok", readings)
+        if doubt or state != "ok" or name != "accelerometer":
+            return doubt
+        frozen_s = self._pipeline.stillness.frozen_s
+        return _frozen(frozen_s) if frozen_s else self._gravity_advice
+
     def _state(self, now_us: int) -> ServiceState:
         if not self._core.samples and not self._core.rows:
             return "starting"
@@ -144,6 +164,9 @@ class Observer:
     def _sensor(self, name: str, now_us: int, place: str, readings: int) -> SensorStatus:
         part = self._sensors[name]
         state = part.state()
+        doubt = self._doubt(name, now_us, state, readings)
+        if doubt:
+            state = "doubtful"
         if self._state_since.get(name, ("", 0))[0] != state:
             self._state_since[name] = (state, now_us)
         return SensorStatus(
@@ -151,7 +174,7 @@ class Observer:
             place=place,
             state=state,
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
-            last_error=part.error or (self._gravity_advice if name == "accelerometer" else None),
+            last_error=doubt or part.error or None,
             readings=readings,
             counters={"faults": part.faults, "restarts": part.restarts, **self._counters[name]()},
         )
@@ -162,6 +185,29 @@ class Observer:
             return sensor.pasco.port
         bus = sensor.bma220.i2c_bus
         return f"/dev/i2c-{bus}" if isinstance(bus, int) else str(bus)
+
+
+class Progress:
+    """Do the bytes that arrive become readings? ``look`` gives what is wrong, or None."""
+
+    def __init__(self) -> None:
+        self._readings = 0
+        self._since_us: int | None = None
+
+    def look(self, now_us: int, speaks: bool, readings: int) -> str | None:
+        """``speaks``: bytes arrive. ``readings``: how many there have been so far."""
+        if not speaks or readings != self._readings or self._since_us is None:
+            self._since_us, self._readings = now_us, readings
+        silent_s = (now_us - self._since_us) / US_PER_S
+        if silent_s < UNREADABLE_S:
+            return None
+        return (f"bytes arrive, but none that can be read for {silent_s:.0f} s: check the baud rate in the settings, "
+                "and that no other device is on this port")
+
+
+def _frozen(seconds: float) -> str:
+    return (f"the car drives, and the readings have not changed at all for {seconds:.0f} s: the sensor has frozen; "
+            "check its wires, and its mounting if it is started anew and it stays so")
 
 
 def _free_bytes(directory: str) -> int | None:

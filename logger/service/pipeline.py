@@ -22,6 +22,7 @@ from logger.roads.from_acceleration import RmsRelation, iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain
 from logger.service.odometer import Odometer
 from logger.service.roughness import RoughnessQueue, Waiting
+from logger.service.stillness import Stillness
 from logger.service.timebase import Timebase
 from logger.units import US_PER_S
 
@@ -72,6 +73,7 @@ class Pipeline:
         self.drive = 1
         self.timebase = Timebase(settings.latency_s)
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
+        self.stillness = Stillness()
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
@@ -79,6 +81,7 @@ class Pipeline:
             self._start_us = now_us
         for fix in fixes:
             self.odometer.add(self.timebase.place(fix))
+        self.stillness.take(block, fixes)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
         self._release(self._settled_until_us(now_us))
@@ -184,6 +187,8 @@ class Pipeline:
         flags = set(window.flags)
         if offset_us is None:
             flags.add("time_unset")
+        if self.stillness.covers(window.t_us, window.t_us + round(window.duration_s * US_PER_S)):
+            flags.add("frozen")
         if estimate is not None:
             flags |= estimate.flags
         elif window.start_m is not None and "partial" not in flags:

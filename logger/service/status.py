@@ -23,7 +23,7 @@ from logger.records import WindowRecord
 STALE_S = 10.0
 """A living service renews its status every second; one this old comes from a service that hangs."""
 
-SensorState = Literal["ok", "absent", "retrying", "silent"]
+SensorState = Literal["ok", "absent", "retrying", "silent", "doubtful"]
 ServiceState = Literal["starting", "standing", "recording", "stopping"]
 
 
@@ -33,7 +33,8 @@ class SensorStatus:
 
     driver, place   what it is and where: ``bma220`` at ``/dev/i2c-1``
     state           ok: readings come; absent: it was never there; retrying: it was there, failed, and is tried
-                    again; silent: it is open and says nothing
+                    again; silent: it is open and says nothing; doubtful: it speaks, but what it says cannot be
+                    read or cannot be true (``last_error`` tells what)
     since_s         how long it has been in that state [s]
     last_error      text of the last fault, also after it recovered; None: there was none
     readings        samples or fixes so far

@@ -10,7 +10,7 @@ import logging
 from collections.abc import Callable
 
 from drivers.dump import Event
-from drivers.errors import DeviceError
+from drivers.errors import BadReply, DeviceError
 from logger.service.sources import Source
 from logger.service.status import SensorState
 from logger.units import US_PER_S
@@ -19,6 +19,7 @@ FIRST_WAIT_US = US_PER_S // 2
 LONGEST_WAIT_US = 30 * US_PER_S
 SILENT_AFTER_US = 5 * US_PER_S
 FAULTS_IN_A_ROW = 5
+FAULTY_US = 300_000
 log = logging.getLogger(__name__)
 
 
@@ -26,7 +27,8 @@ class Supervisor:
     """One source and its state: ``absent`` (never seen), ``ok``, ``silent`` (open, says nothing) or ``retrying``.
 
     A single failed read (a NACK, a time-out) costs one sample and the device is asked again at the next poll; after
-    some in a row it is closed and started anew.
+    some in a row, and a third of a second of nothing else, it is closed and started anew. Starting takes many
+    transfers, and on a bus that refuses every third one it is better not to have to.
     """
 
     def __init__(self, source: Source, now_us: Callable[[], int]) -> None:
@@ -38,7 +40,9 @@ class Supervisor:
         self._retry_us = 0
         self._wait_us = FIRST_WAIT_US
         self._faults = 0
+        self._faulty_us = 0
         self.name = source.name
+        self._doubt = ""
         self.error = ""
         self.restarts = 0
         self.faults = 0
@@ -56,6 +60,10 @@ class Supervisor:
 
     def step(self) -> Event | None:
         """One look at the device. None: nothing there, or not yet time to try again."""
+        doubt, self._doubt = self._doubt, ""
+        if doubt and self._is_open:
+            self.restarts += 1
+            self._give_up(BadReply(doubt), self._now_us())
         if not self._is_open and not self._try_open():
             return None
         try:
@@ -70,6 +78,10 @@ class Supervisor:
             self._seen = True
             self.error = ""
         return event
+
+    def start_anew(self, doubt: str) -> None:
+        """Ask for the device to be closed and opened at its next turn, though it answers. Any thread may."""
+        self._doubt = doubt
 
     def close(self) -> None:
         """Let go of the device for good."""
@@ -92,11 +104,13 @@ class Supervisor:
         return True
 
     def _fault(self, error: DeviceError) -> None:
+        now_us = self._now_us()
+        self._faulty_us = self._faulty_us if self._faults else now_us
         self.faults += 1
         self._faults += 1
-        if self._faults >= FAULTS_IN_A_ROW:
+        if self._faults >= FAULTS_IN_A_ROW and now_us - self._faulty_us >= FAULTY_US:
             self.restarts += 1
-            self._give_up(error, self._now_us())
+            self._give_up(error, now_us)
 
     def _give_up(self, error: DeviceError, now_us: int) -> None:
         if str(error) != self.error:

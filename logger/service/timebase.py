@@ -6,8 +6,9 @@ a floor; the floor over the last minutes is the clock difference plus the shorte
 latency is a setting (only a pulse-per-second wire could measure it).
 
 Two facts are kept apart because receivers learn them apart: the time of day (known with the first fix) and the
-date. UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted, and a
-lasting change (leap second, a receiver that corrects its week) is taken over after as many fixes.
+date. UTC is given out only after some fixes in a row agree on the date; one that disagrees is outvoted. A change of the
+time of day that lasts (a leap second) is taken over after as many fixes, one of the date (a receiver that jumps by a
+week, or corrects one) after half a minute: nobody drives into another week, and most such jumps are soon taken back.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from logger.units import US_PER_S
 DAY_US = 86_400 * US_PER_S
 FLOOR_FIXES = 120
 AGREEING_FIXES = 3
+OTHER_DATE_US = 30 * US_PER_S
 JUMP_US = 700_000  # below the one second of a leap second that the receiver learns late
 
 
@@ -44,7 +46,7 @@ class Timebase:
         self._floor_us: int | None = None
         self._strays_us: list[int] = []
         self._date_us: int | None = None
-        self._date_votes: list[int] = []
+        self._date_vote: tuple[int, int, int] | None = None
         self.time_jumps = 0
 
     def place(self, fix: Fix) -> TimedFix:
@@ -57,7 +59,7 @@ class Timebase:
         self._lags_us.append(lag_us)
         self._floor_us = min(self._lags_us)
         if fix.utc_us is not None and fix.valid:
-            self._vote_for_date(fix.t_us - lag_us, fix.utc_us)
+            self._vote_for_date(fix.t_us, fix.t_us - lag_us, fix.utc_us)
         return TimedFix(fix.t_us - lag_us + self._floor_us - self._latency_us, fix)
 
     def utc_offset_us(self) -> int | None:
@@ -89,16 +91,18 @@ class Timebase:
         self.time_jumps += 1
         return False
 
-    def _vote_for_date(self, gps_scale_us: int, utc_us: int) -> None:
+    def _vote_for_date(self, t_us: int, gps_scale_us: int, utc_us: int) -> None:
+        """Some fixes in a row settle the first date; a date once settled gives way only to half a minute of another."""
         date_us = utc_us - gps_scale_us
         if date_us == self._date_us:
-            self._date_votes.clear()
+            self._date_vote = None
             return
-        if self._date_votes and self._date_votes[-1] != date_us:
-            self._date_votes.clear()
-        self._date_votes.append(date_us)
-        if len(self._date_votes) >= AGREEING_FIXES:
-            if self._date_us is not None:
-                self.time_jumps += 1
-            self._date_us = date_us
-            self._date_votes.clear()
+        voted_us, votes, since_us = self._date_vote or (date_us, 0, t_us)
+        if voted_us != date_us:
+            votes, since_us = 0, t_us
+        self._date_vote = date_us, votes + 1, since_us
+        if votes + 1 < AGREEING_FIXES or (self._date_us is not None and t_us - since_us < OTHER_DATE_US):
+            return
+        self.time_jumps += self._date_us is not None
+        self._date_us = date_us
+        self._date_vote = None

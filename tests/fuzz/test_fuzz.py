@@ -9,8 +9,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import huge_inputs
 import pytest
+
+import huge_inputs
 from fuzz_targets import TARGETS, Workshop
 from fuzzing import fuzz
 

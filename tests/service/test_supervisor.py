@@ -11,7 +11,7 @@ from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
 from logger.service.sources import Bma220Source, SerialSource
-from logger.service.supervisor import FAULTS_IN_A_ROW, FIRST_WAIT_US, LONGEST_WAIT_US, Supervisor
+from logger.service.supervisor import FAULTS_IN_A_ROW, FAULTY_US, FIRST_WAIT_US, LONGEST_WAIT_US, Supervisor
 
 
 class Clock:
@@ -92,6 +92,8 @@ def test_a_device_that_appears_is_taken_and_the_wait_is_short_again(clock: Clock
     assert supervisor.error == ""
     device.answer = Timeout("silent")
     for _ in range(FAULTS_IN_A_ROW):
+        assert supervisor.state() == "ok"
+        clock.now_us += FAULTY_US // 4
         supervisor.step()
     assert supervisor.state() == "retrying"
     assert supervisor.retry_at_us == clock.now_us + FIRST_WAIT_US
@@ -169,6 +171,7 @@ def test_an_unplugged_port_is_a_fault_of_the_device(clock: Clock) -> None:
     assert event == Event(1_000_000, "nmea", b"$GP")
     clock.now_us = 1_600_000
     for _ in range(FAULTS_IN_A_ROW):
+        clock.now_us += FAULTY_US // 4
         assert supervisor.step() is None
     assert supervisor.state() == "retrying"
     assert "nmea port has gone" in supervisor.error

@@ -74,7 +74,7 @@ def test_one_wild_date_is_outvoted_and_a_lasting_one_is_taken_over() -> None:
         timebase.place(fix_at(second, 100_000))
     timebase.place(fix_at(10, 100_000, shift_us=7 * DAY_US))
     assert timebase.utc_offset_us() == NOON_US - BOOT_US
-    for second in range(11, 20):
+    for second in range(11, 45):
         timebase.place(fix_at(second, 100_000, shift_us=7 * DAY_US))
     assert timebase.utc_offset_us() == NOON_US - BOOT_US + 7 * DAY_US
     assert timebase.time_jumps == 1

@@ -20,7 +20,6 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from fuzzing import Target, ViolationError
 
 from drivers.bma220 import Bma220Decoder
 from drivers.dump import open_dump
@@ -36,6 +35,8 @@ from logger.store.record_file import read_record
 from logger.store.segment_log import HEADER, format_row, read_log, scan
 from logger.store.vehicle_file import read_vehicle, write_vehicle
 from logger.store.verify import verify
+
+from fuzzing import Target, ViolationError
 
 Reader = Callable[[bytes, random.Random], Hashable]
 
