@@ -170,6 +170,10 @@ class Block:
         kept = white[behind: min(earlier.count, behind + self.count)] if behind >= 0 else white[:0]
         return np.fft.rfft(kept, self.count)
 
+    def same_road(self, waves: ComplexArray, old: RoadSpectrum, new: RoadSpectrum) -> ComplexArray:
+        """``waves`` found with one spectrum as they are with another, for the same road."""
+        return waves * np.sqrt(old.psd(self.wave_number_cpm) / new.psd(self.wave_number_cpm))
+
     def wave_factors(self, spectrum: RoadSpectrum) -> ComplexArray:
         """F: from white innovations to elevations [m]; 0 for the mean and for waves that the time grid cannot hold.
 

@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-_REACH_M = 3.0
-_COMMON = 8.0
+_REACH_M = 1.5
+_COMMON = 4.0
 _TAKEN_OVER = 0.6  # of a new estimate, so that it does not overshoot
 _SMALLEST_LOG, _LARGEST_LOG = -3.0, 7.0
 _LEAST_SCATTER, _LARGEST_SCATTER = 1e-3, 1.0

@@ -25,7 +25,7 @@ from logger.estimation.sensor import Sensor
 Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
-_LEAST_GAIN = 1e-3
+_MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,14 @@ def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array,
     return low, high
 
 
+def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> float:
+    """Variance by which a solution misses its bounds (t,) more than noise would [(m/s2)2]: it is not settled yet, or
+    the car is not the one in the file. Without it such a solution would take every bound that it misses for a sharp
+    reading, and settle ever less."""
+    missed = np.maximum(np.maximum(low - fitted_mps2, fitted_mps2 - high), 0.0)
+    return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
+
+
 def improved(
     readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: float, sensor: Sensor
 ) -> Readings:
@@ -59,8 +67,9 @@ def improved(
     """
     noise = sensor.noise_rms_mps2**2
     own = 1 / readings.variance
-    others = np.maximum(1 / fitted_variance - own, _LEAST_GAIN / fitted_variance)
-    expected = (fitted_mps2 / fitted_variance - readings.value_mps2 * own) / others
+    taken_out = np.minimum(own, _MOST_OWN / fitted_variance)
+    others = 1 / fitted_variance - taken_out
+    expected = (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others
     spread = 1 / others + noise
     mean, variance = within(expected, spread, low, high)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)

@@ -30,7 +30,7 @@ from logger.estimation.iri_posterior import (
 )
 from logger.estimation.local_roughness import LocalRoughness, mean_told
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.rounding import Readings, bounds, first_guess, improved
+from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
 from logger.estimation.sensor import Sensor
 from logger.vehicle.structure import Output, Structure
 
@@ -269,7 +269,6 @@ class RoadEstimator:
             weight = np.where(read, 1 / readings.variance, 0.0)
             local = self._local.at(first, block.count).variance
             solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, local, steps, start)
-            start = solution.waves
             innovations = np.fft.irfft(solution.waves, block.count)
             white = np.fft.rfft(innovations / np.sqrt(local))
             told = mean_told(solution.gain, local[seen > 0])
@@ -277,14 +276,16 @@ class RoadEstimator:
             moving = weight[block.moving & read]
             variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
             power = np.abs(white) ** 2 / block.count
+            old = self._belief.spectrum
             self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
+            start = block.same_road(solution.waves, old, self._belief.spectrum)
             if self._sensor.is_coarse:
-                self._improve(samples, block, solution, variance)
+                self._improve(samples, read, block, solution, variance)
             else:
                 residual = readings.value_mps2 - solution.fitted_mps2
                 self._belief = with_noise(self._belief, residual, weight, 2 * seen_share * float(told.sum()))
         assert solution is not None
-        self._solved_last = block, solution.waves
+        self._solved_last = block, start
         return solution, variance
 
     def _as_gaussian(self, samples: _Samples) -> Readings:
@@ -295,12 +296,13 @@ class RoadEstimator:
             self._gaussian = first_guess(samples.reading_mps2, self._sensor)
         return self._gaussian
 
-    def _improve(self, samples: _Samples, block: Block, solution: Solution, variance: float) -> None:
+    def _improve(self, samples: _Samples, read: Bools, block: Block, solution: Solution, variance: float) -> None:
         assert self._gaussian is not None
         speed_mps = block.mean_speed_mps
         noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
         left = acceleration_variance_left(self._car, speed_mps, self._belief.spectrum, noise_psd)
         low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
+        left += unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
         self._gaussian = improved(self._gaussian, low, high, solution.fitted_mps2, left, self._sensor)
 
     def _speed_mps(self, samples: _Samples, number: int) -> float | None:

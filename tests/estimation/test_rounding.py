@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.rounding import Readings, bounds, first_guess, improved
+from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
 from logger.estimation.sensor import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
@@ -125,3 +125,16 @@ def test_the_first_guess_leaves_the_readings_as_they_are() -> None:
 @pytest.mark.parametrize(("noise", "step", "coarse"), [(0.05, 0.0, False), (0.05, 0.0981, False), (0.1, 0.613, True)])
 def test_a_sensor_is_coarse_when_its_noise_does_not_blur_its_steps(noise: float, step: float, coarse: bool) -> None:
     assert Sensor(noise, step).is_coarse is coarse
+
+
+def test_what_noise_explains_is_not_unexplained() -> None:
+    """Accelerations known exactly: the readings' noise takes some of them over an edge. Off by half a metre per second
+    squared as well, about that is missed, less what the width of a step hides."""
+    rng = np.random.default_rng(2)
+    true = rng.uniform(-4, 4, 20_000)
+    reading = 0.6 * np.round((true + 0.1 * rng.standard_normal(20_000)) / 0.6)
+    low, high = bounds(reading, np.zeros(20_000), 0.6)
+    assert unexplained(true, low, high, COARSE) == 0.0
+    assert 0.3**2 < unexplained(true + rng.choice([-0.7, 0.7], 20_000), low, high, COARSE) < 0.7**2
+    assert unexplained(true + 100.0, low, high, COARSE) == pytest.approx(100.0**2, rel=0.01)
+    assert unexplained(true[:0], low[:0], high[:0], COARSE) == 0.0

