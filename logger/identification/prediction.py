@@ -24,10 +24,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.parameters import Free, changed, read
+from logger.roads.iso8608 import displacement_psd
 from logger.roads.track import Track
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
-from logger.vehicle.structure import Structure, body_point
+from logger.vehicle.structure import Structure, body_acceleration_response, body_point
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +44,10 @@ _ROUND_THE_END = 1e-4
 # Steps of the differences that derivatives of matrices (exact: they are quadratic at most) and of roads are taken by.
 _RELATIVE_STEP = 1e-3
 _EVEN = 1e-3
+# Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
+_SPEEDS = 12
+_SLOWEST_MPS = 0.5
+_LONGEST_S = 100.0
 
 
 class Model(Protocol):
@@ -140,6 +145,21 @@ class VehicleModel:
             slopes.append(road.samples(derivatives).T)
         return predictions, slopes
 
+    def road_spectra(self, values: Array, f_hz: Array) -> list[Array]:
+        """What the sensor makes of a random road of Gd(n0) = 1 cm3 under the whole of each record: one-sided spectra
+        (f,) behind the recorder's filter [m2/s4/Hz per cm3], the mean over the speeds that were driven."""
+        vehicle = self.vehicle_with(values)
+        structure = structure_of(vehicle)
+        spectra = []
+        for record in self.records:
+            speed = np.quantile(record.speed_mps[record.first:], (np.arange(_SPEEDS) + 0.5) / _SPEEDS)[:, None]
+            speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
+            f = np.maximum(f_hz, 1 / _LONGEST_S)
+            response = np.abs(body_acceleration_response(structure, f, speed, vehicle.sensor)) ** 2
+            recorder = np.abs(_recorder_gain(f_hz / record.rate_hz)) ** 2
+            spectra.append((response * displacement_psd(f / speed, 1.0) / speed).mean(axis=0) * recorder)
+        return spectra
+
     def inputs(self) -> list[Array]:
         """Vertical acceleration of the road under the wheels (n, w) per record [m/s2], band-limited, for tests."""
         structure = structure_of(self.vehicle)
@@ -208,6 +228,15 @@ def _responses(car: _Car, road: _RoadInTime, changes: Sequence[_Change] = ()) ->
             force += moved @ structure.road.T / change.apart
         derivatives[index] = (w * force).sum(axis=1) + s2 * (q @ change.row)
     return s2 * (q @ car.row), derivatives
+
+
+def _recorder_gain(f_of_rate: Array) -> Array:
+    """The recorder's gain at shares of its rate (f,)."""
+    fine = 8
+    taps = recorder_taps(fine)
+    half = len(taps) // 2
+    lags = np.arange(1, half + 1)
+    return np.asarray(taps[half] + 2 * np.cos(2 * np.pi * np.outer(f_of_rate / fine, lags)) @ taps[half + 1:])
 
 
 class _RoadInTime:

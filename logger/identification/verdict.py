@@ -1,0 +1,134 @@
+"""Whether the data can tell the numbers apart at all, in words.
+
+Problem: a fit always ends somewhere. Where the data say nothing of a number, or only of a combination of several, the
+place it ends at is an accident that looks like a result. Solution: the predictions' derivatives, by the relative change
+of each number and in units of the noise, are looked at before anything is believed:
+
+- a number whose derivative is nothing is silent;
+- numbers whose derivatives cancel in some combination can be told only together (a vanishing singular value of the
+  scaled derivatives), whatever the noise;
+- a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import CheckFailed
+
+Array = npt.NDArray[np.float64]
+
+SILENT, TOGETHER, WEAK = "silent", "together", "weak"
+WEAKEST = 0.5
+"""Largest standard error of what is still an estimate, relative to its size or half the width of its bounds."""
+NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
+"""What counts as nothing, relative, where derivatives are exact and where they are differences."""
+_PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
+_EQUAL, _NEARLY_EQUAL = 0.05, 0.2
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that the data cannot tell.
+
+    kind         silent, together or weak
+    direction    relative changes by name that the predictions do not feel, the largest 1
+    words        a sentence
+    """
+
+    kind: str
+    direction: dict[str, float]
+    words: str
+
+
+class NotIdentifiable(CheckFailed):
+    """The data do not tell what was asked. ``findings`` say what, and its text says it in words."""
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))
+        self.findings = list(findings)
+
+
+def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
+    """What no amount of such data could tell.
+
+    derivatives    (N, p) of the predictions by the relative change of each number
+    size           root of the sum of squares of the predictions
+    nothing        what counts as nothing, relative
+    """
+    lengths = np.sqrt((derivatives**2).sum(axis=0))
+    heard = lengths > nothing * size
+    findings = [
+        Finding(SILENT, {name: 1.0}, f"what was measured does not depend on {name}: this drive, read where the sensor "
+                f"sits, says nothing about it. Hold it fixed.")
+        for name, one in zip(names, heard, strict=True) if not one
+    ]
+    kept = [name for name, one in zip(names, heard, strict=True) if one]
+    if not kept:
+        return findings
+    _, values, directions = np.linalg.svd(derivatives[:, heard] / lengths[heard], full_matrices=False)
+    for value, direction in zip(values, directions, strict=True):
+        if value < nothing * len(kept):
+            findings.append(_together(kept, direction / lengths[heard]))
+    return findings
+
+
+def statistical(names: Sequence[str], covariance: Array) -> list[Finding]:
+    """What the noise leaves too uncertain: covariance (p, p) of the relative changes."""
+    deviations = np.sqrt(np.diag(covariance))
+    weak = deviations > WEAKEST
+    if not weak.any():
+        return []
+    findings = []
+    powers, directions = np.linalg.eigh(covariance)
+    for power, direction in zip(powers[::-1], directions.T[::-1], strict=True):
+        if power <= WEAKEST**2 or not weak.any():
+            break
+        shares = _shares(names, direction)
+        told = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
+        if len(shares) == 1:
+            (name, error), = told.items()
+            words = (f"this drive says nothing about {name}: its standard error would be {error} of it. Hold it fixed, "
+                     "or add runs that feel it.")
+        else:
+            why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
+                f"{_moves(shares)} drowns in the noise")
+            words = (f"this drive does not tell {_listed(list(shares))} apart: {why} (standard errors "
+                     f"{', '.join(told.values())}). Hold one of them fixed, or add runs that differ.")
+        findings.append(Finding(WEAK, shares, words))
+        weak &= ~np.isin(names, list(shares))
+    return findings
+
+
+def _together(names: Sequence[str], direction: Array) -> Finding:
+    shares = _shares(names, direction)
+    if len(shares) > 1 and _one_scale(shares, _EQUAL):
+        words = (f"{_listed(list(shares))} share one scale: all of them larger by one factor give the same record. "
+                 "Hold one of them fixed at a value that is known.")
+    else:
+        words = (f"{_listed(list(shares))} can be told only together: {_moves(shares)} gives the same record. Hold one "
+                 "of them fixed.")
+    return Finding(TOGETHER, shares, words)
+
+
+def _shares(names: Sequence[str], direction: Array) -> dict[str, float]:
+    """The parts of a direction that count, the largest 1."""
+    scaled = direction / direction[np.argmax(np.abs(direction))]
+    return {name: float(share) for name, share in zip(names, scaled, strict=True) if abs(share) > _PART_OF}
+
+
+def _one_scale(shares: dict[str, float], apart: float) -> bool:
+    return all(abs(share - 1) < apart for share in shares.values())
+
+
+def _moves(shares: dict[str, float]) -> str:
+    """The direction in words."""
+    return "a change of " + _listed([f"{name} by {share / 100:+.1%}" for name, share in shares.items()])
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
