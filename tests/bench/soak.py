@@ -44,9 +44,12 @@ def main() -> int:
 
 
 def _resources(found: Soaked, figures: Figures) -> None:
-    growth_bytes = found.memory_growth_bytes(START_US + WARM_UP_S * 1_000_000)
+    warm_us = START_US + WARM_UP_S * 1_000_000
+    gained_bytes = found.gained(lambda sample: sample.memory_bytes, warm_us)
+    gained_blocks = found.gained(lambda sample: sample.blocks, warm_us)
     open_files = [sample.open_files for sample in found.samples]
-    figures.at_most("memory gained after the first two hours", growth_bytes / 1e6, 2, "MB")
+    figures.at_most("memory gained after the first two hours", gained_bytes / 1e6, 2, "MB")
+    figures.at_most("of Python's objects alone", 100 * gained_blocks / found.samples[0].blocks, 1, "%")
     figures.at_most("open files, most less fewest", max(open_files) - min(open_files), 1, "")
     folder_bytes = max(sample.folder_bytes for sample in found.samples)
     figures.at_most("folder, largest", folder_bytes / 1e6, QUOTA_BYTES / 1e6, "MB")
