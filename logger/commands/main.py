@@ -31,6 +31,8 @@ VERBS = {
     "road": "make a random road, or tell the class of a measured one",
     "simulate": "what a vehicle's accelerometer would record on a road",
     "estimate": "IRI and profile of the road from a drive's acceleration, beside what is possible",
+    "identify": "vehicle parameters from drives over known roads, each with its standard error",
+    "modes": "natural frequencies, damping ratios and mode shapes of a vibration record",
     "fixed-point": "write the filters as C headers for integer arithmetic",
     "capture": "record the raw bytes of a serial port",
     "hil": "play a recorded dump into serial ports for the running service, and check its log",

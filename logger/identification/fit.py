@@ -48,6 +48,8 @@ _MOST_NOISE_ROUNDS = 20
 _DIFFERENCE = 1e-4
 _NUDGE = 0.03
 _AT_BOUND = 1e-6
+_FAR = 3.0
+_ROOT_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,9 @@ class Fit:
     error_before       rms(measured - model) / rms(measured) at the start
     error_after        the same at the estimates
     residuals          measured minus model, per record
-    white              residuals behind low-pass and noise model, in deviations, joined (N,)
-    sensitivities      derivatives of the predictions behind the same, by relative change (N, p)
+    white              residuals behind low-pass and noise model, in deviations, per record
+    sensitivities      derivatives of the predictions behind the same, by relative change, joined (N, p)
+    low_pass           the filter they went through
     noise              the noise model that was taken
     verdict            what the data cannot tell; empty when all is well
     converged          whether steps and noise model came to rest
@@ -103,8 +106,9 @@ class Fit:
     error_before: float
     error_after: float
     residuals: list[Array]
-    white: Array
+    white: list[Array]
     sensitivities: Array
+    low_pass: LowPass
     noise: Whitening
     verdict: list[Finding]
     converged: bool
@@ -131,6 +135,28 @@ def fit(model: Model, measured: Sequence[Array], options: Options | None = None)
     noise, best, rounds, settled = _innovations(problem, best)
     return _result(problem, best, noise, findings, iterations + rounds, settled,
                    np.array([problem.values(one.x) for one in descents]))
+
+
+def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
+    """So many starts, spread evenly between a third and three times each start, or as far as the bounds go.
+
+    Additive recurrence with powers of the root of x^(p+1) = x + 1, which leaves no corner empty (M. Roberts 2018).
+    """
+    ratio = 1.0
+    for _ in range(_ROOT_STEPS):
+        ratio = (1 + ratio) ** (1 / (len(free) + 1))
+    starts = []
+    for number in range(1, count + 1):
+        start = {}
+        for index, one in enumerate(free):
+            share = (0.5 + number / ratio ** (index + 1)) % 1.0
+            if one.positive:
+                low, high = max(one.low, one.start / _FAR), min(one.high, one.start * _FAR)
+                start[one.name] = float(low * (high / low) ** share)
+            else:
+                start[one.name] = one.low + share * (one.high - one.low)
+        starts.append(start)
+    return starts
 
 
 def normalised_error(measured: Sequence[Array], residuals: Sequence[Array]) -> float:
@@ -353,9 +379,10 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
         standard_errors=dict(zip(names, errors.tolist(), strict=True)), covariance=covariance,
         correlation=covariance / np.maximum(np.outer(errors, errors), 1e-300),
         error_before=normalised_error(problem.measured, before),
-        error_after=normalised_error(problem.measured, after), residuals=after, white=point.white,
-        sensitivities=point.slopes, noise=noise, verdict=findings, converged=settled, iterations=iterations,
-        cost=point.cost, at_bound=at_bound, ends=ends,
+        error_after=normalised_error(problem.measured, after), residuals=after,
+        white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
+        sensitivities=point.slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
+        iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
     )
 
 

@@ -29,7 +29,7 @@ LEAST_SHARE = 1e-9
 """Noise is never taken for less than this share of the measurement."""
 _MOST_ORDER = 60
 _SAMPLES_PER_ORDER = 20
-_MEMORY_S = 4.0
+_MEMORY_S, _FILTER_MEMORY_S = 4.0, 1.0
 _GRID = 8192
 # The level of the road against that of the sensor is searched over so many powers of e.
 _RATIO_LOGS = 40.0
@@ -108,8 +108,12 @@ class White:
 
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
         """As ``Noise``."""
-        deviation = max(_rms(residuals), floor)
-        whitener = Whitener(np.zeros((0, 0)), np.array([1 / deviation]))
+        shape = Whitener(np.zeros((0, 0)), np.ones(1))
+        if low_pass.cutoff_hz is not None:
+            memory = min(int(_FILTER_MEMORY_S * low_pass.kept_hz), min(map(len, residuals)) - 1)
+            shape = _levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
+        deviation = max(_rms([shape(one) for one in residuals]), floor)
+        whitener = Whitener(shape.start / deviation, shape.taps / deviation)
         return _whitening("white", [whitener] * len(residuals), residuals, 1,
                           f"white noise of {deviation:.3g} m/s2", {"deviation_mps2": deviation})
 
@@ -150,24 +154,40 @@ class RoadNoise:
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
         """As ``Noise``. The two levels are those of Whittle's likelihood of the residuals' tapered transforms."""
         rate_hz = low_pass.kept_hz
-        f_hz = np.arange(_GRID // 2 + 1) * rate_hz / _GRID
-        mirrored = np.minimum(rate_hz - f_hz, low_pass.rate_hz / 2)
-        gains = low_pass.gain(f_hz) ** 2, low_pass.gain(mirrored) ** 2 * (low_pass.cutoff_hz is not None)
-        roads = [gains[0] * one + gains[1] * other
-                 for one, other in zip(self.spectra(values, f_hz), self.spectra(values, mirrored), strict=True)]
-        sensor = (gains[0] + gains[1]) * 2 / low_pass.rate_hz
+        (f_hz, gain), (mirrored_hz, mirrored_gain) = _folded(low_pass)
+        roads = [gain * one + mirrored_gain * other for one, other in
+                 zip(self.spectra(values, f_hz), self.spectra(values, mirrored_hz), strict=True)]
+        sensor = _sensor_shape(low_pass)
         road_power, sensor_power = _levels(residuals, roads, sensor, f_hz, rate_hz)
         sensor_power = max(sensor_power, floor**2)
         memory = int(_MEMORY_S * rate_hz)
         whiteners = []
         for road, residual in zip(roads, residuals, strict=True):
-            spectrum = road_power * road + sensor_power * sensor
-            covariance = np.fft.irfft(spectrum, _GRID) * rate_hz / 2
+            covariance = _covariance(road_power * road + sensor_power * sensor, rate_hz)
             whiteners.append(_levinson(covariance[: min(memory, len(residual) - 1) + 1]))
         deviation = float(np.sqrt(sensor_power))
         return _whitening("road", whiteners, residuals, 2,
                           f"a road of Gd(n0) {road_power:.3g} cm3 that the profile does not contain, and white noise "
                           f"of {deviation:.3g} m/s2", {"gd_n0_cm3": road_power, "deviation_mps2": deviation})
+
+
+def _folded(low_pass: LowPass) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """The frequencies of what the low-pass keeps and its gains of power there (f,); and those that fold onto them."""
+    f_hz = np.arange(_GRID // 2 + 1) * low_pass.kept_hz / _GRID
+    mirrored_hz = np.minimum(low_pass.kept_hz - f_hz, low_pass.rate_hz / 2)
+    folds = low_pass.kept_hz < low_pass.rate_hz
+    return (f_hz, low_pass.gain(f_hz) ** 2), (mirrored_hz, folds * low_pass.gain(mirrored_hz) ** 2)
+
+
+def _sensor_shape(low_pass: LowPass) -> Array:
+    """One-sided spectrum (f,) of white noise of power 1 before the low-pass, behind it [1/Hz]."""
+    (_, gain), (_, mirrored_gain) = _folded(low_pass)
+    return (gain + mirrored_gain) * 2 / low_pass.rate_hz
+
+
+def _covariance(spectrum: Array, rate_hz: float) -> Array:
+    """Covariances at lags 0, 1, 2 ... of a process with this one-sided spectrum up to half its rate."""
+    return np.asarray(np.fft.irfft(spectrum, _GRID) * rate_hz / 2)
 
 
 def _whitening(name: str, whiteners: list[Whitener], residuals: Sequence[Array], parameters: int, words: str,
