@@ -31,8 +31,8 @@ import numpy.typing as npt
 from logger.estimation.car_response import HIGHEST_HZ, golden_car_slope
 from logger.estimation.iri_posterior import reading_noise_psd
 from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.samples import RATE_HZ
 from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RATE_HZ
 from logger.roads.iri import PER_KM
 from logger.vehicle.structure import Output, Structure, frequency_response
 

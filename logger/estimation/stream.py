@@ -1,58 +1,49 @@
 """The road and its IRI while the car drives: blocks of readings, a few seconds behind.
 
-A block of 20 s is solved every 2 s (``block.py``); a stretch of road is taken from it once the car is ``LAG_S`` past
-it, because the rear axle, and the body's slow swing, still tell of a road already driven. What was learnt of the road's
-roughness, of the noise and of coarse readings goes on to the next block. Splitting the readings differently changes
-nothing.
+A block of 20 s is solved every 2 s (``block.py``), with what was learnt of road and sensor so far
+(``followed_road.py``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
+the body's slow swing, still tell of a road already driven; windows longer than 10 m are made of several stretches.
+Splitting the readings differently changes nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from math import ceil, hypot, log, nan, sqrt
+from dataclasses import dataclass
+from math import ceil, hypot, nan, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
-from logger.estimation.block import ENTRY_S, Block, Solution, TimeGrid
+from logger.estimation.block import ENTRY_S, Block, TimeGrid
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.followed_road import FollowedRoad
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
-    acceleration_variance_left,
     raised,
     reading_noise_psd,
     told_share,
     unseen_share,
     window_iri,
 )
-from logger.estimation.local_roughness import LocalRoughness, mean_told
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
+from logger.estimation.samples import RATE_HZ, Samples
 from logger.estimation.sensor import Sensor
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
 
-RATE_HZ = 100.0
 BLOCK_SAMPLES = 2048
 HOP_SAMPLES = 200
 LAG_S = 4.0
 FAINT_BELOW = 0.2
-SLOWEST_MPS = 1.0
 SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
 _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
-_STEPS = 8
 _FIRST_SAMPLES = 1000
-_FIRST_STEPS = 24
-_FIRST_ROUNDS = 8
-_COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 
 
 @dataclass(frozen=True)
@@ -85,32 +76,6 @@ class RoadPiece:
     elevation_m: Array
     shortest_m: float
     longest_m: float
-
-
-@dataclass(frozen=True)
-class _Samples:
-    """Readings on the time grid, arrays (n,), as ``RoadEstimator.push`` takes them."""
-
-    reading_mps2: Array
-    usable: Bools
-    at_end: Array
-    distance_m: Array
-
-    def __len__(self) -> int:
-        return len(self.usable)
-
-    def part(self, low: int, high: int) -> _Samples:
-        return _Samples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
-
-    def then(self, later: _Samples) -> _Samples:
-        both = ((getattr(self, name), getattr(later, name)) for name in self.__dataclass_fields__)
-        return _Samples(*(np.concatenate(pair) for pair in both))
-
-    @classmethod
-    def unread(cls, count: int, until_m: float, step_m: float) -> _Samples:
-        """Nothing was read while the car came up to ``until_m``, ``step_m`` further with each sample."""
-        distance_m = until_m - step_m * np.arange(count, 0, -1.0)
-        return cls(np.zeros(count), np.zeros(count, dtype=np.bool_), np.zeros(count), distance_m)
 
 
 @dataclass(frozen=True)
@@ -152,17 +117,14 @@ class RoadEstimator:
         self._on_road = on_road
         self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
         self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
-        self._belief = Belief(COMMON_ROAD)
+        self._road = FollowedRoad(self._car, sensor, self._spacing_m)
         self._start_anew()
 
     def _start_anew(self) -> None:
-        self._waiting = _Samples.unread(0, 0.0, 0.0)
+        self._waiting = Samples.unread(0, 0.0, 0.0)
         self._heard = 0
-        self._samples: _Samples | None = None
-        self._gaussian: Readings | None = None
-        self._solved_last: tuple[Block, ComplexArray] | None = None
-        self._local = LocalRoughness(self._spacing_m)
-        self._begun = False
+        self._samples: Samples | None = None
+        self._road.start_anew()
         self._next = 0
         self._gathered: list[_Piece] = []
 
@@ -184,12 +146,12 @@ class RoadEstimator:
         self._waiting = waiting.part(taken, len(waiting))
         return estimates
 
-    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> _Samples:
+    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> Samples:
         """What is not usable may be any number, NaN too; it has no weight. Nor has what stands at an end of the range,
         unless readings are taken as bounds."""
         if not self._sensor.is_coarse:
             usable = usable & (at_end == 0)
-        return _Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
+        return Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
 
     def finish(self) -> list[WindowEstimate]:
         """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
@@ -197,47 +159,42 @@ class RoadEstimator:
         estimates: list[WindowEstimate] = []
         if last is not None:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
-            after = _Samples.unread(count, float(last.distance_m[-1]), 0.0)
+            after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
             estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
         self._start_anew()
         return estimates
 
-    def _hop(self, fresh: _Samples) -> list[WindowEstimate]:
+    def _hop(self, fresh: Samples) -> list[WindowEstimate]:
         if self._samples is None:
-            self._samples = _Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), _mean_step_m(fresh))
+            self._samples = Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m)
             windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
-        if self._gaussian is not None:
-            guess = first_guess(fresh.reading_mps2, self._sensor)
-            self._gaussian = Readings(
-                np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
-                np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
-            )
+        self._road.move_on(fresh)
         self._heard += len(fresh)
-        if not self._begun and self._heard < _FIRST_SAMPLES:
+        if not self._road.begun and self._heard < _FIRST_SAMPLES:
             return []
         due = list(self._due(self._samples))
         return self._estimates(self._samples, due) if due else []
 
-    def _due(self, samples: _Samples) -> Iterator[int]:
+    def _due(self, samples: Samples) -> Iterator[int]:
         """Numbers of the pieces that the car is far enough past."""
         passed_m = samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
         while (self._next + 1) * self._piece_m <= passed_m:
             yield self._next
             self._next += 1
 
-    def _estimates(self, samples: _Samples, due: list[int]) -> list[WindowEstimate]:
+    def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
         block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
         read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
-        solution, variance = self._solved(block, samples, read)
-        slope = np.fft.irfft(solution.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
-        elevation = np.fft.irfft(solution.road, block.count)
+        solved = self._road.solved(block, samples, read)
+        slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
+        elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(block.seen(read), self._spacing_m)
         estimates: list[WindowEstimate] = []
         for number in due:
@@ -247,83 +204,21 @@ class RoadEstimator:
             if low < 0 or speed_mps is None:
                 piece = _nothing(self._why_none(samples, number))
             else:
-                spectrum, log_level_std = self._level_at(number)
-                piece = self._piece(slope[inside], unseen[inside], speed_mps, variance, spectrum, log_level_std)
-                self._give_road(number, elevation[inside], speed_mps, variance, spectrum)
+                # The slope remembers the road shortly before a piece.
+                back = round(_REMEMBERED_M / self._spacing_m)
+                level = self._road.level_at(number * self._points - back, back + self._points + 1)
+                piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
+                self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
         return estimates
 
-    def _solved(self, block: Block, samples: _Samples, read: Bools) -> tuple[Solution, float]:
-        """The block's road and the variance of a reading, while the belief follows."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._sensor.is_coarse else (1, _STEPS)
-        if not self._begun:
-            rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
-        before = self._belief.spectrum if self._begun else None
-        seen_share = block.seen_points(read) / block.count
-        seen, first = block.seen(read), round(block.start_m / self._spacing_m)
-        self._begun = True
-        solution: Solution | None = None
-        start = None if self._solved_last is None else block.carried_over(*self._solved_last)
-        for _ in range(rounds):
-            readings = self._as_gaussian(samples)
-            weight = np.where(read, 1 / readings.variance, 0.0)
-            local = self._local.at(first, block.count).variance
-            solution = block.solve(readings.value_mps2, weight, self._belief.spectrum, local, steps, start)
-            innovations = np.fft.irfft(solution.waves, block.count)
-            white = np.fft.rfft(innovations / np.sqrt(local))
-            told = mean_told(solution.gain, local[seen > 0])
-            self._local.learn(first, innovations, local, solution.gain, seen)
-            moving = weight[block.moving & read]
-            variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
-            power = np.abs(white) ** 2 / block.count
-            old = self._belief.spectrum
-            self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
-            start = block.same_road(solution.waves, old, self._belief.spectrum)
-            if self._sensor.is_coarse:
-                self._improve(samples, read, block, solution, variance)
-            else:
-                residual = readings.value_mps2 - solution.fitted_mps2
-                self._belief = with_noise(self._belief, residual, weight, 2 * seen_share * float(told.sum()))
-        assert solution is not None
-        self._solved_last = block, start
-        return solution, variance
+    def _speed_mps(self, samples: Samples, number: int) -> float | None:
+        return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
 
-    def _as_gaussian(self, samples: _Samples) -> Readings:
-        if not self._sensor.is_coarse:
-            noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
-            return Readings(samples.reading_mps2, np.full(BLOCK_SAMPLES, noise))
-        if self._gaussian is None:
-            self._gaussian = first_guess(samples.reading_mps2, self._sensor)
-        return self._gaussian
-
-    def _improve(self, samples: _Samples, read: Bools, block: Block, solution: Solution, variance: float) -> None:
-        assert self._gaussian is not None
-        speed_mps = block.mean_speed_mps
-        noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        left = acceleration_variance_left(self._car, speed_mps, self._belief.spectrum, noise_psd)
-        low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
-        left += unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
-        self._gaussian = improved(self._gaussian, low, high, solution.fitted_mps2, left, self._sensor)
-
-    def _speed_mps(self, samples: _Samples, number: int) -> float | None:
-        """Mean speed over a piece while the car moved; None when it is slower than anything can be told at."""
-        low, high = np.searchsorted(samples.distance_m, [number * self._piece_m, (number + 1) * self._piece_m])
-        steps_m = np.diff(samples.distance_m[max(low - 1, 0):high + 1])
-        moving = steps_m > SLOWEST_MPS / RATE_HZ
-        return float(steps_m[moving].mean()) * RATE_HZ if moving.sum() > 0.5 * len(steps_m) else None
-
-    def _why_none(self, samples: _Samples, number: int) -> str:
+    def _why_none(self, samples: Samples, number: int) -> str:
         """The flag of a piece without an estimate: driven before the block began, or too slowly, or not read."""
         gone = (number + 1) * self._piece_m <= samples.distance_m[0]
         return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"
-
-    def _level_at(self, number: int) -> tuple[RoadSpectrum, float]:
-        """The spectrum of the road under a piece and shortly before it, and the standard error of its log level."""
-        back = round(_REMEMBERED_M / self._spacing_m)
-        local = self._local.at(number * self._points - back, back + self._points + 1)
-        spectrum = self._belief.spectrum
-        there = replace(spectrum, log_level=spectrum.log_level + log(float(local.variance.mean())))
-        return there, sqrt(self._belief.log_level_std**2 + float(local.log_error.mean()))
 
     def _piece(
         self,
@@ -372,7 +267,3 @@ class RoadEstimator:
 
 def _nothing(missing: str) -> _Piece:
     return _Piece(WindowIri(nan, nan, nan, nan), 0.0, missing)
-
-
-def _mean_step_m(samples: _Samples) -> float:
-    return float(samples.distance_m[-1] - samples.distance_m[0]) / max(len(samples) - 1, 1)

@@ -13,8 +13,9 @@ import numpy.typing as npt
 from logger.estimation.limit import Limits
 from logger.estimation.road_profile import RoadProfile, road_profile
 from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.samples import RATE_HZ
 from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RATE_HZ, RoadEstimator, RoadPiece
+from logger.estimation.stream import RoadEstimator, RoadPiece
 from logger.roads.golden_car import START_M
 from logger.roads.iri import rectified_slope, window_iri
 from logger.vehicle.structure import Output, Structure

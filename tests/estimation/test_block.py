@@ -161,6 +161,25 @@ def test_more_steps_get_nearer_and_going_on_is_no_start_anew() -> None:
     assert off(further) < 0.7 * off(few)
 
 
+def test_a_change_of_spectrum_keeps_the_road() -> None:
+    block = a_block()
+    waves = np.fft.rfft(np.random.default_rng(1).standard_normal(block.count))
+    other = RoadSpectrum.of_iri(9.0, 1.7)
+    there = block.same_road(waves, ROAD, other)
+    assert there * block.wave_factors(other) == pytest.approx(waves * block.wave_factors(ROAD), rel=1e-12)
+
+
+def test_an_innovation_is_a_step_where_it_stands() -> None:
+    """Where the waviness is 2, slopes are white: a spectrum G n^-2 is that of steps of sqrt(G (2 pi)^2 spacing / 2)."""
+    block = a_block(speeds_mps=[8.0, 8.0])  # slow enough for all waves of the grid
+    white = np.zeros(block.count)
+    white[500] = 1.0
+    elevation = np.fft.irfft(np.fft.rfft(white) * block.wave_factors(ROAD), block.count)
+    step_m = np.sqrt(ROAD.psd(np.ones(1))[0] * (2 * np.pi) ** 2 * SPACING_M / 2)
+    assert elevation[503:508].mean() - elevation[493:498].mean() == pytest.approx(step_m, rel=0.05)
+    assert np.argmax(np.abs(np.gradient(elevation))) == 500
+
+
 @pytest.mark.parametrize("hop", [100, 200])
 def test_what_an_earlier_block_found_is_a_head_start(hop: int) -> None:
     rng = np.random.default_rng(8)

@@ -322,7 +322,7 @@ def test_a_sensor_that_hangs(sensor: Sensor) -> None:
 
 
 @pytest.mark.parametrize("sensor", [FINE, COARSE])
-@pytest.mark.parametrize(("iri", "speed_mps"), [(0.3, 12.0), (10.0, 45.0), (30.0, 20.0)])
+@pytest.mark.parametrize(("iri", "speed_mps"), [(0.3, 12.0), (10.0, 45.0), (30.0, 20.0), (100.0, 9.0), (100.0, 18.0)])
 def test_smooth_rough_and_fast(sensor: Sensor, iri: float, speed_mps: float) -> None:
     one = driven(steady(speed_mps), iri, 6)
     found = estimated(an_estimator(sensor), one.read(sensor), one.distance_m)
