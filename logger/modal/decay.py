@@ -1,0 +1,249 @@
+"""Free decays: which vibrations a record supports, and each with the smallest error that its noise allows.
+
+Problem: a method that reads poles off a decomposition (ERA, SSI, AR) has to be told the order. Too low, and poles are
+mixed; too high, and noise becomes poles; its damping can be 70 % off at 20 dB without a word about it.
+
+Solution: such a method only proposes poles. What is believed and reported comes from the model itself,
+
+    y_c(t) = sum over modes of exp(sigma t) (a_c cos omega t + b_c sin omega t) + offset_c + noise_c(t),
+
+fitted by least squares, which for white noise attains the Cramer-Rao bound. Proposals are taken in one by one, the one
+that explains most first, as long as it explains more than the largest of a thousand draws of noise would; after each
+the poles of all are refitted. Amplitudes are linear and are eliminated (variable projection, Golub and Pereyra, 1973),
+which leaves two unknowns per mode and makes a step cheap however many channels there are. Standard errors follow from
+the same matrices; noise that is louder around a mode than elsewhere enlarges them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from logger.modal.mode import (
+    Array,
+    Complex,
+    FoundMode,
+    ModalResult,
+    OrderPoles,
+    Rejected,
+    damping_ratio,
+    errors_of,
+    normalised,
+)
+
+Propose = Callable[[Array, float], tuple[OrderPoles, ...]]
+
+_FALSE_ALARM = 1e-3  # chance that a record of noise yields a mode
+_MOST_MODES = 40
+_MOST_STEPS = 60
+_LOUDNESS_BINS = 60  # of the residual's spectrum on which the noise around a mode is measured
+_ALIKE = 0.005  # relative distance of poles that are tried once only
+_LEAST_DAMPING, _MOST_DAMPING = -0.05, 0.95
+_LARGEST_ERROR = 0.5  # a damping ratio whose standard error is more than this is none
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Poles s (m,), amplitudes (2 m + 1, channels) of cos, sin and the offset, the residual (samples, channels)."""
+
+    poles: Complex
+    amplitudes: Array
+    residual: Array
+    orthonormal: Array
+    noise: Array  # (channels,) variance
+    turned: Array  # (2 m, 2 m): inverse of the basis' Gram matrix
+
+    @property
+    def cost(self) -> float:
+        """The likelihood's, for noise of unknown strength in each channel."""
+        return float(len(self.residual) * np.log(self.noise).sum())
+
+
+def decay_modes(samples: Array, rate_hz: float, propose: Propose, how: str) -> ModalResult:
+    """Modes of a free decay (samples, channels), from the poles that a method proposes for it.
+
+    The first sample must lie in the free decay. The mean is not taken off: an offset is part of the model.
+    """
+    scale = samples.std(axis=0)
+    scaled = samples / np.where(scale > 0, scale, 1.0)
+    diagram = propose(scaled, rate_hz)
+    threshold = _threshold(*samples.shape)
+    fit = _take_in(_solve(scaled, np.empty(0, complex), rate_hz), scaled, diagram, rate_hz, threshold)
+    if len(fit.poles):  # what strong modes hid
+        hidden = propose(fit.residual, rate_hz)
+        fit = _take_in(fit, scaled, hidden, rate_hz, threshold)
+    modes, rejected = _judge(fit, scale, rate_hz, threshold)
+    return ModalResult(tuple(modes), (*rejected, *_unsupported(fit.poles, diagram)), 2 * len(fit.poles), how, diagram)
+
+
+def _threshold(samples: int, channels: int) -> float:
+    """Chi-squared that the best of all frequencies reaches by chance once in a thousand records of noise."""
+    from scipy.special import chdtri
+
+    return float(chdtri(2 * channels + 2, _FALSE_ALARM / samples))
+
+
+def _basis(poles: Complex, count: int, rate_hz: float) -> Array:
+    """Columns Re, Im of exp(s t) for each pole, each of length 1 or less at its start."""
+    t_s = np.arange(count) / rate_hz
+    waves = np.exp(np.outer(t_s, poles))
+    return np.stack([waves.real, waves.imag], axis=2).reshape(count, -1)
+
+
+def _solve(samples: Array, poles: Complex, rate_hz: float) -> _Fit:
+    """Amplitudes for given poles."""
+    count = len(samples)
+    basis = np.hstack([_basis(poles, count, rate_hz), np.ones((count, 1))])
+    q, r = np.linalg.qr(basis)
+    seen = q.T @ samples
+    residual = samples - q @ seen
+    inverse = np.linalg.pinv(r)
+    noise = (residual**2).sum(axis=0) / max(1, count - len(r))
+    noise = np.maximum(noise, 1e-24 * (samples**2).mean(axis=0) + 1e-300)
+    return _Fit(poles, inverse @ seen, residual, q, noise, (inverse @ inverse.T)[:-1, :-1])
+
+
+def _normal_equations(fit: _Fit, rate_hz: float) -> tuple[Array, Array]:
+    """Information (2 m, 2 m) about Re s, Im s of every pole, amplitudes unknown, and the gradient (2 m,)."""
+    count, m = len(fit.residual), len(fit.poles)
+    slope = _basis(fit.poles, count, rate_hz) * (np.arange(count) / rate_hz)[:, None]
+    slope -= fit.orthonormal @ (fit.orthonormal.T @ slope)
+    gram, pull = slope.T @ slope, slope.T @ fit.residual  # (2 m, 2 m), (2 m, channels)
+    cos, sin = fit.amplitudes[:-1:2], fit.amplitudes[1:-1:2]  # (m, channels)
+    # d/d Re s of a Re e + b Im e is t (a Re e + b Im e); d/d Im s is t (b Re e - a Im e).
+    parts = np.zeros((2 * m, 2 * m, fit.noise.size))
+    index = np.arange(m)
+    parts[2 * index, 2 * index], parts[2 * index, 2 * index + 1] = cos, sin
+    parts[2 * index + 1, 2 * index], parts[2 * index + 1, 2 * index + 1] = sin, -cos
+    weighted = parts / fit.noise
+    information = np.einsum("aic,ij,bjc->ab", weighted, gram, parts, optimize=True)
+    return np.asarray(information, dtype=np.float64), np.einsum("aic,ic->a", weighted, pull)
+
+
+def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
+    """Gauss-Newton on the poles, each step shortened until it helps."""
+    for _ in range(_MOST_STEPS):
+        information, gradient = _normal_equations(fit, rate_hz)
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        step = np.linalg.lstsq(information / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0] / scale
+        change = step[::2] + 1j * step[1::2]
+        size = min(1.0, 0.3 / max(float((np.abs(change) / np.abs(fit.poles)).max()), 1e-300))
+        before = fit
+        while size > 1e-3:
+            poles = before.poles + size * change
+            if (poles.imag > 0).all() and (damping_ratio(poles) > _LEAST_DAMPING).all():
+                trial = _solve(samples, poles, rate_hz)
+                if trial.cost <= before.cost:
+                    fit = trial
+                    break
+            size /= 4
+        if fit is before or before.cost - fit.cost < 1e-4:
+            return fit
+    return fit
+
+
+def _significance(fit: _Fit, rate_hz: float) -> Array:
+    """Chi-squared (m,) that each mode explains, against the noise around its frequency."""
+    loud = _loudness(fit, rate_hz)
+    found = np.empty(len(fit.poles))
+    for k in range(len(fit.poles)):
+        own = slice(2 * k, 2 * k + 2)
+        part = fit.amplitudes[own]
+        explained = (part * np.linalg.solve(fit.turned[own, own], part)).sum(axis=0)
+        found[k] = (explained / (fit.noise * loud[k])).sum()
+    return found
+
+
+def _loudness(fit: _Fit, rate_hz: float) -> Array:
+    """How much louder the residual is around each mode than on average, (m, channels), 1 or more."""
+    count = len(fit.residual)
+    power = np.abs(np.fft.rfft(fit.residual, axis=0)) ** 2 / (count * fit.noise)
+    sums = np.vstack([np.zeros(power.shape[1]), np.cumsum(power, axis=0)])
+    middle = np.round(fit.poles.imag / (2 * np.pi) * count / rate_hz).astype(int)
+    half = np.maximum(_LOUDNESS_BINS // 2, np.abs(fit.poles.real) / np.pi * count / rate_hz).astype(int)
+    first = np.clip(middle - half, 1, max(1, len(power) - 2 * _LOUDNESS_BINS // 2))
+    last = np.clip(middle + half, first + 1, len(power))
+    return np.maximum(1.0, (sums[last] - sums[first]) / (last - first)[:, None])
+
+
+def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
+    """Add proposed poles, the most telling first, as long as they tell more than noise would."""
+    proposed = _different(np.concatenate([np.empty(0, complex), *(found.poles for found in diagram)]))
+    if not len(proposed):
+        return fit
+    waves = _basis(proposed, len(samples), rate_hz)
+    while len(fit.poles) < _MOST_MODES:
+        gains = _gains(fit, waves)
+        best = int(gains.argmax())
+        if gains[best] < threshold:
+            return fit
+        larger = _refit(_solve(samples, np.append(fit.poles, proposed[best]), rate_hz), samples, rate_hz)
+        ratios = damping_ratio(larger.poles)
+        if fit.cost - larger.cost < threshold or (ratios > _MOST_DAMPING).any():
+            keep = np.arange(len(proposed)) != best
+            proposed, waves = proposed[keep], waves.reshape(len(samples), -1, 2)[:, keep].reshape(len(samples), -1)
+            if not len(proposed):
+                return fit
+            continue
+        fit = larger
+    return fit
+
+
+def _different(poles: Complex) -> Complex:
+    """Poles that could be modes, one of those that are alike within a per cent of damping."""
+    ratios = damping_ratio(poles)
+    poles = poles[(ratios > _LEAST_DAMPING) & (ratios < _MOST_DAMPING)]
+    cells = np.round(np.log(poles) / _ALIKE)
+    return np.asarray(poles[np.unique(cells, return_index=True)[1]])
+
+
+def _gains(fit: _Fit, waves: Array) -> Array:
+    """Chi-squared by which each proposed pole would better the fit."""
+    new = waves - fit.orthonormal @ (fit.orthonormal.T @ waves)
+    cos, sin = new[:, ::2], new[:, 1::2]
+    cc, ss, cs = (cos**2).sum(axis=0), (sin**2).sum(axis=0), (cos * sin).sum(axis=0)
+    seen_cos, seen_sin = cos.T @ fit.residual, sin.T @ fit.residual
+    size = cc * ss - cs**2
+    size = np.where(size > 1e-9 * (waves[:, ::2] ** 2).sum(axis=0) ** 2, size, np.inf)[:, None]
+    explained = (ss[:, None] * seen_cos**2 + cc[:, None] * seen_sin**2 - 2 * cs[:, None] * seen_cos * seen_sin) / size
+    return np.asarray((explained / fit.noise).sum(axis=1))
+
+
+def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[list[FoundMode], list[Rejected]]:
+    modes: list[FoundMode] = []
+    rejected: list[Rejected] = []
+    if not len(fit.poles):
+        return modes, rejected
+    information, _ = _normal_equations(fit, rate_hz)
+    covariance = np.linalg.pinv(information, hermitian=True)
+    significance, loud = _significance(fit, rate_hz), _loudness(fit, rate_hz)
+    for k in np.argsort(np.abs(fit.poles)):
+        pole = complex(fit.poles[k])
+        own = slice(2 * k, 2 * k + 2)
+        power = (fit.amplitudes[own] ** 2).sum(axis=0) / fit.noise
+        louder = float((loud[k] * power).sum() / power.sum())
+        frequency, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
+        frequency_std, damping_std = errors_of(pole, np.asarray(covariance[own, own] * louder))
+        reason = None
+        if significance[k] < threshold:
+            reason = "no stronger than the noise around it"
+        elif frequency_std > _LARGEST_ERROR * frequency or damping_std > _LARGEST_ERROR:
+            reason = "the record cannot tell its frequency or damping"
+        elif ratio < -2 * damping_std:
+            reason = "it grows instead of decaying: a hum, not a mode"
+        if reason:
+            rejected.append(Rejected(frequency, ratio, reason))
+        else:
+            shape = normalised((fit.amplitudes[2 * k] - 1j * fit.amplitudes[2 * k + 1]) * scale)
+            modes.append(FoundMode(frequency, ratio, frequency_std, damping_std, shape))
+    return modes, rejected
+
+
+def _unsupported(poles: Complex, diagram: tuple[OrderPoles, ...]) -> list[Rejected]:
+    """Poles of the largest order that did not come in."""
+    if not diagram:
+        return []
+    left = [complex(s) for s in diagram[-1].poles if not len(poles) or np.abs(poles - s).min() > 0.05 * abs(s)]
+    return [Rejected(abs(s) / (2 * np.pi), -s.real / abs(s), "explains no more than noise would") for s in left]
