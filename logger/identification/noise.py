@@ -154,9 +154,8 @@ class RoadNoise:
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
         """As ``Noise``. The two levels are those of Whittle's likelihood of the residuals' tapered transforms."""
         rate_hz = low_pass.kept_hz
-        (f_hz, gain), (mirrored_hz, mirrored_gain) = _folded(low_pass)
-        roads = [gain * one + mirrored_gain * other for one, other in
-                 zip(self.spectra(values, f_hz), self.spectra(values, mirrored_hz), strict=True)]
+        f_hz = _grid(rate_hz)
+        roads = _behind(low_pass, lambda f: self.spectra(values, f))
         sensor = _sensor_shape(low_pass)
         road_power, sensor_power = _levels(residuals, roads, sensor, f_hz, rate_hz)
         sensor_power = max(sensor_power, floor**2)
@@ -171,18 +170,24 @@ class RoadNoise:
                           f"of {deviation:.3g} m/s2", {"gd_n0_cm3": road_power, "deviation_mps2": deviation})
 
 
-def _folded(low_pass: LowPass) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """The frequencies of what the low-pass keeps and its gains of power there (f,); and those that fold onto them."""
-    f_hz = np.arange(_GRID // 2 + 1) * low_pass.kept_hz / _GRID
-    mirrored_hz = np.minimum(low_pass.kept_hz - f_hz, low_pass.rate_hz / 2)
-    folds = low_pass.kept_hz < low_pass.rate_hz
-    return (f_hz, low_pass.gain(f_hz) ** 2), (mirrored_hz, folds * low_pass.gain(mirrored_hz) ** 2)
+def _grid(rate_hz: float) -> Array:
+    """The frequencies that spectra are held at [Hz]."""
+    return np.arange(_GRID // 2 + 1) * rate_hz / _GRID
+
+
+def _behind(low_pass: LowPass, spectra: Callable[[Array], list[Array]]) -> list[Array]:
+    """Spectra behind the low-pass, with what folds down as fewer samples are kept."""
+    f_hz = _grid(low_pass.kept_hz)
+    if low_pass.kept_hz == low_pass.rate_hz:
+        return [low_pass.gain(f_hz) ** 2 * one for one in spectra(f_hz)]
+    above_hz = np.minimum(low_pass.kept_hz - f_hz, low_pass.rate_hz / 2)
+    gain, gain_above = low_pass.gain(f_hz) ** 2, low_pass.gain(above_hz) ** 2
+    return [gain * one + gain_above * other for one, other in zip(spectra(f_hz), spectra(above_hz), strict=True)]
 
 
 def _sensor_shape(low_pass: LowPass) -> Array:
     """One-sided spectrum (f,) of white noise of power 1 before the low-pass, behind it [1/Hz]."""
-    (_, gain), (_, mirrored_gain) = _folded(low_pass)
-    return (gain + mirrored_gain) * 2 / low_pass.rate_hz
+    return _behind(low_pass, lambda f_hz: [np.full_like(f_hz, 2 / low_pass.rate_hz)])[0]
 
 
 def _covariance(spectrum: Array, rate_hz: float) -> Array:
@@ -237,12 +242,13 @@ def _ladder(reflections: Array, power: float) -> Whitener:
 def _levinson(covariance: Array) -> Whitener:
     """The predictors of a process with these covariances (m + 1,) at lags 0, 1, 2 ... (Levinson and Durbin)."""
     m = len(covariance) - 1
-    start = np.zeros((m, m))
-    taps, power = np.ones(1), float(covariance[0])
+    start, taps, power = np.zeros((m, m)), np.zeros(m + 1), float(covariance[0])
+    taps[0] = 1.0
     for k in range(m):
-        start[k, : k + 1] = taps[::-1] / np.sqrt(power)
-        r = -float(taps @ covariance[k + 1:0:-1]) / power
-        taps = np.append(taps, 0.0) + r * np.append(0.0, taps[::-1])
+        newest_last = taps[k::-1] if k else taps[:1]
+        start[k, : k + 1] = newest_last / np.sqrt(power)
+        r = -float(newest_last @ covariance[1 : k + 2]) / power
+        taps[1 : k + 2] += r * start[k, : k + 1] * np.sqrt(power)
         power *= 1 - r * r
     return Whitener(start, taps / np.sqrt(power))
 

@@ -48,6 +48,8 @@ _EVEN = 1e-3
 _SPEEDS = 12
 _SLOWEST_MPS = 0.5
 _LONGEST_S = 100.0
+# The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
+_GAIN_STEPS, _GAIN_GRID = 4, 16384
 
 
 class Model(Protocol):
@@ -156,7 +158,7 @@ class VehicleModel:
             speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
             f = np.maximum(f_hz, 1 / _LONGEST_S)
             response = np.abs(body_acceleration_response(structure, f, speed, vehicle.sensor)) ** 2
-            recorder = np.abs(_recorder_gain(f_hz / record.rate_hz)) ** 2
+            recorder = _recorder_gain(f_hz / record.rate_hz) ** 2
             spectra.append((response * displacement_psd(f / speed, 1.0) / speed).mean(axis=0) * recorder)
         return spectra
 
@@ -231,12 +233,9 @@ def _responses(car: _Car, road: _RoadInTime, changes: Sequence[_Change] = ()) ->
 
 
 def _recorder_gain(f_of_rate: Array) -> Array:
-    """The recorder's gain at shares of its rate (f,)."""
-    fine = 8
-    taps = recorder_taps(fine)
-    half = len(taps) // 2
-    lags = np.arange(1, half + 1)
-    return np.asarray(taps[half] + 2 * np.cos(2 * np.pi * np.outer(f_of_rate / fine, lags)) @ taps[half + 1:])
+    """The size of the recorder's gain at shares of its rate (f,)."""
+    gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
+    return np.interp(f_of_rate * _GAIN_GRID / _GAIN_STEPS, np.arange(len(gains)), gains)
 
 
 class _RoadInTime:
