@@ -11,7 +11,7 @@ damaged lines left out) which is on the disk before it takes the name, and only 
 instant there is either the part or the finished file, and ``repair`` at the next start makes the step that was missing.
 Every change to the disk goes through ``FileSystem``, so that tests can cut between any two of them.
 
-What is promised, whatever is cut and wherever (``tests/bench/crash.py`` tries it):
+What is promised, whatever is cut and wherever (``tests/bench/faults.py`` tries it):
 
 1. A row that ``sync`` returned for is in the folder, once, in every later instant. The service syncs each row within
    a second of its window being finished; a process that is killed loses no row at all that it had handed over.
@@ -41,6 +41,9 @@ from logger.records import WindowRecord
 from logger.store.segment_log import HEADER, format_row, scan
 
 COUNTER_NAME = "last-session"
+SIDECAR_BYTES = 1_000_000
+"""Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
+
 CLOCK_STEP_US = 100_000
 """A clock map that has moved by less than this need not reach the disk before the file is finished."""
 
@@ -290,11 +293,18 @@ def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
 
 def read_sidecar(log: Path) -> dict[str, Any] | None:
     """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is
-    damaged."""
+    damaged, nested too deep or larger than ``SIDECAR_BYTES``."""
     try:
-        found = json.loads(_sidecar_path(log).read_bytes())
+        with _sidecar_path(log).open("rb") as file:
+            text = file.read(SIDECAR_BYTES + 1)
     except FileNotFoundError:
         return None
+    if len(text) > SIDECAR_BYTES:
+        raise ValueError(f"expected at most {SIDECAR_BYTES} bytes")
+    try:
+        found = json.loads(text)
+    except RecursionError:
+        raise ValueError("expected no such deep nesting") from None
     if not isinstance(found, dict):
         raise ValueError("expected a JSON object")
     return found

@@ -11,7 +11,16 @@ from typing import Any
 import pytest
 
 from logger.records import WindowRecord
-from logger.store.rotation import COUNTER_NAME, ClockMap, FileSystem, SegmentLog, next_session, read_sidecar, repair
+from logger.store.rotation import (
+    COUNTER_NAME,
+    SIDECAR_BYTES,
+    ClockMap,
+    FileSystem,
+    SegmentLog,
+    next_session,
+    read_sidecar,
+    repair,
+)
 from logger.store.segment_log import HEADER, format_row, parse_row, read_log
 from logger.store.verify import verify
 
@@ -424,3 +433,27 @@ def _fresh(parent: Path, name: str) -> Path:
     folder = parent / f"folder-{name}"
     folder.mkdir()
     return folder
+
+
+@pytest.mark.parametrize(("content", "reason"), [
+    (b"[" * 100_000, "nesting"),
+    (b'{"a":' * 100_000, "nesting"),
+    (b"{}" + b" " * SIDECAR_BYTES, "at most"),
+    (b"\xff", "can't decode"),
+    (b"[]", "JSON object"),
+])
+def test_a_hostile_sidecar_is_refused_and_costs_no_row(tmp_path: Path, content: bytes, reason: str) -> None:
+    log = SegmentLog(tmp_path, 1, SIDECAR, 10**6)
+    log.append(row(1))
+    (tmp_path / "00001-001.json").write_bytes(content)
+    with pytest.raises(ValueError, match=reason):
+        read_sidecar(log.path)
+    repair(tmp_path)
+    assert len(read_log(tmp_path / "00001-001.csv").records) == 1
+    (tmp_path / "00001-001.json").write_bytes(content)
+    assert verify([tmp_path])[0].problems == ("sidecar: expected a JSON object",)
+
+
+def test_a_sidecar_of_the_largest_size_is_read(tmp_path: Path) -> None:
+    (tmp_path / "00001-001.json").write_bytes(b"{}" + b" " * (SIDECAR_BYTES - 2))
+    assert read_sidecar(tmp_path / "00001-001.csv") == {}
