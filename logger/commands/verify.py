@@ -1,7 +1,7 @@
 """Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
 is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
 
-Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn last row of an open part is not wrong.
+Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ Problem. A card or a copy may have damaged a file anywhere, or cut it; a file ma
 Solution. Every record is read the way every other reader reads it. A row that does not fit its check value is
 corrupt, a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one
 through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
-had, so that a file cut neatly between two rows shows too. A part that ends in a torn row is simply open.
+had, so that a file cut neatly between two rows shows too. A part, of a log or of a recording, that ends in a torn row
+is simply open.
 A stick that logs were exported to is compared with the manifest that lies beside them.
 """
 
@@ -15,7 +16,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from drivers.dump import ACCELEROMETERS, open_dump
+from drivers.dump import ACCELEROMETERS, intact_bytes, open_dump
 from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
@@ -27,6 +28,7 @@ from logger.store.segment_log import Row, scan
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
+OPEN_DUMP_ENDING = ".dump.gz.part"
 SILENCE_US = US_PER_S
 """An accelerometer that says nothing for longer has left a gap in a dump."""
 
@@ -117,7 +119,8 @@ def _files_of(path: Path) -> list[Path]:
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
     files = sorted(file for file in path.rglob("*")
                    if file.is_file() and not file.is_symlink()
-                   and (LogName.of(file) or file.name.endswith(DUMP_ENDINGS) or file.name == manifest.NAME))
+                   and (LogName.of(file) or file.name == manifest.NAME
+                        or file.name.endswith((*DUMP_ENDINGS, OPEN_DUMP_ENDING))))
     if not files:
         raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
     return files
@@ -128,7 +131,7 @@ def _is_part(path: Path) -> bool:
 
 
 def _is_dump(path: Path) -> bool:
-    if path.name.endswith(DUMP_ENDINGS):
+    if path.name.endswith((*DUMP_ENDINGS, OPEN_DUMP_ENDING)):
         return True
     with path.open("rb") as file:
         return file.read(len(_DUMP_START)) == _DUMP_START
@@ -213,6 +216,18 @@ def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
 
 def _check_dump(path: Path) -> FileCheck:
     findings = _Findings()
+    if not _is_part(path):
+        _take_events(findings, path)
+        return findings.check(path, "dump", "dump")
+    if intact_bytes(path):
+        _take_events(findings, path)
+    else:
+        findings.torn = 1 if path.stat().st_size else 0  # its first block is not whole yet
+    return findings.check(path, "dump", "open")
+
+
+def _take_events(findings: _Findings, path: Path) -> None:
+    """Count the events of a dump; in an open one a torn end is as it should be."""
     heard_us: int | None = None
     try:
         with open_dump(path) as reader:
@@ -227,11 +242,11 @@ def _check_dump(path: Path) -> FileCheck:
                 heard_us = event.t_us
             if reader.torn_tail:
                 findings.torn = 1
+            if reader.torn_tail and not _is_part(path):
                 findings.wrong("torn: the recording ends in the middle of a line or of its compressed data")
     except DumpError as error:
         findings.corrupt = 1
         findings.wrong(f"corrupt: {str(error).removeprefix(f'{path}:')}")
-    return findings.check(path, "dump", "dump")
 
 
 def _check_manifest(path: Path) -> FileCheck:

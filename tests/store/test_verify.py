@@ -195,6 +195,27 @@ def test_torn_damaged_and_silent_dumps(tmp_path: Path) -> None:
     assert counts(found(tmp_path / "c.dump.gz")) == (50, 1, 0, 0)
 
 
+def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_path: Path) -> None:
+    path = tmp_path / "00001.dump.gz.part"
+    writer = DumpWriter(path, DumpHeader(None, {"driver": "bma220"}, {"baud": 9600}, "x"))
+    ends = [0]
+    for event in SAMPLES:
+        writer.write(event)
+        writer.flush(sync=False)
+        ends.append(path.stat().st_size)
+    whole = path.read_bytes()
+    for cut in (*range(0, len(whole), 37), *ends):
+        path.write_bytes(whole[:cut])
+        check, = verify([tmp_path])
+        assert (check.kind, check.state, check.ok, check.records_corrupt, check.gaps) == ("dump", "open", True, 0, 0)
+        assert check.records_torn == (cut not in ends)
+        assert check.records_good >= sum(end <= cut for end in ends[1:])
+    assert counts(check) == (50, 0, 0, 0)
+    path.write_bytes(whole[:-40] + bytes(40))
+    assert (counts(found(path))[2], found(path).ok) == (1, False)
+    writer.close()
+
+
 def test_folders_are_searched_for_logs_and_dumps_only(tmp_path: Path) -> None:
     (tmp_path / "drive").mkdir()
     log_in(tmp_path / "drive", 1).close()
