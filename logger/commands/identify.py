@@ -70,7 +70,10 @@ def run(args: argparse.Namespace) -> int:
     vehicle = read_vehicle(vehicle_path(args.vehicle))
     records = [_record(folder, args.skip) for folder in args.runs]
     free = free_of(vehicle, args.free, args.start, args.bounds)
-    model = VehicleModel(vehicle, free, records)
+    try:
+        model = VehicleModel(vehicle, free, records)
+    except ValueError as error:
+        raise BadInput(f"--free: {error}") from None
     options = _options(args, model)
     try:
         found = fit(model, model.measured, options)

@@ -42,6 +42,7 @@ _TAME = 4.0
 _LONGEST_STEP = 1.0
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e12
+_FLAT = 1e-12  # of the steepest coordinate: what one without a slope is damped by
 # Converged: what is left of the way is this share of a standard error, or this much of a relative change.
 _CLOSE, _CLOSE_NOISE, _CLOSE_RELATIVE = 1e-5, 1e-4, 1e-11
 _MOST_NOISE_ROUNDS = 20
@@ -285,7 +286,8 @@ def _descend(problem: _Problem, start: Array, noise: Whitening) -> _Point:
         gradient, hessian, moving = _normal(problem, point)
         if not moving.any() or _left_of_the_way(point, gradient, hessian) < _CLOSE:
             return _arrived(point, count)
-        damped = hessian + damping * np.diag(np.diag(hessian) + 1e-300)
+        size = np.diag(hessian)
+        damped = hessian + damping * np.diag(size + _FLAT * size.max())
         step = np.zeros_like(point.x)
         step[moving] = np.linalg.solve(damped, gradient)
         step *= min(1.0, _LONGEST_STEP / np.abs(step).max())

@@ -49,13 +49,15 @@ class LowPass:
         half = self._half
         if len(samples) <= 2 * half:
             raise ValueError(f"low-pass: expected more than {2 * half} samples, found {len(samples)}")
-        at = np.arange(half, len(samples) - half, self.rate_hz / self.kept_hz)
+        at = np.arange(half, len(samples) - half - 0.5, self.rate_hz / self.kept_hz)
         nearest = np.rint(at).astype(int)
         offsets = np.arange(-half, half + 1)
         weights = self._kernel(offsets + (nearest - at)[:, None])
         weights /= weights.sum(axis=1, keepdims=True)
-        padded = np.concatenate([samples, samples[-1:]])
-        return np.asarray(np.einsum("mk,mk...->m...", weights, padded[nearest[:, None] + offsets]))
+        kept = np.zeros((len(at), *samples.shape[1:]))
+        for offset, weight in zip(offsets, weights.T, strict=True):
+            kept += (samples[nearest + offset].T * weight).T
+        return kept
 
     def gain(self, f_hz: Array) -> Array:
         """The filter's gain at frequencies before it (f,)."""

@@ -157,8 +157,7 @@ class RoadNoise:
         f_hz = _grid(rate_hz)
         roads = _behind(low_pass, lambda f: self.spectra(values, f))
         sensor = _sensor_shape(low_pass)
-        road_power, sensor_power = _levels(residuals, roads, sensor, f_hz, rate_hz)
-        sensor_power = max(sensor_power, floor**2)
+        road_power, sensor_power = _levels(residuals, roads, sensor, f_hz, floor)
         memory = int(_MEMORY_S * rate_hz)
         whiteners = []
         for road, residual in zip(roads, residuals, strict=True):
@@ -257,11 +256,13 @@ def _levinson(covariance: Array) -> Whitener:
 
 
 def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f_hz: Array,
-            rate_hz: float) -> tuple[float, float]:
-    """Powers of the road and of the sensor whose sum of spectra is the likeliest (P. Whittle 1953).
+            floor: float) -> tuple[float, float]:
+    """Powers of the road and of the sensor whose sum of spectra is the likeliest (P. Whittle 1953), with a deviation of
+    the sensor of at least ``floor``.
 
     For each ratio of the two the common level has a formula; the ratio is found by golden section.
     """
+    rate_hz = 2 * float(f_hz[-1])
     periodograms, road_parts, sensor_parts = [], [], []
     for residual, road in zip(residuals, roads, strict=True):
         taper = np.hanning(len(residual) + 2)[1:-1]
@@ -271,6 +272,7 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
         road_parts.append(np.interp(at_hz, f_hz, road))
         sensor_parts.append(np.interp(at_hz, f_hz, sensor))
     periodogram, road_all, sensor_all = map(np.concatenate, (periodograms, road_parts, sensor_parts))
+    periodogram = periodogram + floor**2 * sensor_all
     unit = float(road_all.mean() / sensor_all.mean())
 
     def deviance(log_ratio: float) -> tuple[float, float]:
@@ -288,4 +290,4 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
             low = left
     ratio = (low + high) / 2
     level = deviance(ratio)[1]
-    return float(np.exp(ratio)) / unit * level, level
+    return float(np.exp(ratio)) / unit * level, max(level, floor**2)

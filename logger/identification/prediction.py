@@ -23,7 +23,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import Free, changed, read
+from logger.identification.parameters import AXLES, BOTH, Free, changed, read
 from logger.roads.iso8608 import displacement_psd
 from logger.roads.track import Track
 from logger.vehicle.models import structure_of
@@ -115,13 +115,17 @@ class VehicleModel:
     """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle``.
 
     The car comes to the first sample of a record at the speed it has there, over the road that the track has there.
-    ValueError for a name that the vehicle has no number of.
+    ValueError for a name that the vehicle has no number of, or that sets what another one sets.
     """
 
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record]) -> None:
         self.vehicle, self.parameters, self.records = vehicle, list(parameters), list(records)
-        for one in parameters:
-            read(vehicle, one.name)
+        wanted = [one.name for one in parameters]
+        for name in wanted:
+            read(vehicle, name)
+            part, _, leaf = name.rpartition(".")
+            if wanted.count(name) > 1 or (part in AXLES and f"{BOTH}.{leaf}" in wanted):
+                raise ValueError(f"expected every number once, found {name} twice")
         self._roads = [_RoadInTime(record) for record in records]
         self.measured = [record.kept_mps2 for record in records]
 

@@ -28,8 +28,8 @@ def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
     """All of it for a program; null where there is nothing to tell."""
     names = list(fit.parameters)
     return {
-        "parameters": fit.parameters, "standard_errors": fit.standard_errors, "error_before": fit.error_before,
-        "error_after": fit.error_after, "converged": fit.converged,
+        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
+        "error_before": _finite(fit.error_before), "error_after": _finite(fit.error_after), "converged": fit.converged,
         "start": {one.name: one.start for one in fit.free},
         "bounds": {one.name: [one.low, one.high] for one in fit.free},
         "interval_95": {name: list(interval(fit, name)) for name in names},
@@ -40,6 +40,11 @@ def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
         "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
         "cannot_tell": [finding.words for finding in fit.verdict],
     }
+
+
+def _finite(error: float) -> float | None:
+    """None for the error of a record that is nothing but zeros."""
+    return error if np.isfinite(error) else None
 
 
 def _p_value(test: Test) -> float | None:

@@ -1,0 +1,111 @@
+"""``ridelog identify``: numbers with their errors, a vehicle that can be read back, refusals, and one line else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bump_drives import bump_record
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.identification.verdict import NotIdentifiable
+from logger.shipped import vehicle_file
+from logger.store.drive_file import write_drive, write_profile
+from logger.store.vehicle_file import read_vehicle
+
+CAR = read_vehicle(vehicle_file("rav4-2009"))
+MASS, DAMPERS = "sprung_mass_kg", "both.suspension_damping_n_s_per_m"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Two drives over bumps, from 12 m before them."""
+    folders = []
+    for seed, height_m in enumerate((0.15, 0.10)):
+        folder = tmp_path_factory.mktemp(f"run{seed}")
+        record = bump_record(CAR, 8.0, seed=seed, height_m=height_m, start_m=12.0)
+        write_drive(folder / "drive.csv", {"t_s": record.time_s, "accel_z_mps2": record.measured_mps2,
+                                           "speed_mps": record.speed_mps, "distance_m": record.distance_m})
+        write_profile(folder / "profile.csv", record.track)
+        folders.append(str(folder))
+    return folders
+
+
+def identify(runs: list[str], free: str, *more: str) -> int:
+    return main(["identify", *runs, "--vehicle", "rav4-2009", "--free", free, *more])
+
+
+def test_for_a_program(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "fitted.yaml"
+    assert identify(runs, f"{MASS},{DAMPERS}", "--start", f"{MASS}=700", "--json", "--out", str(out)) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= told.keys()
+    assert told["converged"] is True
+    for name, truth in ((MASS, 875), (DAMPERS, 1776)):
+        assert told["parameters"][name] == pytest.approx(truth, abs=4 * told["standard_errors"][name])
+    assert told["error_after"] < 0.1 < told["error_before"]
+    assert told["residuals_white_p_value"] > 0.001
+    assert told["residuals_free_of_road_p_value"] > 0.001
+    written = read_vehicle(out)
+    assert written.sprung_mass_kg == told["parameters"][MASS]
+    assert written.rear is not None
+    assert written.front.suspension_damping_n_s_per_m == written.rear.suspension_damping_n_s_per_m
+    assert f"# {MASS}: " in out.read_text("utf-8")
+
+
+def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert identify(runs, f"{MASS},{DAMPERS}", "--tries", "2", "--low-pass", "20", "--robust") == 0
+    text = capsys.readouterr().out
+    for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "taken for white noise of 0.0",
+                  "These runs tell all that was asked.", "Known best in the combination", "below 20 Hz"):
+        assert words in text
+
+
+def test_a_model_that_lacks_something(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
+    assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, "--noise", "white"]) == 0
+    text = capsys.readouterr().out
+    assert "yes, the model misses something of the car" in text
+    assert "the standard errors are a guide only" in text
+
+
+def test_what_the_runs_cannot_tell(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(NotIdentifiable, match="pitch_inertia_kg_m2") as caught:
+        identify(runs, f"{MASS},pitch_inertia_kg_m2")
+    assert caught.value.exit_status == 1
+    assert identify(runs, "pitch_inertia_kg_m2", "--json") == 1
+    printed = capsys.readouterr()
+    told = json.loads(printed.out)
+    assert (told["parameters"], told["converged"], told["error_after"]) == ({}, False, None)
+    assert "pitch_inertia_kg_m2" in told["cannot_tell"][0]
+    assert printed.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(("free", "more", "message"), [
+    ("mass", (), "no parameter 'mass'; expected one of sprung_mass_kg"),
+    ("", (), "expected names with commas"),
+    ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every number once"),
+    (MASS, ("--start", "sprung_mass_kg"), "expected PARAM=NUMBER"),
+    (MASS, ("--start", f"{DAMPERS}=3"), "expected one of what is free"),
+    (MASS, ("--bounds", f"{MASS}=900,1000"), "expected a start between its bounds"),
+    (MASS, ("--bounds", f"{MASS}=900"), "expected PARAM=NUMBER,NUMBER"),
+    (MASS, ("--low-pass", "70"), "below 50 Hz"),
+    (MASS, ("--skip", "30"), "after the first 30 s"),
+    (MASS, ("--tries", "-1"), "expected 0 to 1000"),
+])
+def test_wrong_use_is_one_line(runs: list[str], free: str, more: tuple[str, ...], message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        identify(runs, free, *more)
+
+
+def test_runs_of_different_rates(runs: list[str], tmp_path: Path) -> None:
+    time_s = np.arange(400) / 50
+    write_drive(tmp_path / "drive.csv", {"t_s": time_s, "accel_z_mps2": 0 * time_s, "speed_mps": 0 * time_s + 5,
+                                         "distance_m": 5 * time_s})
+    write_profile(tmp_path / "profile.csv", bump_record(CAR).track)
+    with pytest.raises(BadInput, match="expected 100 samples a second"):
+        identify([*runs, str(tmp_path)], MASS)
