@@ -140,7 +140,7 @@ def answer(ask: Question, vehicle: Vehicle, title: str) -> tuple[SpeedCalibratio
     speeds = calibrate(vehicle, ask.gain, ask.settings)
     took_s = time.perf_counter() - started_s
     path = keep(kept_in, key, speeds)
-    where = f"kept in {path}" if path else f"not kept: neither {' nor '.join(map(str, kept_in))} can be written"
+    where = f"kept in {path}" if path else f"not kept: {' or '.join(map(str, kept_in))} cannot be written"
     print(f"{title}: computed in {took_s:.1f} s, {where}", file=sys.stderr)
     return speeds
 

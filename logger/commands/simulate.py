@@ -111,6 +111,8 @@ def _in_words(made: dict[str, Any]) -> str:
 
 
 def _check_numbers(args: argparse.Namespace) -> None:
+    from logger.shipped import vehicle_path
+
     _check_range("--rate", args.rate, *_RATES_HZ, "Hz")
     _check_range("--noise", args.noise, 0.0, 100.0, "m/s2")
     _check_range("--step", args.step, 0.0, 100.0, "m/s2")
@@ -120,7 +122,8 @@ def _check_numbers(args: argparse.Namespace) -> None:
         _check_range("--speed", args.speed, *_SPEEDS_MPS, "m/s")
     if args.flat is not None:
         _check_range("--flat", args.flat, *_FLAT_M, "m")
-    files = [path.resolve() for path in (args.out, args.profile_out, args.profile, args.speed_file) if path is not None]
+    read = (vehicle_path(args.vehicle), args.profile, args.speed_file)
+    files = [path.resolve() for path in (args.out, args.profile_out, *read) if path is not None]
     if len(set(files)) < len(files):
         raise BadInput(f"--out {args.out}: expected every file to be another one")
 

@@ -172,5 +172,7 @@ def test_files_that_will_not_do(folder: Path) -> None:
     assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
     assert "expected every file to be another one" in refusal(
         folder, "--speed", "20", "--profile-out", str(folder / "profile.csv"))
+    assert "expected every file to be another one" in refusal(
+        folder, "--speed", "20", "--vehicle", "./mine.yaml", "--profile-out", "mine.yaml")
     (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
     assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")
