@@ -115,6 +115,8 @@ def _find(args: argparse.Namespace, record: ChannelRecord, inputs: Any) -> Modal
         return peak_modes(record.samples, record.rate_hz, args.segments)
     if args.method == DECREMENT:
         return _by_decrement(record)
+    if args.order is not None and args.order < 2:
+        raise ValueError(f"expected an order of 2 or more, found {args.order}")
     decay = None if args.response is None else args.response == "decay"
     return find_modes(record.samples, record.rate_hz, args.method, inputs, args.order, decay)
 

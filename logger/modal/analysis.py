@@ -22,16 +22,16 @@ from logger.modal.decay import decay_modes
 from logger.modal.era import proposals, realise
 from logger.modal.mode import Array, ModalResult, OrderPoles, order_poles
 from logger.modal.moments import Moments, jackknife, segment_products
-from logger.modal.stabilisation import best_size, judge
+from logger.modal.stabilisation import best_size, generous_size, judge
 
 METHODS = {
     "era": "eigensystem realisation of a free decay, or of correlations (NExT)",
     "ssi": "data-driven stochastic subspace, canonical weighting",
     "ssi-cov": "covariance-driven stochastic subspace",
     "n4sid": "deterministic-stochastic subspace, canonical weighting",
-    "ar": "autoregressive",
-    "arx": "autoregressive with input",
-    "armax": "autoregressive moving average, with input if there is one",
+    "ar": "autoregressive (noise of the sensors makes its damping too high, which its errors do not show)",
+    "arx": "autoregressive with input (noise of the sensors makes its damping too high, which its errors do not show)",
+    "armax": "autoregressive moving average in two regressions (weak modes in noise come out too damped)",
 }
 NEED_INPUT = ("arx",)
 TAKE_INPUT = ("n4sid", "arx", "armax")
@@ -43,6 +43,7 @@ _MOST_STATES = 40
 _BEYOND = 8  # states beyond the chosen order, for the stabilisation diagram
 _DECAY_RATIO = 3.0
 _PROPOSED_ORDERS = 12
+_DIAGRAM_ORDERS, _DIAGRAM_BEYOND = 24, 8
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,14 @@ def find_modes(
         raise ValueError(f"expected an order out of {plan.orders[0]} to {plan.orders[-1]} in steps of "
                          f"{plan.orders[1] - plan.orders[0]}, found {order}")
     chosen = plan.best(moments) if order is None else order
-    diagram = plan.models(moments, plan.orders)
     what = "response to unmeasured random forces" if inputs is None else "response beside its measured input"
     how = f"{what}: {METHODS[method]}"
     if chosen == 0:
-        return ModalResult((), (), 0, f"{how}; no model tells more than its parameters cost", tuple(diagram))
+        return ModalResult((), (), 0, f"{how}; no model tells more than its parameters cost")
     place = plan.orders.index(chosen)
+    thinned = plan.orders[place::-(place // _DIAGRAM_ORDERS + 1)][::-1]
+    diagram = plan.models(moments, thinned + plan.orders[place + 1:place + 1 + _DIAGRAM_BEYOND])
+    place = len(thinned) - 1
     found = diagram[place]
     covariance = jackknife(segments, lambda part: plan.models(part, [chosen])[0], found.poles)
     modes, rejected = judge(found, covariance, diagram[place + 1:], scale, plan.peaks(moments, found))
@@ -143,8 +146,8 @@ def _plan(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan:
         if method == "era":
             transition, observe = realise(correlations, max(wanted), horizon)
             return [order_poles(transition[:n, :n], observe[:, :n], rate_hz) for n in wanted]
-        seen = [subspace.covariance_driven(correlations, n) for n in wanted]
-        return [order_poles(model.transition, model.observe, rate_hz) for model in seen]
+        return [order_poles(model.transition, model.observe, rate_hz)
+                for model in subspace.covariance_driven(correlations, wanted)]
 
     return _Plan(data, 2 * horizon, orders, best, models)
 
@@ -156,7 +159,7 @@ def _regression(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan
     if method == "armax":
         segments = segment_products(data, longest + 1, 1).whole()
         misfit = autoregressive.misfits(segments, which, longest)
-        lags = max(1, best_size(misfit, segments.count, outputs * data.shape[1]))
+        lags = max(1, generous_size(misfit, segments.count, outputs * data.shape[1]))
         errors = autoregressive.errors(data, segments, which, lags)
         data, which = np.hstack([data[lags:], errors]), Regressors(outputs, inputs, outputs)
         longest = max(2, min(_MOST_STATES // outputs, len(data) // (12 * data.shape[1])))
@@ -164,7 +167,7 @@ def _regression(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan
 
     def best(moments: Moments) -> int:
         misfit = autoregressive.misfits(moments, which, longest)
-        return best_size(misfit, moments.count, outputs * moments.channels)
+        return generous_size(misfit, moments.count, outputs * moments.channels)
 
     def models(moments: Moments, wanted: list[int]) -> list[OrderPoles]:
         return [autoregressive.poles(moments, which, n, rate_hz) for n in wanted]

@@ -86,10 +86,11 @@ def _threshold(samples: int, channels: int) -> float:
 
 
 def _basis(poles: Complex, count: int, rate_hz: float) -> Array:
-    """Columns Re, Im of exp(s t) for each pole, each of length 1 or less at its start."""
-    t_s = np.arange(count) / rate_hz
-    waves = np.exp(np.outer(t_s, poles))
-    return np.stack([waves.real, waves.imag], axis=2).reshape(count, -1)
+    """Columns Re, Im of exp(s t) for each pole; products of exponentials of far and near instants are cheap."""
+    near = int(np.sqrt(count)) + 1
+    far = np.exp(np.outer(np.arange(-(-count // near)) * (near / rate_hz), poles))
+    waves = far[:, None] * np.exp(np.outer(np.arange(near) / rate_hz, poles))
+    return np.ascontiguousarray(waves.reshape(near * len(far), len(poles))[:count]).view(np.float64)
 
 
 def _solve(samples: Array, poles: Complex, rate_hz: float) -> _Fit:

@@ -16,6 +16,7 @@ from logger.modal.mode import Array, OrderPoles, order_poles
 
 _MOST_ROWS, _MOST_COLUMNS = 300, 400
 _PROPOSED_STATES = 40
+_RANK = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
 
 
 def realise(responses: Array, most: int, block_rows: int | None = None) -> tuple[Array, Array]:
@@ -28,10 +29,13 @@ def realise(responses: Array, most: int, block_rows: int | None = None) -> tuple
     columns = max(1, min(_MOST_COLUMNS // cases, samples - rows))
     blocks = responses[np.arange(rows)[:, None] + np.arange(columns + 1)]  # (rows, columns + 1, channels, cases)
     whole = blocks.transpose(0, 2, 1, 3).reshape(rows * channels, (columns + 1) * cases)
-    left, sizes, right = np.linalg.svd(whole[:, :-cases], full_matrices=False)
-    n = min(most, int((sizes > 1e-12 * sizes[0]).sum()))
-    root = np.sqrt(sizes[:n])
-    return left[:, :n].T @ whole[:, cases:] @ right[:n].T / np.outer(root, root), left[:channels, :n] * root
+    early, late = whole[:, :-cases], whole[:, cases:]
+    squares, left = np.linalg.eigh(early @ early.T)
+    sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
+    n = max(1, min(most, int((sizes > _RANK * sizes[0]).sum())))
+    left, root = left[:, :n], np.sqrt(np.maximum(sizes[:n], 1e-300))
+    right = (left.T @ early) / sizes[:n, None]
+    return left.T @ late @ right.T / np.outer(root, root), left[:channels] * root
 
 
 def corners(transition: Array, observe: Array, rate_hz: float) -> tuple[OrderPoles, ...]:

@@ -34,8 +34,15 @@ _HUM_DAMPING = 5e-4
 
 
 def best_size(misfit: Array, count: int, parameters_per_step: int) -> int:
-    """Index of the misfit (log det of the error covariance of larger and larger models) with Schwarz's best criterion."""
+    """Index of the misfit (log det of the errors' covariance, larger and larger models) best by Schwarz's criterion."""
     return int((count * misfit + np.log(count) * parameters_per_step * np.arange(len(misfit))).argmin())
+
+
+def generous_size(misfit: Array, count: int, parameters_per_step: int) -> int:
+    """The same by Akaike's criterion, which takes more, as a regression needs that must imitate noise; 0 stays 0."""
+    if best_size(misfit, count, parameters_per_step) == 0:
+        return 0
+    return int((count * misfit + 2 * parameters_per_step * np.arange(len(misfit))).argmin())
 
 
 def judge(

@@ -85,16 +85,16 @@ def combined(moments: Moments, outputs: int, horizon: int, orders: Sequence[int]
     return found
 
 
-def covariance_driven(correlations: Array, order: int) -> StateSpace:
-    """SSI-cov of one order, from correlations (lags from 1, channels, references), by the observability's shift."""
+def covariance_driven(correlations: Array, orders: Sequence[int]) -> list[StateSpace]:
+    """SSI-cov, from correlations (lags from 1, channels, references), by the observability's shift."""
     lags, p, _ = correlations.shape
     rows = (lags + 1) // 2
     blocks = correlations[np.arange(rows)[:, None] + np.arange(lags + 1 - rows)]
     whole = blocks.transpose(0, 2, 1, 3).reshape(rows * p, -1)
     left, sizes, _ = np.linalg.svd(whole, full_matrices=False)
-    seen = left[:, :order] * np.sqrt(sizes[:order])
-    shift = np.linalg.lstsq(seen[:-p], seen[p:], rcond=None)[0]
-    return StateSpace(np.asarray(shift, dtype=np.float64), np.asarray(seen[:p], dtype=np.float64), np.empty(0))
+    seen = np.asarray(left[:, :max(orders)] * np.sqrt(sizes[:max(orders)]), dtype=np.float64)
+    shifts = [np.asarray(np.linalg.lstsq(seen[:-p, :n], seen[p:, :n], rcond=None)[0]) for n in orders]
+    return [StateSpace(shift, seen[:p, :len(shift)], np.empty(0)) for shift in shifts]
 
 
 def _right_vectors(matrix: Array, most: int) -> Array:

@@ -1,0 +1,140 @@
+"""Modes of simulated records against the eigenvalues of what was simulated; records without modes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from logger.modal.analysis import METHODS, decays, find_modes
+from logger.modal.mode import FoundMode, mac
+from logger.modal.structure_response import Masses, chain, free_decay, random_response, with_damping_ratios
+
+RATE_HZ = 100.0
+FREQUENCIES_HZ = 2.48 * np.sin((2 * np.arange(1, 6) - 1) * np.pi / 22) / np.sin(np.pi / 22)  # of a uniform chain
+
+
+def five(ratios: list[float]) -> Masses:
+    stiffness = (2 * np.pi * 2.48 / (2 * np.sin(np.pi / 22))) ** 2
+    return with_damping_ratios(*chain(np.ones(5), np.full(5, stiffness)), np.array(ratios))
+
+
+def noisy(clean: np.ndarray, share: float, seed: int) -> np.ndarray:
+    return clean + share * clean.std(axis=0) * np.random.default_rng(seed).standard_normal(clean.shape)
+
+
+def random_record(masses: Masses, seconds: float, seed: int) -> np.ndarray:
+    force = np.random.default_rng(seed).standard_normal((round(400 * seconds), len(masses.mass)))
+    return noisy(random_response(masses, force, RATE_HZ), 0.1, seed + 1000)
+
+
+def check(found: tuple[FoundMode, ...], ratios: list[float], sds: float) -> None:
+    """All five and no other, each within so many standard deviations, which are small themselves."""
+    assert len(found) == 5
+    for mode, frequency_hz, ratio in zip(found, FREQUENCIES_HZ, ratios, strict=True):
+        assert abs(mode.frequency_hz - frequency_hz) < sds * mode.frequency_std_hz < 0.2 * sds * frequency_hz
+        assert abs(mode.damping_ratio - ratio) < sds * mode.damping_std < sds * max(0.01, 0.2 * ratio)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_five_light_modes_in_a_noisy_decay(share: float, seed: int) -> None:
+    masses = five([0.01] * 5)
+    record = noisy(free_decay(masses, np.eye(5)[0], RATE_HZ, 2000), share, seed) + 9.81
+    result = find_modes(record, RATE_HZ, "era")
+    check(result.modes, [0.01] * 5, 4.0)
+    shapes = np.array([mode.shape for mode in result.modes]).T
+    assert np.diag(mac(masses.poles()[1], shapes)).min() > 0.9
+    assert result.rejected
+    assert all(one.reason for one in result.rejected)
+
+
+@pytest.mark.parametrize("method", ["ssi", "ssi-cov", "n4sid", "ar"])
+def test_any_method_may_propose_for_a_decay(method: str) -> None:
+    record = noisy(free_decay(five([0.01] * 5), np.eye(5)[0], RATE_HZ, 1000), 0.05, 4)
+    check(find_modes(record, RATE_HZ, method).modes, [0.01] * 5, 4.0)
+
+
+def test_the_truth_lies_within_two_errors_as_often_as_it_should() -> None:
+    clean = free_decay(five([0.03] * 5), np.eye(5)[0], RATE_HZ, 600)
+    inside = []
+    for seed in range(12):
+        modes = find_modes(noisy(clean, 0.05, seed), RATE_HZ, "era").modes
+        for mode, frequency_hz in zip(modes, FREQUENCIES_HZ, strict=True):
+            inside.append(abs(mode.frequency_hz - frequency_hz) < 2 * mode.frequency_std_hz)
+            inside.append(abs(mode.damping_ratio - 0.03) < 2 * mode.damping_std)
+    assert np.mean(inside) > 0.88  # of 120
+
+
+def test_heavy_and_light_damping_under_random_forces() -> None:
+    ratios = [0.35, 0.10, 0.05, 0.30, 0.03]
+    result = find_modes(random_record(five(ratios), 200.0, 1), RATE_HZ, "ssi")
+    check(result.modes, ratios, 4.0)
+    assert result.order == 10
+
+
+@pytest.mark.parametrize("method", ["era", "ssi-cov", "ar"])
+def test_light_modes_under_random_forces(method: str) -> None:
+    found = find_modes(random_record(five([0.02] * 5), 100.0, 2), RATE_HZ, method).modes
+    frequencies = np.array([mode.frequency_hz for mode in found])
+    np.testing.assert_allclose(frequencies, FREQUENCIES_HZ, rtol=0.02)
+    np.testing.assert_allclose([mode.damping_ratio for mode in found], 0.02, atol=0.012)
+
+
+@pytest.mark.parametrize(("method", "atol"), [("n4sid", 0.003), ("arx", 0.01), ("armax", 0.02)])
+def test_a_measured_input(method: str, atol: float) -> None:
+    rng = np.random.default_rng(5)
+    masses, push = five([0.02] * 5), rng.standard_normal(8000)
+    force = np.zeros((32_000, 5))
+    force[:, 0] = np.repeat(push, 4)
+    record = noisy(random_response(masses, force, RATE_HZ), 0.03, 6)
+    found = find_modes(record, RATE_HZ, method, push[:, None]).modes
+    near = [min(found, key=lambda mode, f=f: abs(mode.frequency_hz - f)) for f in FREQUENCIES_HZ]
+    np.testing.assert_allclose([mode.frequency_hz for mode in near], FREQUENCIES_HZ, rtol=0.02)
+    np.testing.assert_allclose([mode.damping_ratio for mode in near], 0.02, atol=atol)
+    if method == "n4sid":
+        check(found, [0.02] * 5, 4.0)
+
+
+@pytest.mark.parametrize("method", ["ssi", "ssi-cov", "ar", "armax"])
+def test_white_noise_has_no_modes(method: str) -> None:
+    for seed in range(3):
+        assert find_modes(np.random.default_rng(seed).standard_normal((3000, 2)), RATE_HZ, method).modes == ()
+
+
+def test_a_decay_of_noise_has_no_modes() -> None:
+    for seed in range(5):
+        noise = np.random.default_rng(seed).standard_normal((1500, 2))
+        assert find_modes(noise, RATE_HZ, "era", decay=True).modes == ()
+
+
+def test_a_mode_that_was_not_excited_is_not_there() -> None:
+    masses = five([0.01] * 5)
+    only_two = masses.poles()[1][:, :2].real.sum(axis=1)
+    found = find_modes(noisy(free_decay(masses, only_two, RATE_HZ, 2000), 0.1, 3), RATE_HZ, "era").modes
+    np.testing.assert_allclose([mode.frequency_hz for mode in found], FREQUENCIES_HZ[:2], rtol=0.01)
+
+
+def test_what_kind_of_record_it_is() -> None:
+    masses = five([0.01] * 5)
+    assert decays(free_decay(masses, np.eye(5)[0], RATE_HZ, 2000))
+    assert not any(decays(random_record(masses, 60.0, seed)) for seed in range(5))
+
+
+def test_an_order_that_cannot_be() -> None:
+    record = random_record(five([0.02] * 5), 60.0, 3)
+    with pytest.raises(ValueError, match="expected an order out of 2 to 48 in steps of 2, found 7"):
+        find_modes(record, RATE_HZ, "ssi", order=7)
+    assert find_modes(record, RATE_HZ, "ssi", order=12).order == 12
+    with pytest.raises(ValueError, match="at least 100 samples, found 99"):
+        find_modes(record[:99], RATE_HZ, "ssi")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("samples", [100, 250])
+def test_short_records_end_in_modes_or_words(method: str, samples: int) -> None:
+    record = random_record(five([0.02] * 5), 5.0, 3)[:samples]
+    inputs = record[:, :1] ** 2 if method == "arx" else None
+    try:
+        find_modes(record, RATE_HZ, method, inputs)
+    except ValueError as error:
+        assert "expected" in str(error)
