@@ -126,10 +126,10 @@ def fit(model: Model, measured: Sequence[Array], options: Options | None = None)
     predictions, no free number, or a start outside its bounds.
     """
     problem = _Problem(model, measured, options or Options())
-    findings = problem.structural_findings()
+    starts = problem.starts()
+    findings = problem.structural_findings(problem.beside(starts[0]))
     if findings and problem.options.refuse:
         raise NotIdentifiable(findings)
-    starts = problem.starts()
     descents = [_descend(problem, start, problem.plain) for start in starts]
     best = descents[int(np.argmin([one.cost for one in descents]))]
     iterations = sum(one.steps for one in descents)
@@ -251,16 +251,18 @@ class _Problem:
             columns.append([(high - low) / (2 * step) for low, high in zip(*ends, strict=True)])
         return predictions, [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
-    def structural_findings(self) -> list[Finding]:
-        """What no such data could tell: asked a little beside the start, where no symmetry of it hides anything."""
-        nothing = NOTHING_EXACT if isinstance(self.model, Differentiable) else NOTHING_BY_DIFFERENCES
-        start = self.starts()[0]
+    def beside(self, start: Array) -> Array:
+        """A place a little beside a start, where no symmetry of the start hides anything."""
         nudge = _NUDGE * np.cos(1.0 + 2.0 * np.arange(len(start))) * (len(start) > 1)
-        x = np.clip(start + nudge, self.low, self.high)
-        predictions, slopes = self._linearised(self.values(x))
+        return np.clip(start + nudge, self.low, self.high)
+
+    def structural_findings(self, x: Array) -> list[Finding]:
+        """What no such data could tell at a place."""
+        nothing = NOTHING_EXACT if isinstance(self.model, Differentiable) else NOTHING_BY_DIFFERENCES
+        values = self.values(x)
+        predictions, slopes = self._linearised(values)
         predictions = [self.low_pass.apply(one) for one in predictions]
-        scale = self.per_coordinate(self.values(x))
-        derivatives = np.concatenate([self.low_pass.apply(slope) * scale for slope in slopes])
+        derivatives = np.concatenate([self.low_pass.apply(slope) * self.per_coordinate(values) for slope in slopes])
         size = float(np.sqrt(sum((one**2).sum() for one in predictions)))
         return structural([one.name for one in self.free], derivatives, size, nothing)
 
@@ -364,7 +366,7 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
     at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
                 if x - low < _AT_BOUND or high - x < _AT_BOUND]
     if not findings:
-        findings = statistical(names, relative)
+        findings = problem.structural_findings(point.x) or statistical(names, relative)
         if findings and problem.options.refuse:
             raise NotIdentifiable(findings)
     values = problem.values(point.x)
