@@ -22,14 +22,13 @@ from soaking import MAX_FILE_BYTES, Soaked, soak
 QUOTA_BYTES = 75_000_000
 START_UTC = datetime(2026, 12, 31, 17, 57, tzinfo=UTC)
 CYCLE_S = 1800
-WARM_UP_S = 2 * 3600
 PATIENCE_S = 300
 
 
 def main() -> int:
     """Print the figures; exit 1 when a goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--hours", type=float, default=24.0, help="how much of a day; more than 2")
+    parser.add_argument("--hours", type=float, default=24.0, help="how much of a day; 2 or more")
     day = CarDay(round(parser.parse_args().hours * 3600 / CYCLE_S), START_UTC, CYCLE_S)
     with tempfile.TemporaryDirectory() as name:
         found = soak(day, Path(name), QUOTA_BYTES)
@@ -38,17 +37,17 @@ def main() -> int:
     print(f"{day_s / 3600:g} h, {found.events / 1e6:.1f} million events in {found.wall_s:.0f} s: "
           f"{day_s / found.wall_s:.0f} times real time")
     figures.at_most("processor time it took", found.cpu_s, PATIENCE_S, "s")
-    _resources(found, figures)
+    _resources(found, START_US + day_s // 3 * 1_000_000, figures)
     _rows(found, day, figures)
     return 1 if figures.missed else 0
 
 
-def _resources(found: Soaked, figures: Figures) -> None:
-    warm_us = START_US + WARM_UP_S * 1_000_000
+def _resources(found: Soaked, warm_us: int, figures: Figures) -> None:
+    """The memory that the allocator holds grows in steps, until every kind of hour has been; then it must not."""
     gained_bytes = found.gained(lambda sample: sample.memory_bytes, warm_us)
     gained_blocks = found.gained(lambda sample: sample.blocks, warm_us)
     open_files = [sample.open_files for sample in found.samples]
-    figures.at_most("memory gained after the first two hours", gained_bytes / 1e6, 2, "MB")
+    figures.at_most("memory gained after a third of the day", gained_bytes / 1e6, 1, "MB")
     figures.at_most("of Python's objects alone", 100 * gained_blocks / found.samples[0].blocks, 1, "%")
     figures.at_most("open files, most less fewest", max(open_files) - min(open_files), 1, "")
     folder_bytes = max(sample.folder_bytes for sample in found.samples)
