@@ -42,6 +42,13 @@ class CarResponse:
         response = np.stack([by_wheel[:, self._axle == axle].sum(axis=1) for axle in range(len(self.behind_m))])
         return np.where(seen, response, 0.0)
 
+    def power_apart(self, speed_mps: float) -> Array:
+        """Sum over the axles of each one's own squared gain, at ``WAVE_NUMBERS_CPM`` [1/s4], where ``power`` is the
+        square of their sum: where both axles' shares cancel, what a wrong model leaves is as large as they are."""
+        gain = np.abs(self.by_axle(WAVE_NUMBERS_CPM * speed_mps)) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
+        apart: Array = (gain**2).sum(axis=0)
+        return apart
+
     def power(self, speed_mps: float) -> Array:
         """Squared gain from road to output at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.
 

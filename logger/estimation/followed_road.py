@@ -17,7 +17,7 @@ import numpy.typing as npt
 from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
 from logger.estimation.block import Block, Solution
 from logger.estimation.car_response import CarResponse
-from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd
+from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
 from logger.estimation.local_roughness import LocalRoughness, mean_told
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
@@ -37,7 +37,7 @@ _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 @dataclass(frozen=True)
 class SolvedBlock:
     """road      (k,) rfft of the elevations on the block's grid [m]
-    variance     of a reading, noise and rounding, while the car moved [(m/s2)2]
+    variance     of a reading, noise, rounding and the car's own error, while it moved [(m/s2)2]
     """
 
     road: ComplexArray
@@ -45,10 +45,14 @@ class SolvedBlock:
 
 
 class FollowedRoad:
-    """One road after another, as one car and one sensor find them, on a distance grid of ``spacing_m``."""
+    """One road after another, as one car and one sensor find them, on a distance grid of ``spacing_m``.
 
-    def __init__(self, car: CarResponse, sensor: Sensor, spacing_m: float) -> None:
+    vehicle_error    share that each axle's gain may be off, because no file fits a car
+    """
+
+    def __init__(self, car: CarResponse, sensor: Sensor, spacing_m: float, vehicle_error: float) -> None:
         self._car = car
+        self._vehicle_error = vehicle_error
         self._sensor = sensor
         self._spacing_m = spacing_m
         self._belief = Belief(COMMON_ROAD)
@@ -92,7 +96,11 @@ class FollowedRoad:
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says."""
         readings = self._as_gaussian(samples)
-        weight = np.where(read, 1 / readings.variance, 0.0)
+        there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
+        variance = readings.variance + vehicle_error_variance(
+            self._car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
+        )
+        weight = np.where(read, 1 / variance, 0.0)
         seen, seen_share = block.seen(read), block.seen_points(read) / block.count
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
         local = self._local.at(first, block.count).variance
@@ -106,13 +114,13 @@ class FollowedRoad:
         self._local.learn(first, innovations, local, solution.gain, seen)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         moving = weight[block.moving & read]
-        variance = 1 / float(moving.mean()) if len(moving) else float(readings.variance.mean())
+        typical = 1 / float(moving.mean()) if len(moving) else float(variance.mean())
         if self._sensor.is_coarse:
-            self._gaussian = self._improved(readings, samples, read, block, solution, variance)
+            self._gaussian = self._improved(readings, samples, read, block, solution, typical)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             self._belief = with_noise(self._belief, residual, weight, 2 * seen_share * float(told.sum()))
-        return SolvedBlock(solution.road, variance)
+        return SolvedBlock(solution.road, typical)
 
     def _as_gaussian(self, samples: Samples) -> Readings:
         if not self._sensor.is_coarse:

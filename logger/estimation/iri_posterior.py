@@ -43,6 +43,17 @@ def told_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise
     return signal / (signal + noise_psd)
 
 
+def vehicle_error_variance(
+    car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, vehicle_error: float, rate_hz: float
+) -> float:
+    """White noise of readings that costs the IRI as much as a model whose axles' gains are each off by a share
+    ``vehicle_error`` [(m/s2)2]: the error's density over wave numbers, weighted as the IRI weights them."""
+    road = spectrum.psd(WAVE_NUMBERS_CPM)
+    weight = _SLOPE_POWER * road
+    density = float((vehicle_error**2 * car.power_apart(speed_mps) * road) @ weight / weight.sum())
+    return density * rate_hz / (2 * speed_mps)
+
+
 def acceleration_variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> float:
     """Variance of the acceleration itself once the readings are known [(m/s2)2]."""
     signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)

@@ -39,6 +39,7 @@ BLOCK_SAMPLES = 2048
 HOP_SAMPLES = 200
 LAG_S = 4.0
 FAINT_BELOW = 0.2
+VEHICLE_ERROR = 0.05
 SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
 _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
@@ -95,6 +96,8 @@ class RoadEstimator:
     sensor       noise and step of the readings
     window_m     length of a window [m]
     place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
+    vehicle_error    share that each axle's gain may be off; it also keeps waves that lift one axle while the other
+                 sinks from being made too much of
     on_road      is given each piece of estimated road
     """
 
@@ -105,11 +108,13 @@ class RoadEstimator:
         sensor: Sensor,
         window_m: float,
         place_std_m: float = 0.0,
+        vehicle_error: float = VEHICLE_ERROR,
         on_road: Callable[[RoadPiece], None] | None = None,
     ) -> None:
         self._car = CarResponse(structure, output)
         self._sensor = sensor
         self._place_std_m = place_std_m
+        self._vehicle_error = vehicle_error
         self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
         self._piece_m = window_m / self._pieces_per_window
         self._points = ceil(self._piece_m / _SPACING_M)
@@ -117,7 +122,7 @@ class RoadEstimator:
         self._on_road = on_road
         self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
         self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
-        self._road = FollowedRoad(self._car, sensor, self._spacing_m)
+        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error)
         self._start_anew()
 
     def _start_anew(self) -> None:
@@ -251,7 +256,10 @@ class RoadEstimator:
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
         misplaced = self._place_std_m * sum(one.change_per_m for one in iri) / len(iri)
-        return [WindowEstimate(number // self._pieces_per_window, mean, hypot(own, shared, misplaced), told, flags)]
+        # Errors of the axles' gains, independent of each other, leave their mean off by less.
+        modelled = self._vehicle_error / sqrt(len(self._car.behind_m)) * mean
+        std = hypot(own, shared, misplaced, modelled)
+        return [WindowEstimate(number // self._pieces_per_window, mean, std, told, flags)]
 
     def _give_road(
         self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum

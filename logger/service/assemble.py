@@ -110,7 +110,9 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     chain = SignalChain(axis, WEIGHTING, sensor.oversample, low_pass_hz, sensor.sensor.is_coarse, make_filter)
     structure = structure_of(vehicle)
     place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    estimator = RoadEstimator(structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m)
+    estimator = RoadEstimator(
+        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error
+    )
     return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
 
 

@@ -112,6 +112,7 @@ class Config:
     accelerometer: AccelerometerConfig = AccelerometerConfig()
     gps: GpsConfig = GpsConfig()
     vehicle: Path = field(default_factory=lambda: vehicle_file("rav4-2009"))
+    vehicle_error: float = 0.05
     pipeline: PipelineConfig = PipelineConfig()
     log: LogConfig = LogConfig()
     status_file: Path = Path("/run/ridelog/status.json")
@@ -130,6 +131,7 @@ def load_config(path: Path) -> Config:
         "accelerometer": _accelerometer,
         "gps": _gps,
         "vehicle": _vehicle,
+        "vehicle_error": _number(0, 1),
         "pipeline": _pipeline,
         "log": _log,
         "status_file": _file_to_write,

@@ -45,7 +45,7 @@ def read(accel_mps2: np.ndarray, sensor: Sensor, seed: int) -> np.ndarray:
 def estimated(
     sensor: Sensor, reading: np.ndarray, distance_m: np.ndarray, window_m: float = WINDOW_M, place_std_m: float = 0.0
 ) -> list[WindowEstimate]:
-    estimator = RoadEstimator(RAV4, body_point(RAV4), sensor, window_m, place_std_m)
+    estimator = RoadEstimator(RAV4, body_point(RAV4), sensor, window_m, place_std_m, vehicle_error=0.0)
     found = estimator.push(reading, np.ones(len(reading), dtype=bool), np.zeros(len(reading)), distance_m)
     return found + estimator.finish()
 
