@@ -1,6 +1,6 @@
 """The storage of the service cut at every change of the disk: killed, and without power; the repair cut as well.
 
-A few hundred of the crashes of ``tests/bench/crash.py``, and cuts that this bench once showed to be wrong.
+A few hundred of the crashes of ``tests/bench/faults.py``, and cuts that this bench once showed to be wrong.
 """
 
 from __future__ import annotations
@@ -9,24 +9,21 @@ import random
 from pathlib import Path
 
 import pytest
+from fault_trials import Hazard, cases_for_tests, label
 
 from logger.store.rotation import repair
 
-from crashes import Life, crash
+from crashes import HAZARDS, Life, crash
 from faulty_disk import CrashModel, RecordingFiles
 
 
-@pytest.mark.parametrize("seed", [101, 102])
-def test_cut_at_every_change(tmp_path: Path, seed: int) -> None:
-    (tmp_path / "life").mkdir()
-    life = Life(tmp_path / "life", seed, steps=25)
-    rng = random.Random(seed)
-    outcomes = [crash(life, count, power, rng, tmp_path / "after")
-                for count in range(len(life.files.journal) + 1) for power in (False, True)]
-    assert len(outcomes) > 200
-    assert [outcome.wrong for outcome in outcomes if outcome.wrong] == []
-    assert sum(outcome.rows_promised for outcome in outcomes) > 1000
-    assert sum(outcome.torn_or_damaged for outcome in outcomes) > 10
+@pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
+def test_cut_at_every_change(tmp_path: Path, hazard: Hazard, case: object) -> None:
+    found = hazard.trial(tmp_path, case)
+    assert found.wrong == ()
+    assert found.trials > 100
+    assert found.figures["rows_promised"] > 500
+    assert found.figures["torn_or_damaged"] > 5 or hazard is HAZARDS[0]
 
 
 def test_a_disk_that_forgets_what_was_synced_is_noticed(tmp_path: Path) -> None:

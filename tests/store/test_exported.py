@@ -59,18 +59,6 @@ def test_a_file_that_changed_is_not_exported(tmp_path: Path, later: tuple[str, i
     assert exported_names(tmp_path) == set()
 
 
-def test_marks_damaged_anywhere_mark_no_more_than_before(tmp_path: Path) -> None:
-    names = {"00001-001.csv", "00001-001.json"}
-    mark(tmp_path, {name: a_file(tmp_path, name) for name in names})
-    path = tmp_path / MARKS_NAME
-    whole = path.read_bytes()
-    for place in range(len(whole)):
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1:])
-        assert exported_names(tmp_path) in (set(), names)
-        path.write_bytes(whole[:place])
-        assert exported_names(tmp_path) in (set(), names)
-
-
 @pytest.mark.parametrize("content", ["", "[]", "1", '{"format": 1}', "[" * 10_000,
                                      '{"format":1,"files":[],"sha256":0}'])
 def test_a_file_of_marks_that_is_none_marks_nothing(tmp_path: Path, content: str) -> None:

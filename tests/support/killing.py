@@ -1,4 +1,5 @@
-"""A real ``ridelog run`` killed at random under load, started again in the same folder, and what is left each time.
+"""A real ``ridelog run`` killed at random under load, started again in the same folder, and what is left each time; and
+one that may write no more.
 
 Windows of one metre at 24 m/s, files of a few seconds and a raw dump make load. A kill comes at any time from the
 first import on, so the repair is killed as well.
@@ -8,20 +9,28 @@ from __future__ import annotations
 
 import os
 import random
+import resource
+import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 import tty
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from unittest.mock import patch
+
+from fault_trials import Found, Hazard, found
 
 from drivers.dump import Event, intact_bytes, open_dump
+from logger.commands.status import advice, screen
 from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
-from logger.service.status import read_status
+from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
 from logger.store.rotation import LogName
 from logger.store.segment_log import read_log
@@ -172,3 +181,89 @@ def kill_many(folder: Path, kills: int, services: int, longest_s: float, seed: i
     finally:
         for service in running:
             service.close()
+
+
+SERVICES = 6
+
+
+def killed_at_random(folder: Path, case: tuple[int, float, int]) -> Found:
+    kills, longest_s, seed = case
+    services = kill_many(folder, kills, SERVICES, longest_s, seed)
+    figures = {name: float(sum(getattr(one, name) for one in services))
+               for name in ("rows", "rows_told", "torn_tails", "dumps")}
+    wrong = tuple(words for one in services for words in one.wrong)
+    return Found(sum(one.kills for one in services), figures, wrong=wrong)
+
+
+def may_write_no_more(folder: Path, case: None) -> Found:
+    """The system refuses longer files (EFBIG) in the middle of a write, for some seconds."""
+    fast_drive(folder / "drive.dump.gz", 60.0)
+    service = KilledService(folder / "service", folder / "drive.dump.gz")
+    heard_by = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "1000000"}
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager, patch.dict(os.environ, heard_by):
+        manager.bind(str(folder / "notify"))
+        manager.setblocking(False)
+        process = service.start()
+        try:
+            _wait_for(service, process.pid, lambda status: status.rows_written > 20)
+            unlimited = resource.prlimit(process.pid, resource.RLIMIT_FSIZE)
+            sidecar, *_ = service.log.glob("*.json")
+            limit = sidecar.stat().st_size - 1  # no file can be begun any more, while the status file still fits
+            assert (service.work / "status.json").stat().st_size < limit
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, unlimited[1]))
+            full = _wait_for(service, process.pid, lambda status: status.storage.rows_waiting > 10)
+            _drain(manager)
+            time.sleep(1.5)
+            told = _drain(manager)
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, unlimited)
+            _wait_for(service, process.pid, lambda status: not status.storage.trouble)
+        finally:
+            process.send_signal(signal.SIGTERM)
+            ended = process.wait(timeout=PATIENCE_S)
+            service.close()
+    assert ended == 0
+    assert "WATCHDOG=1" in told
+    assert any("NOT WRITING" in words for words in told)
+    assert full.accelerometer.state == "ok"
+    lines = "\n".join(screen(full, None))
+    assert "but writes NOTHING" in lines
+    assert "rows wait in memory" in lines
+    segments = [record.segment for path in sorted(service.log.glob("*.csv")) for record in read_log(path).records]
+    assert segments == list(range(1, len(segments) + 1))
+    assert len(segments) > full.rows_written + full.storage.rows_waiting
+    assert all(check.ok for check in verify(sorted(service.log.glob("*.csv"))))
+    return found(told=advice(full)[0], waited=full.storage.rows_waiting)
+
+
+def _wait_for(service: KilledService, pid: int, what: Callable[[ServiceStatus], bool]) -> ServiceStatus:
+    until_s = time.monotonic() + PATIENCE_S
+    status = None
+    while time.monotonic() < until_s:
+        status = read_status(service.work / "status.json")
+        if status is not None and status.pid == pid and what(status):
+            return status
+        time.sleep(0.1)
+    raise AssertionError(f"not reached: {status}")
+
+
+def _drain(manager: socket.socket) -> list[str]:
+    """What systemd was told."""
+    told = []
+    try:
+        while True:
+            told.append(manager.recv(1000).decode())
+    except BlockingIOError:
+        return told
+
+
+KILLS = Hazard(
+    "the real service killed (SIGKILL)", f"{SERVICES} services at a time under load (windows of 1 m at 24 m/s, files "
+    "of 10 kB, a raw dump), at any moment from the first import on, each started again in the same folder",
+    "no row that was there or that `ridelog status` had told of is gone, none is missing in between; every finished "
+    "file is good", "{rows.total:.0f} rows left, {rows_told.total:.0f} of them told of before, none gone; "
+    "{torn_tails.total:.0f} torn rows refused, {dumps.total:.0f} dumps cut off", killed_at_random,
+    ((2, 10.0, 1), *((8, 20.0, seed) for seed in range(2, 6))), 1)
+WRITES_NO_MORE = Hazard(
+    "the real service may write no more", "the system limits the size of its files in the middle of a write (EFBIG)",
+    "it stays up, the watchdog is fed, systemd and `status` are told; once it may, every row is written",
+    "{waited.total:.0f} rows waited, all were written", may_write_no_more)

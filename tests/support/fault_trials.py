@@ -1,0 +1,117 @@
+"""Faults, their trials, and the line that each of them gets in the table.
+
+A trial injects its fault in a new folder and asserts what is promised. The tests run a few cases of each fault, the
+bench all of them; both take them from the same lists.
+"""
+
+from __future__ import annotations
+
+import shutil
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a case has shown: how often the fault was injected, figures by name, what ``ridelog status`` told, and
+    promises broken, in words."""
+
+    trials: int = 1
+    figures: dict[str, float] = field(default_factory=dict)
+    told: str = ""
+    wrong: tuple[str, ...] = ()
+
+
+def found(trials: int = 1, told: str = "", **figures: float) -> Found:
+    """The fault was injected so often, and every promise was held."""
+    return Found(trials, figures, told)
+
+
+@dataclass(frozen=True)
+class Hazard:
+    """One line of the table.
+
+    name        what goes wrong
+    injected    how the trial brings it about
+    promised    what is promised then
+    happened    what to say when all was held; ``{x.least}``, ``{x.most}`` and ``{x.total}`` are of the figure x
+    trial       takes a new folder and a case; raises ``AssertionError`` when a promise is broken
+    few         so many cases, spread over all, are for the tests and the short form
+    """
+
+    name: str
+    injected: str
+    promised: str
+    happened: str
+    trial: Callable[[Path, Any], Found]
+    cases: Sequence[Any] = (None,)
+    few: int = 1_000_000
+
+    def some(self) -> Sequence[Any]:
+        """The cases for the tests and the short form."""
+        return self.cases[:: -(-len(self.cases) // self.few)]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One figure over all cases."""
+
+    least: float
+    most: float
+    total: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """What came of a fault. ``told``: by ``ridelog status``; ``wrong``: empty when every promise was held."""
+
+    name: str
+    injected: str
+    promised: str
+    happened: str
+    trials: int
+    figures: dict[str, Spread] = field(default_factory=dict)
+    told: str = ""
+    wrong: tuple[str, ...] = ()
+
+
+def run(hazard: Hazard, cases: Sequence[Any], folder: Path) -> Line:
+    """Every case in a folder of its own below ``folder``."""
+    seen = []
+    for case in cases:
+        place = folder / "case"
+        place.mkdir()
+        try:
+            seen.append(hazard.trial(place, case))
+        except AssertionError as broken:
+            seen.append(Found(wrong=(f"case {case}: {_words(broken)}",)))
+        shutil.rmtree(place)
+    wrong = tuple(words for one in seen for words in one.wrong)
+    figures = {}
+    for name in dict.fromkeys(name for one in seen for name in one.figures):
+        values = [one.figures[name] for one in seen if name in one.figures]
+        figures[name] = Spread(min(values), max(values), sum(values))
+    happened = hazard.happened.format(**figures) if not wrong else f"**BROKEN**: {'; '.join(wrong[:3])}"
+    told = next((one.told for one in seen if one.told), "")
+    trials = sum(one.trials for one in seen)
+    return Line(hazard.name, hazard.injected, hazard.promised, happened, trials, figures, told, wrong)
+
+
+def _words(broken: AssertionError) -> str:
+    """The promise that was broken: its own words, or the line that asserts it."""
+    return str(broken) or str(traceback.extract_tb(broken.__traceback__)[-1].line)
+
+
+def cases_for_tests(hazards: Sequence[Hazard]) -> list[tuple[Hazard, Any]]:
+    """Each fault with each of its few cases."""
+    return [(hazard, case) for hazard in hazards for case in hazard.some()]
+
+
+def label(value: object) -> str:
+    """How pytest is to name a fault or a case; the same in every process."""
+    if isinstance(value, tuple):
+        return "-".join(map(label, value))
+    return str(getattr(value, "name", getattr(value, "__name__", value)))
