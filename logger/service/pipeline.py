@@ -9,7 +9,7 @@ is known, over a short loss bridged, and when no fix has come for longer than th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import hypot, isfinite
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from logger.units import US_PER_S
 
 FIX_DELAY_US = 3_000_000
 SHORT_WINDOW_SHARE = 0.5
+# Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.
+BRIDGED_ERROR = 0.2
 _BLIND = -1
 
 
@@ -208,7 +210,7 @@ class Pipeline:
             lon_deg=place[1] if place else None,
             speed_mps=_known(window.speed_mps),
             iri_m_per_km=iri,
-            iri_std_m_per_km=_known(estimate.iri_std_m_per_km) if estimate is not None else None,
+            iri_std_m_per_km=_iri_std(estimate, "gps_lost" in flags) if estimate is not None else None,
             iri_rms_m_per_km=self._iri_by_rms(window, flags),
             a_w_mps2=_known(window.a_w_mps2),
             mtvv_mps2=_known(window.mtvv_mps2),
@@ -241,6 +243,12 @@ class Pipeline:
         if window.start_m is None or window.end_m is None:
             return None
         return self.odometer.place(0.5 * (window.start_m + window.end_m), window.leg)
+
+
+def _iri_std(estimate: WindowEstimate, is_bridged: bool) -> float | None:
+    """Standard error of the IRI [m/km]; where the speed was only carried through a loss of fix, with what that costs."""
+    bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_bridged else 0.0
+    return _known(hypot(estimate.iri_std_m_per_km, bridging))
 
 
 def _known(value: float) -> float | None:

@@ -31,13 +31,14 @@ class RoughnessQueue:
     def __init__(self, estimator: RoadEstimator) -> None:
         self._estimator = estimator
         self._queue: deque[Waiting] = deque()
-        self._estimates: dict[int, WindowEstimate] = {}
+        self._estimates: dict[tuple[int, int], WindowEstimate] = {}
         self._leg: int | None = None
         self._expected = -1
 
     def read(self, samples: GridSamples, distance_m: npt.NDArray[np.float64], leg: int) -> None:
         """Samples of one leg with their travelled distance [m]; the leg before has ended (``end_leg``)."""
-        self._leg = leg
+        if leg != self._leg:
+            self._leg, self._expected = leg, -1
         estimates = self._estimator.push(
             samples.reading_mps2,
             samples.present & ~samples.interpolated,
@@ -49,7 +50,7 @@ class RoughnessQueue:
     def end_leg(self) -> None:
         """What the estimator still holds comes out; what it never saw to its end has no estimate."""
         self._take(self._estimator.finish())
-        self._leg = None
+        self._leg = None  # what waits from here on has no estimate to wait for
 
     def add(self, waiting: list[Waiting]) -> None:
         """Windows that have ended, in order."""
@@ -60,15 +61,16 @@ class RoughnessQueue:
         done = []
         while self._queue and self._has_settled(self._queue[0].window):
             waiting = self._queue.popleft()
-            whole = _is_whole(waiting.window)
-            done.append((waiting, self._estimates.pop(waiting.window.number, None) if whole else None))
+            key = (waiting.window.leg, waiting.window.number)
+            done.append((waiting, self._estimates.pop(key, None) if _is_whole(waiting.window) else None))
         if not self._queue:
             self._estimates.clear()
         return done
 
     def _take(self, estimates: list[WindowEstimate]) -> None:
         for estimate in estimates:
-            self._estimates[estimate.number] = estimate
+            if self._leg is not None:
+                self._estimates[self._leg, estimate.number] = estimate
             self._expected = estimate.number + 1
 
     def _has_settled(self, window: Window) -> bool:
