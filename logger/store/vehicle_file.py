@@ -23,6 +23,19 @@ _AXLE_KEYS = (
 )
 _ANTI_ROLL_KEY = "anti_roll_stiffness_n_m_per_rad"
 _FARTHEST_M = 10.0  # no sensor is bolted farther from its car's centre of gravity
+# What a number may be. Most scale with the body, so that they are limited per kilogram of sprung mass: a car, a lorry
+# and the Golden Car, whose numbers are given for 1 kg, fit; the same numbers in g, t, mm, kN/m or kN s/m do not.
+_LIMITS: Mapping[str, tuple[float, float]] = {
+    "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.2, 5.0), "cg_distance_m": (0.0, 20.0),
+    "contact_patch_m": (0.0, 1.0),
+}
+_LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
+    "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
+    "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
+    "tire_stiffness_n_per_m": (5.0, 50_000.0), _ANTI_ROLL_KEY: (0.01, 10_000.0),
+}
+_MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
+_SHORTEST_WHEELBASE_M = 0.1
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
@@ -31,7 +44,8 @@ def read_vehicle(path: Path | str) -> Vehicle:
     A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
     has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
     an axle that has an anti-roll bar, ``anti_roll_stiffness_n_m_per_rad``. Any car may say where its accelerometer
-    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference.
+    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference. Numbers that no car has,
+    such as those in other units, are wrong too.
     """
     top = load_mapping(path)
     model_node = top.mapping().get("model")
@@ -41,37 +55,49 @@ def read_vehicle(path: Path | str) -> Vehicle:
     keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects"))
     if "effects" in keys and keys["effects"].items():
         raise keys["effects"].wrong("an empty list (effects are not supported yet)")
+    mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
+    front = _read_axle(keys["front"], model, mass_kg)
+    rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
+    if rear is not None and front.cg_distance_m + rear.cg_distance_m < _SHORTEST_WHEELBASE_M:
+        distance = keys["rear"].mapping()["cg_distance_m"]
+        raise distance.wrong(f"axles at least {_SHORTEST_WHEELBASE_M:g} m apart")
+    body = {key: _number_of(keys, key, mass_kg)
+            for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
     return Vehicle(
         name=keys["name"].text(),
         model=model,
-        sprung_mass_kg=keys["sprung_mass_kg"].number(above=0),
-        pitch_inertia_kg_m2=_optional_number(keys, "pitch_inertia_kg_m2"),
-        front=_read_axle(keys["front"], model),
-        rear=_read_axle(keys["rear"], model) if "rear" in keys else None,
-        contact_patch_m=keys["contact_patch_m"].number(low=0, high=1),
-        roll_inertia_kg_m2=_optional_number(keys, "roll_inertia_kg_m2"),
-        track_width_m=_optional_number(keys, "track_width_m"),
+        sprung_mass_kg=mass_kg,
+        pitch_inertia_kg_m2=body.get("pitch_inertia_kg_m2"),
+        front=front,
+        rear=rear,
+        contact_patch_m=_number_of(keys, "contact_patch_m", mass_kg),
+        roll_inertia_kg_m2=body.get("roll_inertia_kg_m2"),
+        track_width_m=body.get("track_width_m"),
         sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
     )
 
 
-def _optional_number(keys: Mapping[str, Node], key: str) -> float | None:
-    return keys[key].number(above=0) if key in keys else None
+def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> float:
+    """The number of a key, within its limits."""
+    node = keys[key]
+    if key in _LIMITS:
+        low, high = _LIMITS[key]
+        return node.number(low=low, high=high)
+    value = node.number(low=0)
+    low, high = (limit * sprung_mass_kg for limit in _LIMITS_PER_KG[key])
+    none = key in _MAY_BE_MISSING
+    if low <= value <= high or (none and value == 0):
+        return value
+    raise node.wrong(f"a number from {low:g} to {high:g}{' or 0' if none else ''}, for {sprung_mass_kg:g} kg on the "
+                     "springs")
 
 
-def _read_axle(node: Node, model: str) -> Axle:
+def _read_axle(node: Node, model: str, sprung_mass_kg: float) -> Axle:
     keys = node.mapping(
         required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
         optional=(_ANTI_ROLL_KEY,) if model == "full_car" else (),
     )
-    return Axle(
-        cg_distance_m=keys["cg_distance_m"].number(low=0) if "cg_distance_m" in keys else 0.0,
-        unsprung_mass_kg=keys["unsprung_mass_kg"].number(above=0),
-        suspension_stiffness_n_per_m=keys["suspension_stiffness_n_per_m"].number(above=0),
-        suspension_damping_n_s_per_m=keys["suspension_damping_n_s_per_m"].number(low=0),
-        tire_stiffness_n_per_m=keys["tire_stiffness_n_per_m"].number(above=0),
-        anti_roll_stiffness_n_m_per_rad=keys[_ANTI_ROLL_KEY].number(low=0) if _ANTI_ROLL_KEY in keys else 0.0,
-    )
+    return Axle(**{"cg_distance_m": 0.0} | {key: _number_of(keys, key, sprung_mass_kg) for key in keys})
 
 
 def _read_sensor(node: Node, model: str) -> SensorPlace:

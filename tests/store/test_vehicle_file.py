@@ -87,13 +87,25 @@ def test_a_sensor_at_the_centre_of_gravity_may_be_written_out(tmp_path: Path) ->
     assert read_vehicle(tmp_path / "q.yaml").sensor == SensorPlace(0.0, 0.0)
 
 
-positive = st.floats(1e-300, 1e300)
-axles = st.builds(Axle, st.just(0.0), positive, positive, st.floats(0, 1e300), positive)
+per_kg = st.floats(0.01, 5)
+
+
+@st.composite
+def axles(draw: st.DrawFn, mass_kg: float) -> Axle:
+    each = [draw(per_kg) * mass_kg * factor for factor in (0.1, 100, draw(st.sampled_from([0, 1])), 1000)]
+    return Axle(0.0, *each)
+
+
 names = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), min_size=1)
-cars = st.builds(
-    Vehicle, names, st.sampled_from(list(MODELS)), positive, positive, axles, axles, st.floats(0, 1), positive,
-    positive, st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10)),
-)
+places = st.builds(SensorPlace, st.floats(-10, 10), st.floats(-10, 10))
+
+
+@st.composite
+def cars(draw: st.DrawFn) -> Vehicle:
+    mass_kg = draw(st.floats(1, 1e5))
+    pitch, roll = draw(per_kg) * mass_kg, draw(per_kg) * mass_kg
+    return Vehicle(draw(names), draw(st.sampled_from(list(MODELS))), mass_kg, pitch, draw(axles(mass_kg)),
+                   draw(axles(mass_kg)), draw(st.floats(0, 1)), roll, draw(st.floats(0.2, 5)), draw(places))
 
 
 def as_its_model_knows_it(car: Vehicle) -> Vehicle:
@@ -105,10 +117,10 @@ def as_its_model_knows_it(car: Vehicle) -> Vehicle:
     car = replace(car, front=replace(car.front, cg_distance_m=1.1), rear=replace(car.rear, cg_distance_m=1 / 3))
     if car.model == "half_car":
         return replace(car, roll_inertia_kg_m2=None, track_width_m=None, sensor=replace(car.sensor, left_m=0.0))
-    return replace(car, front=replace(car.front, anti_roll_stiffness_n_m_per_rad=1e4 / 7))
+    return replace(car, front=replace(car.front, anti_roll_stiffness_n_m_per_rad=car.sprung_mass_kg / 7))
 
 
-@given(cars)
+@given(cars())
 @settings(deadline=None, max_examples=60)
 def test_a_written_vehicle_is_read_back_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, car: Vehicle) -> None:
     path = tmp_path_factory.getbasetemp() / "written.yaml"
@@ -142,9 +154,9 @@ def test_a_shipped_vehicle_names_itself_its_sources_and_its_frequencies(name: st
 
 
 @pytest.mark.parametrize(("old", "new", "at", "words"), [
-    ("sprung_mass_kg: 875", "sprung_mass_kg: heavy", "sprung_mass_kg", "a number greater than 0, found 'heavy'"),
+    ("sprung_mass_kg: 875", "sprung_mass_kg: heavy", "sprung_mass_kg", "a number from 1 to 100000, found 'heavy'"),
     ("sprung_mass_kg: 875", "sprung_mass_kg: '875'", "sprung_mass_kg", "expected a number"),
-    ("sprung_mass_kg: 875", "sprung_mass_kg: -1", "sprung_mass_kg", "greater than 0"),
+    ("sprung_mass_kg: 875", "sprung_mass_kg: -1", "sprung_mass_kg", "from 1 to 100000"),
     ("sprung_mass_kg: 875", "sprung_mass_kg: .nan", "sprung_mass_kg", "expected a number"),
     ("sprung_mass_kg: 875", "sprung_mass_kg: 1e999", "sprung_mass_kg", "expected a number"),
     ("sprung_mass_kg: 875", "sprung_mass_kg: [875]", "sprung_mass_kg", "found a list"),
@@ -168,6 +180,57 @@ def test_complaints_name_the_line(tmp_path: Path, old: str, new: str, at: str, w
     message = complaint(tmp_path, text)
     assert message.startswith(f"{line_of(text, at)}: expected")
     assert words in message
+
+
+WRONG_UNITS = {
+    "sprung_mass_kg": (1e3, 1e-3), "pitch_inertia_kg_m2": (1e3, 1e-3, 1e6), "roll_inertia_kg_m2": (1e3, 1e-3, 1e6),
+    "track_width_m": (1e3, 1e2), "cg_distance_m": (1e3, 1e2), "unsprung_mass_kg": (1e3, 1e-3),
+    "suspension_stiffness_n_per_m": (1e-3,), "suspension_damping_n_s_per_m": (1e-3,), "tire_stiffness_n_per_m": (1e-3,),
+    "contact_patch_m": (1e3, 1e2),
+}
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_other_units_are_told_from_those_of_the_format(tmp_path: Path, name: str) -> None:
+    """Every number of every car that comes with ridelog, in g, t, mm, cm, kN/m, kN s/m."""
+    lines = vehicle_file(name).read_text("utf-8").splitlines()
+    tried = 0
+    for number, line in enumerate(lines, 1):
+        key, _, value = line.split("#")[0].partition(":")
+        for factor in WRONG_UNITS.get(key.strip(), ()):
+            changed = [*lines[: number - 1], f"{key}: {float(value) * factor:.6g}", *lines[number:]]
+            message = complaint(tmp_path, "\n".join(changed))
+            if key == "sprung_mass_kg" and factor < 1:  # 1.75 t are 1.75 kg, with the springs of a car
+                assert "kg on the springs" in message or message.startswith(f"{number}: ")
+            else:
+                assert message.startswith(f"{number}: expected a number from ")
+            tried += 1
+    assert tried >= 9
+
+
+def test_the_golden_car_for_one_kilogram_is_a_car(tmp_path: Path) -> None:
+    axle = Axle(0.0, 0.15, 63.3, 6.0, 653.0)
+    write_vehicle(tmp_path / "g.yaml", Vehicle("golden", "quarter_car", 1.0, None, axle, None, 0.25))
+    assert read_vehicle(tmp_path / "g.yaml").front == axle
+
+
+@pytest.mark.parametrize(("key", "values"), [
+    ("sprung_mass_kg", ("1e308", "1e-300", "0")), ("cg_distance_m", ("1e6",)),
+    ("suspension_stiffness_n_per_m", ("1e300", "0")), ("suspension_damping_n_s_per_m", ("-1", "1e-9")),
+])
+def test_numbers_that_no_car_has(tmp_path: Path, key: str, values: tuple[str, ...]) -> None:
+    for value in values:
+        text = re.sub(rf"{key}: [0-9.]+", f"{key}: {value}", TEXT, count=1)
+        message = complaint(tmp_path, text)
+        at = next(number for number, line in enumerate(text.splitlines(), 1) if key in line)
+        assert message.startswith(f"{at}: expected a number ")
+        assert message.endswith(f"found '{value}'")
+
+
+def test_both_axles_at_the_centre_of_gravity_are_no_car(tmp_path: Path) -> None:
+    text = TEXT.replace("cg_distance_m: 1.47", "cg_distance_m: 0")
+    at = max(number for number, line in enumerate(text.splitlines(), 1) if "cg_distance_m" in line)
+    assert complaint(tmp_path, text) == f"{at}: expected axles at least 0.1 m apart, found '0'"
 
 
 def test_missing_keys_are_named_with_the_place_they_belong(tmp_path: Path) -> None:

@@ -399,7 +399,7 @@ def vehicle(folder: Path) -> Target:
     half = (b"name: x\nmodel: half_car\nsprung_mass_kg: 875\npitch_inertia_kg_m2: 1100\nfront: " + axle
             + b"\nrear: " + axle + b"\ncontact_patch_m: 0.25\neffects: []\n")
     block = half.replace(b"front: " + axle, b"front:\n  " + axle[1:-1].replace(b", ", b"\n  "))
-    quarter = (b"name: q\nmodel: quarter_car\nsprung_mass_kg: 1\nfront: {" + axle[20:]
+    quarter = (b"name: q\nmodel: quarter_car\nsprung_mass_kg: 400\nfront: {" + axle[20:]
                + b"\ncontact_patch_m: 0\nsensor: {ahead_m: 0}\n")
     full = half.replace(b"half_car", b"full_car") + b"roll_inertia_kg_m2: 3\ntrack_width_m: 1.5\n"
     file, copy = _File(folder, "car.yaml"), folder / "copy.yaml"
