@@ -88,9 +88,9 @@ def keep(paths: Sequence[Path], key: str, speeds: tuple[SpeedCalibration, ...]) 
 
 
 def _cache_folder() -> Path:
-    """XDG Base Directory Specification: a relative path in the variable is to be ignored."""
+    """XDG Base Directory Specification: a relative path in the variable is to be ignored, an empty one is none."""
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (given if given.is_absolute() else Path(os.environ.get("HOME", "/")) / ".cache") / "ridelog"
+    return (given if given.is_absolute() else Path(os.environ.get("HOME") or "/") / ".cache") / "ridelog"
 
 
 def _read(path: Path) -> dict[str, tuple[SpeedCalibration, ...]]:

@@ -133,3 +133,7 @@ def test_beside_the_vehicle_or_in_the_cache(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setenv("XDG_CACHE_HOME", "relative/is/ignored")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert places(mine)[1].parent == tmp_path / "home" / ".cache" / "ridelog"
+    monkeypatch.setenv("HOME", "")
+    assert places(mine)[1].parent == Path("/.cache/ridelog")
+    monkeypatch.delenv("HOME")
+    assert places(mine)[1].parent == Path("/.cache/ridelog")
