@@ -9,9 +9,10 @@ Solution: such a method only proposes poles. What is believed and reported comes
 
 fitted by least squares, which for white noise attains the Cramer-Rao bound. Proposals are taken in one by one, the one
 that explains most first, as long as it explains more than the largest of a thousand draws of noise would; after each
-the poles of all are refitted. Amplitudes are linear and are eliminated (variable projection, Golub and Pereyra, 1973),
-which leaves two unknowns per mode and makes a step cheap however many channels there are. Standard errors follow from
-the same matrices; noise that is louder around a mode than elsewhere enlarges them.
+the poles of all are refitted, and the poles of each smaller order are tried as a start too. Amplitudes are linear and
+are eliminated (variable projection, Golub and Pereyra, 1973), which leaves two unknowns per mode and makes a step cheap
+however many channels there are. Standard errors follow from the same matrices; noise that is louder around a mode than
+elsewhere enlarges them.
 """
 
 from __future__ import annotations
@@ -71,6 +72,7 @@ def decay_modes(samples: Array, rate_hz: float, propose: Propose, how: str) -> M
     diagram = propose(scaled, rate_hz)
     threshold = _threshold(*samples.shape)
     fit = _take_in(_solve(scaled, np.empty(0, complex), rate_hz), scaled, diagram, rate_hz, threshold)
+    fit = _fewer(fit, scaled, diagram, rate_hz, threshold)
     if len(fit.poles):  # what strong modes hid
         hidden = propose(fit.residual, rate_hz)
         fit = _take_in(fit, scaled, hidden, rate_hz, threshold)
@@ -198,6 +200,27 @@ def _different(poles: Complex) -> Complex:
     poles = poles[(ratios > _LEAST_DAMPING) & (ratios < _MOST_DAMPING)]
     cells = np.round(np.log(poles) / _ALIKE)
     return np.asarray(poles[np.unique(cells, return_index=True)[1]])
+
+
+def _fewer(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
+    """The same or better with the poles of one order for a start.
+
+    Modes that overlap, as heavily damped ones do, can lead one at a time into a fit with more poles than there are.
+    """
+    best = fit
+    for found in diagram:
+        poles = _different(found.poles)
+        if not 0 < len(poles) <= len(fit.poles):
+            continue
+        trial = _refit(_solve(samples, poles, rate_hz), samples, rate_hz)
+        if _price(trial, threshold) < _price(best, threshold):
+            best = trial
+    return best
+
+
+def _price(fit: _Fit, threshold: float) -> float:
+    """Cost of a fit and its modes; one that nobody would believe is dear."""
+    return fit.cost + threshold * len(fit.poles) + (1e300 if (damping_ratio(fit.poles) > _MOST_DAMPING).any() else 0.0)
 
 
 def _gains(fit: _Fit, waves: Array) -> Array:
