@@ -33,6 +33,9 @@ _MOST_SAMPLES = 5_000_000
 AFTER_S = 1.0
 """How long a drive at one speed goes on after the last wheel has left the profile."""
 OBSTACLE_SPACING_M = 0.01
+_LARGEST_M = 10_000.0  # of an obstacle
+_NEARLY = 1e-6  # of a step: what rounding may do
+_FEWEST_STEPS = 2  # of the road, that an obstacle spans
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
 OUTPUTS = ("wheels", "travel", "tires", "body")
 
@@ -225,10 +228,30 @@ def _with_obstacles(track: Track, wanted: list[str]) -> Track:
         if not needed <= set(parameters) <= {one.name for one in known}:
             raise BadInput(f"--obstacle {text}: expected {name}:{','.join(f'{one.name}=M' for one in known)}")
         try:
-            dense += OBSTACLES[name](distance, **parameters)[:, None]
+            _check_place(parameters, distance)
+            added = OBSTACLES[name](distance, **parameters)
         except ValueError as error:
             raise BadInput(f"--obstacle {text}: {error}") from None
+        if added.all():
+            raise BadInput(f"--obstacle {text}: expected some road before it, from {track.start_m:g} m on")
+        dense += added[:, None]
     return Track(track.spacing_m / parts, dense.reshape(count, *track.elevation_m.shape[1:]), track.start_m)
+
+
+def _check_place(parameters: dict[str, float], distance_m: Array) -> None:
+    """ValueError for an obstacle that is too large, not all on the road, or lost between the samples of the road."""
+    for name, value in parameters.items():
+        if name != "start_m" and abs(value) > _LARGEST_M:
+            raise ValueError(f"expected {name} within {_LARGEST_M:g} m, found {value:g}")
+    first_m, last_m = float(distance_m[0]), float(distance_m[-1])
+    step_m = (last_m - first_m) / (len(distance_m) - 1)
+    start_m = parameters["start_m"]
+    extent_m = parameters.get("width_m", parameters.get("length_m"))
+    end_m = start_m + (extent_m or 0.0)
+    if start_m < first_m - _NEARLY * step_m or end_m > last_m + _NEARLY * step_m:
+        raise ValueError(f"expected it on the road, {first_m:g} to {last_m:g} m, found {start_m:g} to {end_m:g} m")
+    if extent_m is not None and 0 < extent_m < (_FEWEST_STEPS - _NEARLY) * step_m:
+        raise ValueError(f"expected it to be {_FEWEST_STEPS * step_m:g} m long or more, found {extent_m:g} m")
 
 
 # --- the drive ---

@@ -29,6 +29,7 @@ SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
 MAX_SPEED_MPS = 150.0
+_MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
 _LINES_AT_ONCE = 50_000
 _HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}], each once"
 
@@ -97,7 +98,8 @@ def read_drive(path: Path | str) -> Drive:
 def read_speeds(path: Path | str) -> tuple[Array, Array]:
     """Times [s], growing, and speeds [m/s] at them out of the columns ``t_s`` and ``speed_mps``.
 
-    Raises BadInput ("file:line: expected ..., found ...") for anything else, and for a speed below 0.
+    Raises BadInput ("file:line: expected ..., found ...") for anything else, for a speed below 0, and for times beyond
+    1e5 s.
     """
     header, file = (TIME, SPEED), str(path)
     _, table = parse_columns(
@@ -108,6 +110,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two times, found the end of the file")
     time_s, speed_mps = table.T.copy()
+    _check_size(time_s, TIME, _MAX_TIME_S, "s", file)
     if (back := np.diff(time_s) <= 0).any():
         row = int(np.argmax(back)) + 1
         raise BadInput(f"{file}:{row + 2}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")

@@ -105,10 +105,10 @@ def test_an_obstacle_on_a_flat_road_and_the_road_as_driven(tmp_path: Path) -> No
 
 def test_an_obstacle_leaves_the_road_around_it_as_it_was(folder: Path) -> None:
     path = folder / "with.csv"
-    simulated(folder, "--speed", "9", "--obstacle", "step:start_m=200,height_m=1", "--profile-out", str(path))
+    simulated(folder, "--speed", "9", "--obstacle", "step:start_m=100,height_m=1", "--profile-out", str(path))
     distance, elevation = np.loadtxt(path, delimiter=",", skiprows=1).T
     x = 30 + 0.05 * np.arange(len(ROAD.elevation_m))
-    assert elevation == pytest.approx(np.interp(distance, x, ROAD.elevation_m), abs=2e-7)
+    assert elevation - (distance >= 100 - 1e-9) == pytest.approx(np.interp(distance, x, ROAD.elevation_m), abs=2e-7)
 
 
 def test_other_points_as_further_columns(folder: Path) -> None:
@@ -155,19 +155,45 @@ def refusal(folder: Path, *arguments: str) -> str:
     (("--speed", "20", "--output", "body:ahead_m=x"), "--output body:ahead_m=x: expected PARAM=NUMBER, found 'ahead"),
     (("--speed", "20", "--obstacle", "wall"), "--obstacle wall: expected one of bump, plate, pothole, ramp, step"),
     (("--speed", "20", "--obstacle", "step:start_m=1"), "--obstacle step:start_m=1: expected step:start_m=M,height_m"),
-    (("--speed", "20", "--obstacle", BUMP.replace("3.6", "0")), f"--obstacle {BUMP.replace('3.6', '0')}: expected a"),
+    (("--speed", "20", "--obstacle", "bump:start_m=40,height_m=1,width_m=0"), "--obstacle bump:start_m=40,height_m=1,"),
     (("--speed", "20", "--obstacle", "ramp:start_m=1,height_m=1,length_m=0"), "--obstacle ramp:start_m=1,height_m=1,"),
 ])
 def test_wrong_use_is_one_line(folder: Path, arguments: tuple[str, ...], complaint: str) -> None:
     assert refusal(folder, *arguments).startswith(complaint)
 
 
+@pytest.mark.parametrize(("obstacle", "complaint"), [
+    ("bump:start_m=29,height_m=0.08,width_m=3.6", "expected it on the road, 30 to 130 m, found 29 to 32.6 m"),
+    ("bump:start_m=128,height_m=0.08,width_m=3.6", "expected it on the road, 30 to 130 m, found 128 to 131.6 m"),
+    ("step:start_m=1e300,height_m=0.1", "expected it on the road, 30 to 130 m, found 1e+300 to 1e+300 m"),
+    ("step:start_m=30,height_m=0.1", "expected some road before it, from 30 m on"),
+    ("step:start_m=60,height_m=1e300", "expected height_m within 10000 m, found 1e+300"),
+    ("pothole:start_m=60,depth_m=-20000,length_m=1", "expected depth_m within 10000 m, found -20000"),
+    ("bump:start_m=60,height_m=0.1,width_m=0.001", "expected it to be 0.02 m long or more, found 0.001 m"),
+    ("plate:start_m=60,height_m=0.1,length_m=0.005", "expected it to be 0.02 m long or more, found 0.005 m"),
+])
+def test_an_obstacle_that_would_not_be_met_is_refused(folder: Path, obstacle: str, complaint: str) -> None:
+    assert refusal(folder, "--speed", "20", "--obstacle", obstacle) == f"--obstacle {obstacle}: {complaint}"
+
+
+def test_an_obstacle_may_reach_to_the_ends_of_the_road(tmp_path: Path) -> None:
+    assert main(["simulate", "--vehicle", "golden-car", "--flat", "60", "--speed", "20",
+                 "--obstacle", "bump:start_m=0,height_m=0.08,width_m=3.6",
+                 "--obstacle", "bump:start_m=59.98,height_m=0.08,width_m=0.02",
+                 "--out", str(tmp_path / "d.csv"), "--profile-out", str(tmp_path / "p.csv")]) == 0
+    elevation = np.loadtxt(tmp_path / "p.csv", delimiter=",", skiprows=1)[:, 1]
+    assert elevation[[180, 5999]] == pytest.approx(0.08)
+
+
 def test_files_that_will_not_do(folder: Path) -> None:
     speeds = folder / "speeds.csv"
     speeds.write_text("t_s,speed_mps\n0,1\n0,1\n")
     assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:3: expected a time after 0 s")
-    speeds.write_text("t_s,speed_mps\n0,1\n1e9,1\n")
-    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 1e+09 s")
+    speeds.write_text("t_s,speed_mps\n0,1\n9e4,1\n")
+    assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 90000 s")
+    for first, then, line in (("1e17", "1.0000000000000001e17", 2), ("0", "1e9", 3)):
+        speeds.write_text(f"t_s,speed_mps\n{first},1\n{then},1\n")
+        assert refusal(folder, "--speed-file", str(speeds)).startswith(f"{speeds}:{line}: expected t_s within 100000 s")
     speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
     assert refusal(folder, "--speed-file", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
     assert "expected every file to be another one" in refusal(
