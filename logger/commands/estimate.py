@@ -19,6 +19,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from logger.estimation.road_profile import RoadProfile
     from logger.estimation.whole_drive import Windows
     from logger.roads.track import Array, Track
+    from logger.store.drive_file import Drive
     from logger.vehicle.vehicle import Vehicle
 
 NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
@@ -41,6 +44,10 @@ _SLOWEST_RATE_HZ = 80.0
 _SPEED_CLASS_MPS = 5.0
 _NEARLY = 1e-6
 _FAR_ABOVE = 1.5
+_WAYS_DIFFER = 0.1
+_LEAST_WAY_M = 10.0  # over less, a distance from GPS may well differ from the integral of the speed
+_MOVING_MPS = 1.0
+_G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,13 +79,38 @@ def run(args: argparse.Namespace) -> int:
                                          ("--window", window_m, 1.0, 1000.0, "m")):
         if not low <= value <= high:
             raise BadInput(f"{name} {value:g}: expected {low:g} to {high:g} {unit}")
-    vehicle = read_vehicle(vehicle_path(args.vehicle))
+    vehicle_yaml = vehicle_path(args.vehicle)
+    vehicle = read_vehicle(vehicle_yaml)
+    _check_files(args, vehicle_yaml)
     result = estimate(args.run, vehicle, args.noise, args.step, window_m)
     files = [] if args.profile_out is None else _write_road(args.profile_out, result)
     if args.out is not None:
         args.out.write_text("".join(_csv(result)), encoding="ascii")
     print(json.dumps(as_json(result, files), allow_nan=False) if args.json else "\n".join(screen(result, files)))
+    if args.profile_out is not None and not files:
+        print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "
+              "longest of them", file=sys.stderr if args.json else sys.stdout)
     return EXIT_DONE
+
+
+def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
+    """Raise BadInput where a file to write is one that is read, or another one to write."""
+    from logger.store.drive_file import DRIVE, PROFILE
+
+    taken = {path.resolve() for path in (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)}
+    for option, path in (("--out", args.out), ("--profile-out", args.profile_out)):
+        if path is not None:
+            if path.resolve() in taken:
+                raise BadInput(f"{option} {path}: expected every file to be another one")
+            taken.add(path.resolve())
+    if args.profile_out is None:
+        return
+    folder = args.profile_out.parent.resolve()
+    beside = {path for path in taken if path.parent == folder} | set(folder.iterdir() if folder.is_dir() else ())
+    part = re.compile(rf"{re.escape(args.profile_out.stem)}-[1-9][0-9]*{re.escape(args.profile_out.suffix)}")
+    if clash := [path for path in beside if part.fullmatch(path.name) and path.resolve() in taken]:
+        raise BadInput(f"--profile-out {args.profile_out}: expected another name, its parts could be written over "
+                       f"{clash[0]}")
 
 
 # --- the drive ---
@@ -110,6 +142,7 @@ def read_estimable(run: Path) -> Estimable:
         raise BadInput(f"{drive.path}: expected at least {_SLOWEST_RATE_HZ:g} samples a second, "
                        f"found {drive.rate_hz:.4g}")
     _check_way(drive.distance_m, MAX_SPEED_MPS / drive.rate_hz, str(drive.path))
+    _check_speed(drive)
     if (np.diff(drive.distance_m) >= 0).all():
         return Estimable(drive.rate_hz, drive.accel_z_mps2, drive.distance_m, 0.0)
     relaid = laid_anew(drive.distance_m, drive.speed_mps, drive.rate_hz)
@@ -127,6 +160,21 @@ def _check_way(distance_m: Array, longest_m: float, file: str) -> None:
         limit = (f"at most {BACK_M:g} m before the farthest yet, {distance_m[:row].max():.10g} m" if back[row]
                  else f"at most {longest_m + BACK_M:.4g} m after {distance_m[row - 1]:.10g} m")
         raise BadInput(f"{file}:{row + 2}: expected a distance {limit}, found {distance_m[row]:.10g}")
+
+
+def _check_speed(drive: Drive) -> None:
+    """Refuse a speed that does not go with the distance, such as one in km/h."""
+    import numpy as np
+
+    speed = np.abs(drive.speed_mps)
+    way_m = float(drive.distance_m[-1] - drive.distance_m[0])
+    integral_m = float(np.sum(speed[1:] + speed[:-1])) / 2 / drive.rate_hz
+    larger_m = max(way_m, integral_m)
+    if larger_m > _LEAST_WAY_M and abs(way_m - integral_m) > _WAYS_DIFFER * larger_m:
+        factor = f"{integral_m / way_m:.3g}" if way_m > 0 else "infinitely many"
+        raise BadInput(f"{drive.path}: expected speed_mps and distance_m to agree within {_WAYS_DIFFER:.0%}, found "
+                       f"{integral_m:.4g} m by speed_mps, {factor} times the {way_m:.4g} m of distance_m (km/h would "
+                       "give 3.6)")
 
 
 # --- what is found ---
@@ -192,15 +240,12 @@ def _driven(track: Track, vehicle: Vehicle) -> Array:
 
 
 def _write_road(path: Path, result: Result) -> list[Path]:
-    """The parts of the profile, each a file of its own."""
+    """The parts of the profile, each a file of its own; none where the readings do not make one."""
     from logger.roads.track import Track
     from logger.store.drive_file import write_profile
 
-    if result.road is None or not result.road.parts:
-        raise BadInput(f"--profile-out {path}: expected readings that tell wavelengths, over a stretch longer than the "
-                       f"longest, and {result.run} has none")
-    files = []
-    for number, part in enumerate(result.road.parts, start=1):
+    files: list[Path] = []
+    for number, part in enumerate(result.road.parts if result.road else (), start=1):
         file = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
         write_profile(file, Track(part.spacing_m, part.elevation_m, part.start_m))
         files.append(file)
@@ -316,6 +361,8 @@ def screen(result: Result, files: list[Path]) -> list[str]:
     if told["distance_relaid_m"]:
         lines.append("The distance went back here and there: laid anew by the speed, "
                      f"{told['distance_relaid_m']:.2f} m off at most.")
+    if hint := _unit_hint(result):
+        lines.append(hint)
     if not told["answered_count"]:
         return [*lines, f"No IRI: {_unanswered(told) or 'not one whole window was driven'}"]
     limit = told["limit"]
@@ -333,6 +380,23 @@ def screen(result: Result, files: list[Path]) -> list[str]:
                      "vehicle and this noise explain.")
     lines += ["", *_table(told)]
     return lines + [f"Profile: {file}" for file in files]
+
+
+def _unit_hint(result: Result) -> str:
+    """What makes one doubt that the readings on the way are in m/s2; empty if nothing does."""
+    import numpy as np
+
+    drive = result.drive
+    moving = np.diff(drive.distance_m, prepend=drive.distance_m[0]) * drive.rate_hz > _MOVING_MPS
+    if not moving.any():
+        return ""
+    mean, rms = float(drive.accel_z_mps2[moving].mean()), float(drive.accel_z_mps2[moving].std())
+    if abs(abs(mean) - 1) < _G_NEAR and rms < _G_CALM_MPS2:
+        return f"Acceleration in g? On the way it is {mean:.2f} on the mean and {rms:.3g} r.m.s. about it."
+    if rms < result.noise_mps2:
+        return (f"Acceleration in g? On the way it is {rms:.3g} r.m.s., less than the noise of {result.noise_mps2:g} "
+                "(--noise).")
+    return ""
 
 
 def _unanswered(told: dict[str, Any]) -> str:

@@ -178,8 +178,82 @@ def test_a_drive_without_a_window(speed_mps: float, tmp_path: Path, capsys: pyte
     assert (result["window_count"], result["answered_count"], result["windows"]) == (0, 0, [])
     assert main(["estimate", str(drive), "--vehicle", CAR, "--out", str(tmp_path / "w.csv")]) == 0
     assert "No IRI: not one whole window was driven" in capsys.readouterr().out
-    with pytest.raises(BadInput, match=r"--profile-out .*p.csv: expected readings that tell wavelengths"):
-        main(["estimate", str(drive), "--vehicle", CAR, "--profile-out", str(tmp_path / "p.csv")])
+
+
+def test_a_short_drive_has_windows_without_a_profile(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """96 m."""
+    drive = write(tmp_path, {name: column[:600] for name, column in read(folder).items()})
+    road, windows = tmp_path / "p.csv", tmp_path / "w.csv"
+    asked = ["estimate", str(drive), "--vehicle", CAR, "--profile-out", str(road), "--out", str(windows)]
+    assert main(asked) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("IRI ") for line in lines)
+    why = f"No profile in {road}: the readings tell no wavelengths over a stretch longer than the longest of them"
+    assert lines[-1] == why
+    assert windows.read_text().count("\n") > 10
+    assert main([*asked, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["profile_files"] == []
+    assert err == why + "\n"
+    assert not road.exists()
+
+
+def test_no_file_is_written_over_another(folder: Path, tmp_path: Path) -> None:
+    """The folder's files reached by name, by way of another folder, and by a link; parts of a profile too."""
+    run, car = tmp_path / "run", tmp_path / "car.yaml"
+    run.mkdir()
+    for name in ("drive.csv", "profile.csv"):
+        (run / name).write_bytes((folder / name).read_bytes())
+    car.write_bytes(vehicle_file(CAR).read_bytes())
+    (run / "p-2.csv").symlink_to(run / "drive.csv")
+    (run / "drive-3.csv").write_bytes((run / "drive.csv").read_bytes())
+    before = {path: path.read_bytes() for path in (car, *run.iterdir())}
+    new = tmp_path / "new.csv"
+    for arguments in (("--out", run / "drive.csv"), ("--profile-out", run / "profile.csv"), ("--out", car),
+                      ("--profile-out", run / ".." / "run" / "drive.csv"), ("--out", run / "p-2.csv"),
+                      ("--out", new, "--profile-out", tmp_path / "run" / ".." / "new.csv")):
+        complaint = f"{arguments[-2]} {arguments[-1]}: expected every file to be another one"
+        assert refusal(run, "--vehicle", str(car), *map(str, arguments)) == complaint
+    for start, *arguments in ((run, "--profile-out", run / "p.csv"),
+                              (run / "drive-3.csv", "--profile-out", run / "drive.csv"),
+                              (run, "--out", tmp_path / "new-12.csv", "--profile-out", new)):
+        assert "its parts could be written over" in refusal(start, *map(str, arguments))
+    assert {path: path.read_bytes() for path in (car, *run.iterdir())} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["car.yaml", "run"]
+
+
+@pytest.mark.parametrize(("factor", "words"), [(3.6, "3.6"), (0.85, "0.85"), (1.15, "1.15")])
+def test_a_speed_that_does_not_go_with_the_distance(
+    folder: Path, tmp_path: Path, factor: float, words: str
+) -> None:
+    columns = read(folder)
+    way_m = columns["distance_m"][-1] - columns["distance_m"][0]
+    drive = write(tmp_path, columns | {"speed_mps": columns["speed_mps"] * factor})
+    assert refusal(drive) == (
+        f"{drive}: expected speed_mps and distance_m to agree within 10%, found {way_m * factor:.4g} m by speed_mps, "
+        f"{words} times the {way_m:.4g} m of distance_m (km/h would give 3.6)")
+    standing = write(tmp_path, columns | {"distance_m": 0 * columns["distance_m"]})
+    assert "infinitely many times the 0 m of distance_m" in refusal(standing)
+
+
+def test_readings_that_may_be_in_g_are_said_to_be(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = read(folder)
+    in_g = columns["accel_z_mps2"] / 9.80665
+    rms = in_g.std()
+    hints = {}
+    for name, readings, noise in (("m/s2", columns["accel_z_mps2"], 0.05), ("g with gravity", 1 + in_g, 0.05),
+                                  ("little", in_g, 1.05 * rms), ("enough", in_g, 0.95 * rms)):
+        drive = write(tmp_path, columns | {"accel_z_mps2": readings})
+        capsys.readouterr()
+        assert main(["estimate", str(drive), "--vehicle", CAR, "--noise", f"{noise:.4f}"]) == 0
+        hints[name] = [line for line in capsys.readouterr().out.splitlines() if "in g?" in line]
+    assert hints["m/s2"] == hints["enough"] == []
+    assert hints["g with gravity"][0].startswith("Acceleration in g? On the way it is 1.00 on the mean and ")
+    assert hints["little"][0].endswith(f"less than the noise of {1.05 * rms:.4f} (--noise).")
 
 
 def test_a_road_without_any_roughness_in_places_has_a_limit_all_the_same(
