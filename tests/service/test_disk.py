@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from disk_faults import HAZARDS
-from fault_trials import Hazard, cases_for_tests, label
 
 from logger.store.rotation import SegmentLog
 
 from crashes import FACTS, window
+from disk_faults import HAZARDS
+from fault_trials import Hazard, cases_for_tests, label
 from faulty_disk import RefusingFiles
 
 

@@ -6,11 +6,12 @@ import ast
 from pathlib import Path
 
 import pytest
-from fault_trials import Hazard, cases_for_tests, label
-from sensor_faults import HAZARDS
 
 import drivers
 import logger
+
+from fault_trials import Hazard, cases_for_tests, label
+from sensor_faults import HAZARDS
 
 WALL_CLOCKS = {("time", "time"), ("time", "time_ns"), ("time", "localtime"), ("time", "gmtime"), ("time", "ctime"),
                ("time", "strftime"), ("datetime", "now"), ("datetime", "utcnow"), ("datetime", "today"),

@@ -9,11 +9,11 @@ import random
 from pathlib import Path
 
 import pytest
-from fault_trials import Hazard, cases_for_tests, label
 
 from logger.store.rotation import repair
 
 from crashes import HAZARDS, Life, crash
+from fault_trials import Hazard, cases_for_tests, label
 from faulty_disk import CrashModel, RecordingFiles
 
 

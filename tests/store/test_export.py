@@ -8,6 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from logger.errors import BadInput
+from logger.store import manifest
+from logger.store.export import Progress, export, finished_files
+from logger.store.exported import exported_names
+from logger.store.manifest import parse_manifest
+from logger.store.open_folder import OpenFolder
+from logger.store.verify import FileCheck, verify
+
 from fault_trials import Hazard, cases_for_tests, label
 from stick_faults import (
     HAZARDS,
@@ -21,14 +30,6 @@ from stick_faults import (
     own,
     run,
 )
-
-from logger.errors import BadInput
-from logger.store import manifest
-from logger.store.export import Progress, export, finished_files
-from logger.store.exported import exported_names
-from logger.store.manifest import parse_manifest
-from logger.store.open_folder import OpenFolder
-from logger.store.verify import FileCheck, verify
 
 
 @pytest.fixture

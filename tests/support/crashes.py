@@ -13,8 +13,6 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fault_trials import Found, Hazard
-
 from drivers.dump import DumpHeader, Event, open_dump
 from drivers.errors import DumpError
 from logger.records import WindowRecord
@@ -25,6 +23,7 @@ from logger.store.segment_log import format_row, parse_row, read_log
 from logger.store.space import Limits
 from logger.store.verify import verify
 
+from fault_trials import Found, Hazard
 from faulty_disk import CrashModel, RecordingFiles, RefusingFiles
 
 FACTS = {"ridelog_version": "test", "sensor": {"driver": "bma220", "verified": True}}

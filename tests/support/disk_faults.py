@@ -8,13 +8,12 @@ from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
-from fault_trials import Found, Hazard, found
-
 from logger.service.storage import LOOK_US
 from logger.store import lasting, space
 from logger.store.space import Limits
 
 from crashes import ERRORS, KINDS, Service, events, outage, problems, restart, segments
+from fault_trials import Found, Hazard, found
 from faulty_disk import RefusingFiles
 
 Case = tuple[int, tuple[str, ...], int, int]
@@ -295,7 +294,7 @@ HAZARDS = (
            outage_longer_than_memory, range(5, 26, 5), 2),
     Hazard("disk that is bad from the start", "all is refused before the first file is made",
            "the service starts, says it, and writes everything once it can", "as promised", bad_from_the_start, ERRORS),
-    Hazard("really full device", "the kernel's `/dev/full` in place of a write", "as above", "as promised",
+    Hazard("really full device", "the kernel's `/dev/full` in place of a write", _GOES_ON, "as promised",
            real_full_device, range(1, 11), 2),
     Hazard("little room, exported files there", "the quota or the free room is short",
            "the oldest exported files go, and only as many as needed", "as promised", exported_files_go_first,

@@ -24,8 +24,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unittest.mock import patch
 
-from fault_trials import Found, Hazard, found
-
 from drivers.dump import Event, intact_bytes, open_dump
 from logger.commands.status import advice, screen
 from logger.demo.motion import Stretch
@@ -36,6 +34,8 @@ from logger.store.rotation import LogName
 from logger.store.segment_log import read_log
 from logger.store.vehicle_file import read_vehicle
 from logger.store.verify import verify
+
+from fault_trials import Found, Hazard, found
 
 PATIENCE_S = 60.0
 Rows = dict[int, set[int]]

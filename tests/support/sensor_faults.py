@@ -15,8 +15,6 @@ from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
-from fault_trials import Found, Hazard, found
-
 from drivers.bma220 import CHIP_ID, Bma220Settings
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
@@ -37,6 +35,7 @@ from logger.store.segment_log import read_log
 from logger.store.space import Limits
 from logger.store.vehicle_file import read_vehicle
 
+from fault_trials import Found, Hazard, found
 from replaying import Rows, core_for
 
 STEP_US = 10_000
@@ -486,7 +485,7 @@ HAZARDS = (
            "back after {waited_s.least:.1f} to {waited_s.most:.1f} s", accelerometer_unplugged, range(60), 6),
     Hazard("GPS unplugged for 2 to 30 s", "the port fails, then cannot be opened",
            "no sample of the accelerometer is lost; rows are marked `gps_lost`; the fix is taken up again",
-           "{heard_percent.least:.1f} % of samples or more", receiver_unplugged, range(40), 4),
+           "{heard_percent.least:.1f} % of samples heard, or more", receiver_unplugged, range(40), 4),
     Hazard("another chip at the address", "its identity register holds something else",
            "no sample is taken; both identities are named; the right chip is found within 31 s", "as promised",
            another_chip, (0xE5, 0x00, 0xFF, 0x33)),
@@ -513,7 +512,7 @@ HAZARDS = (
            "every row is flagged `clipped`; `status` says that it does not feel 1 g",
            "{rows.total:.0f} rows, all flagged", saturated, (31, -32)),
     Hazard("peaks beyond the range", "a tenth of a second at the end of the range",
-           "flagged `clipped` where it was and nowhere else", "at most {rows.most:.0f} rows flagged",
+           "flagged `clipped` where it was and nowhere else", "{rows.least:.0f} to {rows.most:.0f} rows flagged each",
            peaks_beyond_the_range, (20.2, 23.5, 27.7, 31.1), 1),
     Hazard("an hour without a fix", "a receiver without a fix for 3600 s, the car drives",
            "rows without place and IRI, flagged `blind`, with comfort and UTC; the fix is taken up again; memory is "
@@ -524,7 +523,7 @@ HAZARDS = (
            tuple(product((WEEK, -WEEK, 1024 * WEEK, timedelta(days=-1)), (1, 3, 20)))),
     Hazard("GPS date jumps for good", "a week on or back, and it stays",
            "UTC follows after half a minute; nothing else in any row changes",
-           "UTC of rows from {after_s.least:.0f} s or later on", date_jumps_for_good, (WEEK, -WEEK)),
+           "rows from {after_s.least:.0f} s after the jump on have the new UTC", date_jumps_for_good, (WEEK, -WEEK)),
     Hazard("system clock set back", "by a year, in the middle of a drive", "no row changes",
            "{rows.total:.0f} rows, all the same", system_clock_set_back, (365,)),
 )

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from fault_trials import Found, Hazard, found
-
 from logger.errors import BadInput
 from logger.store import manifest, open_folder
 from logger.store.export import ExportResult, Progress, export
 from logger.store.exported import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
 from logger.store.manifest import parse_manifest
 from logger.store.open_folder import OpenFolder
+
+from fault_trials import Found, Hazard, found
 
 OTHER_LOGGER = "ridelog/0123456789ab/00001-001.csv"
 NAMES = ("00001-001.csv", "00001-001.json", "00002-001.csv", "00002-001.json")

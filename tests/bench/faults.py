@@ -1,0 +1,209 @@
+"""Everything that goes wrong with a logger, tried: power, kills, disks, sensors, sticks, hostile input, a long day.
+
+    python faults.py [--quick] [--out FILE] [--inputs N] [--huge-gb G]
+
+Runs the trials of each fault (``tests/support``; the tests run a few of each), prints goals, and writes the table
+``docs/faults.md``; exit 1 when a promise was broken. ``--quick`` takes a few cases of each fault, leaves the long day
+out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py`` and ``soak.py``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from figures import Figures, read_figures
+
+BENCH = Path(__file__).resolve().parent
+sys.path.append(str(BENCH.parent / "support"))
+import crashes  # noqa: E402
+import disk_faults  # noqa: E402
+import killing  # noqa: E402
+import sensor_faults  # noqa: E402
+import stick_faults  # noqa: E402
+from fault_trials import Hazard, Line, run  # noqa: E402
+
+TABLE = BENCH.parents[1] / "docs" / "faults.md"
+MEMORY = Path("/dev/shm")
+"""The models of disks and sticks need no disk, and are quicker without."""
+
+ON_DISK = (killing.KILLS, killing.WRITES_NO_MORE)
+TRIED = {
+    "Power cuts and kills": (*crashes.HAZARDS, killing.KILLS),
+    "Disks": (*disk_faults.HAZARDS, killing.WRITES_NO_MORE),
+    "Sensors": sensor_faults.HAZARDS,
+    "USB sticks": stick_faults.HAZARDS,
+}
+ENOUGH_CRASHES = 1000
+_READER = re.compile(r"(\S+) +(\d+) inputs +(\d+) accepted +(\d+) refused +(\d+) ends +slowest (\S+ s) +"
+                     r"memory \+(\S+ MB) +\S+/s +(\d+) broken")
+
+HEAD = """\
+# Faults
+
+A logger lives under a seat. The ignition cuts its power in the middle of a write, cables shake loose, the card fills,
+a stick is pulled too early, and nobody looks at it for months. This page says what is promised then, and what happened
+when it was tried. It is made by `python tests/bench/faults.py`; the counts are those of the run that made it.
+
+## What is promised
+
+- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written four to
+  eight seconds after its window was driven, because the road behind still tells of it. So a power cut costs the last
+  five to nine seconds of a drive, and nothing older.
+- **Kill.** A process that is killed loses no row that was written to the log.
+- **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32. After the next start every file is
+  finished, beside its sidecar, and `ridelog verify` has nothing against it. No session number is given twice.
+- **Disk.** Full, failing or read-only: the service stays up and says so; what was written stays; rows wait in memory
+  and are written as soon as the disk takes them. Raw dumps make room for logs; an unexported log is never removed.
+- **Sensors.** What one does wrong costs its own readings only. It is tried again until it is back, rows are flagged,
+  and no figure is made up.
+- **Sticks.** Only what was read back from the stick counts as exported. Pulled at any instant nothing is lost, and the
+  next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there.
+- **Input.** Every file and every byte from a wire is read as it stands or refused in one line that names it: no crash,
+  no hang, no memory without bound.
+
+The card has to keep its side: what fsync returned for stays, and a rename happens or does not. ext4 does. A card that
+lies about fsync can lose what it lied about; no software can help that, but a damaged row is still seen.
+
+Power is cut in a model of the disk (what each write, fsync and rename leaves behind when all ends there), not at a
+plug: a cut at every single change of the disk can only be tried so. Sensors are bytes on simulated buses and ports, in
+simulated time. Kills, and a service that may write no more, are those of the real process.
+"""
+
+
+@dataclass(frozen=True)
+class Group:
+    """One table."""
+
+    title: str
+    words: str
+    lines: Sequence[Line]
+
+
+def main() -> int:
+    """Try everything; write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a minute or two")
+    parser.add_argument("--out", type=Path, help="where the table goes (default: docs/faults.md; none with --quick)")
+    parser.add_argument("--inputs", type=int, help="damaged inputs per reader (default: 20000, with --quick 300)")
+    parser.add_argument("--huge-gb", type=float, help="size of huge inputs (default: 10, with --quick 0.02)")
+    args = parser.parse_args()
+    if sys.flags.optimize:
+        parser.error("expected Python without -O: the trials are assertions")
+    logging.disable(logging.CRITICAL)
+    inputs = args.inputs or (300 if args.quick else 20_000)
+    huge_gb = args.huge_gb or (0.02 if args.quick else 10.0)
+    groups = [*_tried(args.quick), _hostile(inputs, huge_gb)] + ([] if args.quick else [_long_day()])
+    figures = Figures()
+    _judge(groups, 0 if args.quick else ENOUGH_CRASHES, figures)
+    out = args.out or (None if args.quick else TABLE)
+    if out is not None:
+        out.write_text(_page(groups), encoding="utf-8")
+    return 1 if figures.missed else 0
+
+
+def _tried(quick: bool) -> list[Group]:
+    """The groups of faults that are trials of functions, on two processes."""
+    with ProcessPoolExecutor(2) as pool:
+        runs = {title: [pool.submit(_run, hazard, quick) for hazard in hazards] for title, hazards in TRIED.items()}
+        groups = []
+        for title, pending in runs.items():
+            lines = []
+            for one in pending:
+                line = one.result()
+                print(f"{title}: {line.name}: {line.trials} trials; {line.happened}", flush=True)
+                lines.append(line)
+            groups.append(Group(title, "", lines))
+        return groups
+
+
+def _run(hazard: Hazard, quick: bool) -> Line:
+    memory = MEMORY if MEMORY.is_dir() and hazard not in ON_DISK else None
+    with tempfile.TemporaryDirectory(dir=memory) as name:
+        return run(hazard, hazard.some() if quick else hazard.cases, Path(name))
+
+
+def _hostile(inputs: int, huge_gb: float) -> Group:
+    """``fuzz.py``, and a line for each reader."""
+    command = [sys.executable, BENCH / "fuzz.py", "--inputs", str(inputs), "--huge-gb", str(huge_gb)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    print(done.stdout, end="", flush=True)
+    huge = [line.split("\t") for line in done.stdout.splitlines() if line.count("\t") == 3]
+    failed = tuple(f"{name}: {outcome}" for name, outcome, *_ in huge if outcome.startswith("FAILED"))
+    lines = [Line(
+        "huge input", f"files and pipes without end, lines of {huge_gb:g} GB, YAML and zip bombs, deep nesting",
+        "an answer or a refusal, in bounded memory",
+        f"slowest {max(float(row[2]) for row in huge):.0f} s, memory +{max(int(row[3]) for row in huge)} MB"
+        if not failed else f"**BROKEN**: {'; '.join(failed)}", len(huge), wrong=failed)]
+    for name, count, accepted, refused, ends, slowest, memory, broken in _READER.findall(done.stdout):
+        lines.append(Line(
+            f"`{name}`", "damaged valid input", "read as it stands, or refused in one line; within 2 s",
+            f"{accepted} read, {refused} refused, {ends} different ends, slowest {slowest}, memory +{memory}"
+            if broken == "0" else f"**BROKEN**: {broken} inputs", int(count),
+            wrong=(f"{name}: {broken} inputs",) * (broken != "0")))
+    if done.returncode and not any(line.wrong for line in lines):
+        raise RuntimeError(f"fuzz.py ended with {done.returncode}: {done.stderr[-1000:]}")
+    return Group("Hostile input", (
+        f"{inputs} damaged inputs for each reader. The tool is the project's own: bits, bytes, spans, lines, fields "
+        "and numbers of valid examples are changed, repeated and spliced, check values are mended half of the time, "
+        "and inputs that end at a new place in the sources are damaged further."), lines)
+
+
+def _long_day() -> Group:
+    """``soak.py``, and a line for each of its figures."""
+    done = subprocess.run([sys.executable, BENCH / "soak.py"], capture_output=True, text=True, check=False)
+    print(done.stdout, end="", flush=True)
+    lines = [Line(name, "a day as above", goal, value if met else f"**MISSED**: {value}", 1,
+                  wrong=() if met else (f"{name}: {value}",))
+             for name, value, goal, met in read_figures(done.stdout)]
+    if done.returncode and not any(line.wrong for line in lines):
+        raise RuntimeError(f"soak.py ended with {done.returncode}: {done.stderr[-1000:]}")
+    return Group("Soak", (
+        "A day of driving and parking, from New Year's Eve on, through the service's own code at many times real time: "
+        "in the open, under ground, and with the sensors off; the host's clock is 20 ppm fast, a raw dump would by "
+        "itself break the quota."), lines)
+
+
+def _judge(groups: Sequence[Group], enough: int, figures: Figures) -> None:
+    for group in groups:
+        broken = [words for line in group.lines for words in line.wrong]
+        print("".join(f"    {words}\n" for words in broken[:20]), end="")
+        figures.at_most(f"{group.title}: promises broken", len(broken), 0, "")
+    injected = groups[0].lines
+    figures.at_least("crashes injected", sum(line.trials for line in injected), enough, "")
+    for name, words in (("rows_lost", "rows lost beyond the promise"), ("damaged_accepted", "damaged rows accepted")):
+        figures.at_most(words, sum(line.figures[name].total for line in injected if name in line.figures), 0, "")
+
+
+def _page(groups: Sequence[Group]) -> str:
+    told = dict.fromkeys(line.told for group in groups for line in group.lines if line.told)
+    parts = [HEAD, "## What `ridelog status` says\n", "In these trials, among others (times and places differ):\n",
+             "\n".join(f"- {words}" for words in told) + "\n",
+             "When nothing is wrong: \"Nothing: all is well.\" What each stick is doing, and whether it may be pulled, "
+             "stands above all else.\n"]
+    for group in groups:
+        trials = sum(line.trials for line in group.lines)
+        parts.append(f"## {group.title}\n")
+        parts += [f"{group.words}\n"] if group.words else []
+        parts.append("\n".join([
+            "| fault | how it is injected | what is promised | what happened | trials |",
+            "| --- | --- | --- | --- | --- |",
+            *(f"| {line.name} | {line.injected} | {line.promised} | {_cell(line.happened)} | {line.trials} |"
+              for line in group.lines), f"| **all** | | | | **{trials}** |"]) + "\n")
+    return "\n".join(parts)
+
+
+def _cell(words: str) -> str:
+    return words.replace("|", "\\|").replace("\n", " ")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
