@@ -96,8 +96,8 @@ class RoadEstimator:
     sensor       noise and step of the readings
     window_m     length of a window [m]
     place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
-    vehicle_error    share that each axle's gain may be off; it also keeps waves that lift one axle while the other
-                 sinks from being made too much of
+    vehicle_error    share that each axle's gain may be off: readings are not trusted beyond it, which keeps waves that
+                 lift one axle while the other sinks from being made too much of
     on_road      is given each piece of estimated road
     """
 
@@ -114,7 +114,6 @@ class RoadEstimator:
         self._car = CarResponse(structure, output)
         self._sensor = sensor
         self._place_std_m = place_std_m
-        self._vehicle_error = vehicle_error
         self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
         self._piece_m = window_m / self._pieces_per_window
         self._points = ceil(self._piece_m / _SPACING_M)
@@ -256,9 +255,7 @@ class RoadEstimator:
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
         misplaced = self._place_std_m * sum(one.change_per_m for one in iri) / len(iri)
-        # Errors of the axles' gains, independent of each other, leave their mean off by less.
-        modelled = self._vehicle_error / sqrt(len(self._car.behind_m)) * mean
-        std = hypot(own, shared, misplaced, modelled)
+        std = hypot(own, shared, misplaced)
         return [WindowEstimate(number // self._pieces_per_window, mean, std, told, flags)]
 
     def _give_road(

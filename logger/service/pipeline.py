@@ -246,7 +246,7 @@ class Pipeline:
 
 
 def _iri_std(estimate: WindowEstimate, is_bridged: bool) -> float | None:
-    """Standard error of the IRI [m/km]; where the speed was only carried through a loss of fix, with what that costs."""
+    """Standard error of the IRI [m/km], with what it costs to carry the speed through a loss of fix."""
     bridging = BRIDGED_ERROR * estimate.iri_m_per_km if is_bridged else 0.0
     return _known(hypot(estimate.iri_std_m_per_km, bridging))
 
