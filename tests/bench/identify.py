@@ -28,7 +28,6 @@ from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from bump_drives import BUMP_MPS, RATE_HZ, bump_record, road_record
-
 from figures import Figures
 
 Array = npt.NDArray[np.float64]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bump_drives import bump_record
 
 from logger.commands.main import main
 from logger.errors import BadInput
@@ -15,6 +14,8 @@ from logger.identification.verdict import NotIdentifiable
 from logger.shipped import vehicle_file
 from logger.store.drive_file import write_drive, write_profile
 from logger.store.vehicle_file import read_vehicle
+
+from bump_drives import bump_record
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 MASS, DAMPERS = "sprung_mass_kg", "both.suspension_damping_n_s_per_m"

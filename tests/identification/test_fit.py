@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bump_drives import bump_record, recorded, road_record
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
@@ -15,6 +14,8 @@ from logger.identification.parameters import Free, changed, free
 from logger.identification.prediction import VehicleModel
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+
+from bump_drives import bump_record, recorded, road_record
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bump_drives import bump_record, recorded, road_record
 
 from logger.identification.parameters import changed, free, names
 from logger.identification.prediction import Record, VehicleModel
@@ -15,6 +14,8 @@ from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.vehicle import SensorPlace, Vehicle
+
+from bump_drives import bump_record, recorded, road_record
 
 Array = npt.NDArray[np.float64]
 

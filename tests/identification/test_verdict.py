@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bump_drives import bump_record, road_record
 
 from logger.identification.fit import Options, fit
 from logger.identification.parameters import changed, free, names
@@ -15,6 +14,8 @@ from logger.identification.verdict import SILENT, TOGETHER, WEAK, NotIdentifiabl
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.vehicle import SensorPlace, Vehicle
+
+from bump_drives import bump_record, road_record
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 BUMP = bump_record(CAR)
