@@ -32,6 +32,7 @@ _STEPS = 8
 _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
+_MOST_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,11 @@ class FollowedRoad:
         solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
 
         innovations = np.fft.irfft(solution.waves, block.count)
-        power = np.abs(np.fft.rfft(innovations / np.sqrt(local))) ** 2 / block.count
         told = mean_told(solution.gain, local[seen > 0])
+        # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
+        expected = sqrt(2 * float(told.sum()) / block.count)
+        white = np.clip(innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
+        power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
         self._local.learn(first, innovations, local, solution.gain, seen)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
