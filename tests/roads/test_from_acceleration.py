@@ -10,7 +10,6 @@ from logger.roads import iso8608
 from logger.roads.from_acceleration import RmsRelation, iri_class, rms_relation
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
-from logger.units import WINDOW_M
 from logger.vehicle import half_car
 from logger.vehicle.quarter_car import GOLDEN_CAR
 
@@ -56,8 +55,6 @@ def test_relation_between_and_outside_its_speeds() -> None:
     assert relation.iri(0.5, 7.5) == pytest.approx(9.0)
     assert relation.iri(np.array([1.0, 2.0]), np.array([5.0, 10.0])) == pytest.approx([20.0, 32.0])
     assert np.isnan(relation.iri(np.array([1.0, 1.0, 1.0]), np.array([4.99, 10.01, np.nan]))).all()
-    assert np.isnan(relation.iri_std(3.0, 4.0, WINDOW_M))
-    assert isinstance(relation.iri_std(3.0, 6.0, WINDOW_M), float)
 
 
 def test_relation_is_quick_and_covers_3_to_45_mps() -> None:
