@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
+from drivers.errors import shortened
 from logger.errors import BadInput
 
 _PACKAGE = Path(__file__).parent
@@ -29,7 +30,7 @@ def vehicle_names() -> list[str]:
 def vehicle_file(name: str) -> Path:
     """The file of a vehicle that comes with the program. Raises BadInput, which lists the names there are."""
     if name not in vehicle_names():
-        raise BadInput(f"no vehicle {name!r} comes with ridelog; expected a path to a .yaml file, or one of: "
+        raise BadInput(f"no vehicle {shortened(name)} comes with ridelog; expected a path to a .yaml file, or one of: "
                        f"{', '.join(vehicle_names())}")
     return shipped("config") / "vehicles" / f"{name}.yaml"
 

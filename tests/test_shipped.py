@@ -27,3 +27,9 @@ def test_a_path_is_seen_from_a_folder(word: str) -> None:
 def test_another_word_is_refused_with_the_names() -> None:
     with pytest.raises(BadInput, match=r"no vehicle 'mine' comes with ridelog; expected a path to a .yaml file, or"):
         vehicle_path("mine")
+
+
+def test_a_long_word_is_refused_in_a_short_line() -> None:
+    with pytest.raises(BadInput, match="no vehicle '999") as refused:
+        vehicle_path("9" * 5000)
+    assert len(str(refused.value)) < 400

@@ -376,8 +376,8 @@ def screen(result: Result, files: list[Path]) -> list[str]:
         "Wavelengths told: " + _range_words(result),
     ]
     if (factor := told["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
-        lines.append(f"The standard errors are {factor:.1f} times as large: there is more in the readings than this "
-                     "vehicle and this noise explain.")
+        lines.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
+                     "percent, and there may be more in the readings than vehicle and noise explain.")
     lines += ["", *_table(told)]
     return lines + [f"Profile: {file}" for file in files]
 

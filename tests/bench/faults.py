@@ -30,6 +30,7 @@ import killing  # noqa: E402
 import sensor_faults  # noqa: E402
 import stick_faults  # noqa: E402
 from fault_trials import Hazard, Line, run  # noqa: E402
+from fuzz_targets import TARGETS  # noqa: E402
 
 TABLE = BENCH.parents[1] / "docs" / "faults.md"
 MEMORY = Path("/dev/shm")
@@ -55,9 +56,9 @@ when it was tried. It is made by `python tests/bench/faults.py`; the counts are 
 
 ## What is promised
 
-- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written four to
-  eight seconds after its window was driven, because the road behind still tells of it. So a power cut costs the last
-  five to nine seconds of a drive, and nothing older.
+- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written, as
+  a rule, four to eight seconds after its window was driven, because the road behind still tells of it. So a power cut
+  costs the last five to nine seconds of a drive.
 - **Kill.** A process that is killed loses no row that was written to the log.
 - **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32. After the next start every file is
   finished, beside its sidecar, and `ridelog verify` has nothing against it. No session number is given twice.
@@ -149,8 +150,7 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
             f"{accepted} read, {refused} refused, {ends} different ends, slowest {slowest}, memory +{memory}"
             if broken == "0" else f"**BROKEN**: {broken} inputs", int(count),
             wrong=(f"{name}: {broken} inputs",) * (broken != "0")))
-    if done.returncode and not any(line.wrong for line in lines):
-        raise RuntimeError(f"fuzz.py ended with {done.returncode}: {done.stderr[-1000:]}")
+    _check_ended(done, lines, len(TARGETS) + 1)
     return Group("Hostile input", (
         f"{inputs} damaged inputs for each reader. The tool is the project's own: bits, bytes, spans, lines, fields "
         "and numbers of valid examples are changed, repeated and spliced, check values are mended half of the time, "
@@ -164,12 +164,17 @@ def _long_day() -> Group:
     lines = [Line(name, "a day as above", goal, value if met else f"**MISSED**: {value}", 1,
                   wrong=() if met else (f"{name}: {value}",))
              for name, value, goal, met in read_figures(done.stdout)]
-    if done.returncode and not any(line.wrong for line in lines):
-        raise RuntimeError(f"soak.py ended with {done.returncode}: {done.stderr[-1000:]}")
+    _check_ended(done, lines, 1)
     return Group("Soak", (
         "A day of driving and parking, from New Year's Eve on, through the service's own code at many times real time: "
         "in the open, under ground, and with the sensors off; the host's clock is 20 ppm fast, a raw dump would by "
         "itself break the quota."), lines)
+
+
+def _check_ended(done: subprocess.CompletedProcess[str], lines: Sequence[Line], fewest: int) -> None:
+    """It said as much as it should, and what was wrong when it failed; else no table may be made of it."""
+    if len(lines) < fewest or (done.returncode and not any(line.wrong for line in lines)):
+        raise RuntimeError(f"{done.args[1]} ended with {done.returncode}: {done.stderr[-1000:]}")
 
 
 def _judge(groups: Sequence[Group], enough: int, figures: Figures) -> None:

@@ -6,6 +6,7 @@ import errno
 import os
 from itertools import product
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 from logger.service.storage import LOOK_US
@@ -169,7 +170,7 @@ class Card(RefusingFiles):
         return self.size - sum(path.stat().st_size for path in self.folder.iterdir())
 
 
-def small() -> patch.multiple:
+def small() -> Any:
     """Kilobytes for megabytes."""
     return patch.multiple(space, RESERVE_BYTES=50_000, STEP_BYTES=5_000)
 

@@ -111,7 +111,9 @@ def _degrees(text: str, negative: bool) -> float:
     whole, _, fraction = text.partition(".")
     if not whole[-2:].isdigit() or not whole[:-2].isdigit():
         return float("inf")
-    size = int(whole[:-2]) + float(f"{whole[-2:]}.{fraction or 0}") / 60 if fraction.isdigit() or not fraction else 999
+    if fraction and not fraction.isdigit():
+        return float("inf")
+    size = float(whole[:-2]) + float(f"{whole[-2:]}.{fraction or 0}") / 60
     return round(-size if negative else size, 9)
 
 
@@ -197,11 +199,12 @@ def pasco_reader(profile: Profile) -> Reader:
         promise(bool(np.isfinite(accel).all()), "accelerations that are no numbers")
         promise(len(found_us) == len(accel), "samples without times")
         ahead_us = int(found_us[-1]) - t_us if len(found_us) else 0
-        promise(ahead_us <= len(found_us), f"a sample {ahead_us} us ahead")
+        counters = decoder.counters
+        # Times grow by 1 us where they must, also over frames that were refused.
+        promise(ahead_us <= counters.frames + counters.bad_frames, f"a sample {ahead_us} us ahead")
         held = _frames_in(data, profile.layout) if isinstance(profile.layout, FrameLayout) else _lines_in(
             data, profile.layout)
         promise({tuple(row) for row in accel.tolist()} <= held, "a sample that the bytes do not hold")
-        counters = decoder.counters
         return (len(accel) > 0, len(accel) > 40, counters.bad_frames > 0, counters.resyncs > 0,
                 counters.dropped_bytes > 0)
     return read
