@@ -141,7 +141,7 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
     failed = tuple(f"{name}: {outcome}" for name, outcome, *_ in huge if outcome.startswith("FAILED"))
     lines = [Line(
         "huge input", f"files and pipes without end, lines of {huge_gb:g} GB, YAML and zip bombs, deep nesting",
-        "an answer or a refusal, in bounded memory",
+        "an answer or a refusal; memory bounded by the largest file that a desk command takes (1 GB)",
         f"slowest {max(float(row[2]) for row in huge):.0f} s, memory +{max(int(row[3]) for row in huge)} MB"
         if not failed else f"**BROKEN**: {'; '.join(failed)}", len(huge), wrong=failed)]
     for name, count, accepted, refused, ends, slowest, memory, broken in _READER.findall(done.stdout):
