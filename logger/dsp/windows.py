@@ -9,7 +9,7 @@ the next (start or end of a drive, a break) is `partial`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import nan, sqrt
 
@@ -86,6 +86,10 @@ class Window:
     vdv_mps175: float
     peak_mps2: float
     flags: frozenset[str]
+
+    def without_figures(self) -> Window:
+        """The window as if too few of its samples were good."""
+        return replace(self, accel_rms_mps2=nan, a_w_mps2=nan, mtvv_mps2=nan, vdv_mps175=nan, peak_mps2=nan)
 
 
 # Columns that are summed, then columns of which the largest counts.

@@ -51,7 +51,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
     "gap": "samples of the accelerometer are missing",
     "clipped": "the accelerometer stood at the end of its range: the road is at least this rough",
-    "frozen": "the readings of the accelerometer had not changed for half a minute of driving: do not trust it",
+    "frozen": "the readings of the accelerometer had not changed for half a minute of driving: no figures",
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
     "stationary": "the car stood inside the window; that time is not in the averages",

@@ -8,8 +8,8 @@ is known, over a short loss bridged, and when no fix has come for longer than th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import hypot, isfinite
+from dataclasses import dataclass, replace
+from math import hypot, isfinite, nan
 
 import numpy as np
 
@@ -157,7 +157,8 @@ class Pipeline:
             moving = np.flatnonzero(speed_mps > 0.0)
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
-            self._roughness.read(part, distance_m + self._settings.front_axle_ahead_m, leg)
+            believed = replace(part, present=part.present & ~self.stillness.during(part.t_us))
+            self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
 
     def _end_leg(self) -> None:
@@ -191,6 +192,8 @@ class Pipeline:
             flags.add("time_unset")
         if self.stillness.covers(window.t_us, window.t_us + round(window.duration_s * US_PER_S)):
             flags.add("frozen")
+            window = window.without_figures()
+            estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan)
         if estimate is not None:
             flags |= estimate.flags
         elif window.start_m is not None and "partial" not in flags:

@@ -4,9 +4,10 @@ Problem: a chip that has frozen goes on giving the reading it had, and a road of
 But with steps of 0.6 m/s2 a car that is parked gives one and the same reading for hours too, and nothing is wrong.
 
 Solution: the receiver tells which of the two it is. Only time counts through which every fix said that the car moved,
-and not one axis of one reading changed. After ``FROZEN_S`` of it the windows are flagged ``frozen``, from where it
-began as far as they have not been written yet. Without a fix nothing is said. The figures stay: a sensor without any
-noise, at an even speed on a perfect road, can be silent for half a minute too.
+and not one axis of one reading changed. After ``FROZEN_S`` of it the sensor is frozen until a reading changes, with a
+fix or without, and its windows are flagged and left without figures: from where it began, as far as they have not been
+written yet. Before that nothing is said. A sensor without any noise, at an even speed on a perfect road, can be silent
+for half a minute too; what it says then is too little to tell a road by.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
 from logger.units import US_PER_S
@@ -35,6 +37,7 @@ class Stillness:
         self._moving_us: int | None = None
         self._fix_us = 0
         self._frozen: deque[tuple[int, int]] = deque(maxlen=_SPANS_KEPT)
+        self._lasting = False
 
     def take(self, block: AccelerationBlock, fixes: Sequence[Fix]) -> None:
         """More of both."""
@@ -42,11 +45,9 @@ class Stillness:
             self._take_fix(fix)
         if len(block):
             self._take_block(block)
-        begin_us, end_us = self._span_us()
-        if end_us - begin_us >= FROZEN_S * US_PER_S:
-            if self._frozen and self._frozen[-1][0] == begin_us:
-                self._frozen.pop()
-            self._frozen.append((begin_us, end_us))
+        if not self._lasting and self.frozen_s:
+            self._lasting = True
+            self._frozen.append((self._span_us()[0], self._heard_us))
 
     @property
     def frozen_s(self) -> float:
@@ -58,6 +59,13 @@ class Stillness:
     def covers(self, begin_us: int, end_us: int) -> bool:
         """Tell whether the sensor was frozen in some of [begin, end)."""
         return any(begin_us < last_us and first_us < end_us for first_us, last_us in self._frozen)
+
+    def during(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """Tell of instants (n,) [us] whether the sensor was frozen."""
+        frozen = np.zeros(len(t_us), dtype=np.bool_)
+        for first_us, last_us in self._frozen:
+            frozen |= (first_us <= t_us) & (t_us <= last_us)
+        return frozen
 
     def _span_us(self) -> tuple[int, int]:
         if self._moving_us is None:
@@ -74,10 +82,16 @@ class Stillness:
 
     def _take_block(self, block: AccelerationBlock) -> None:
         readings = block.accel_mps2
-        if self._last != tuple(readings[0]) or int(block.t_us[0]) - self._heard_us > LONGEST_BETWEEN_FIXES_US:
-            self._changed_us = int(block.t_us[0])
-        changes = np.flatnonzero((readings[1:] != readings[:-1]).any(axis=1))
-        if len(changes):
-            self._changed_us = int(block.t_us[changes[-1] + 1])
+        is_new = np.ones(len(block), dtype=np.bool_)
+        is_new[1:] = (readings[1:] != readings[:-1]).any(axis=1)
+        was_silent = int(block.t_us[0]) - self._heard_us > LONGEST_BETWEEN_FIXES_US
+        is_new[0] = self._last != tuple(readings[0]) or (was_silent and not self._lasting)
+        changes_us = block.t_us[is_new]
         self._last = tuple(readings[-1])
         self._heard_us = int(block.t_us[-1])
+        if self._lasting:
+            last_us = int(changes_us[0]) - 1 if len(changes_us) else self._heard_us
+            self._frozen[-1] = (self._frozen[-1][0], last_us)
+        if len(changes_us):
+            self._changed_us = int(changes_us[-1])
+            self._lasting = False

@@ -20,6 +20,7 @@ from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
 from logger.commands.status import advice
+from logger.records import WindowRecord
 from logger.service import assemble
 from logger.service.config import AccelerometerConfig, Config, PascoConfig
 from logger.service.core import Core
@@ -327,6 +328,13 @@ def refused_transfers(folder: Path, loss: float) -> Found:
     return found(waited_s=waited_s)
 
 
+def figures_of(record: WindowRecord) -> list[float | str | None]:
+    """All that the accelerometer says of a window; None where it says nothing."""
+    return [None if figure == "" else figure for figure in (
+        record.iri_m_per_km, record.iri_std_m_per_km, record.iri_rms_m_per_km, record.iri_class, record.a_w_mps2,
+        record.mtvv_mps2, record.vdv_mps175, record.crest_factor, record.comfort, record.accel_rms_mps2)]
+
+
 def frozen_chip(folder: Path, level: int) -> Found:
     car = Car(folder)
     car.drive(40)
@@ -342,6 +350,8 @@ def frozen_chip(folder: Path, level: int) -> Found:
     late = [record for record in car.rows.records if record.t_us > car.begin_us + (40 + FROZEN_S + 2) * 1e6]
     assert len(late) > 30
     assert all("frozen" in record.flags for record in late)
+    figures = [figure for record in car.rows.records if "frozen" in record.flags for figure in figures_of(record)]
+    assert figures == [None] * len(figures)
     car.sample = car.rough_road
     status = car.drive(20)
     assert status.accelerometer.state == "ok"
@@ -503,8 +513,9 @@ HAZARDS = (
            "only the samples that are hit are lost (up to 30 %); back within 30 s after the storm",
            "back after {waited_s.most:.1f} s or less", refused_transfers, (0.05, 0.3, 0.6, 0.9, 0.99)),
     Hazard("frozen accelerometer", "one and the same reading while the car drives",
-           f"told and flagged `frozen` after {FROZEN_S:g} s, the chip is started anew; well again by itself",
-           "{rows.total:.0f} rows, all flagged", frozen_chip, (17, 15, 16), 1),
+           f"told after {FROZEN_S:g} s; from then on rows are flagged `frozen`, without IRI and comfort; the chip is "
+           "started anew; well again by itself",
+           "{rows.total:.0f} rows, all flagged, none with a figure", frozen_chip, (17, 15, 16), 1),
     Hazard("parked car", "one and the same reading while the car stands, has no fix or drifts",
            "never taken for a frozen sensor", "as promised", parked,
            ("stands", "no fix", "drifts at a walking pace")),
