@@ -23,6 +23,9 @@ from logger.records import WindowRecord
 STALE_S = 10.0
 """A living service renews its status every second; one this old comes from a service that hangs."""
 
+LARGEST_BYTES = 100_000
+"""Most that is read of a status file; what is cut there is none."""
+
 SensorState = Literal["ok", "absent", "retrying", "silent", "doubtful"]
 ServiceState = Literal["starting", "standing", "recording", "stopping"]
 
@@ -127,7 +130,8 @@ def write_status(path: Path, status: ServiceStatus) -> None:
 def read_status(path: Path) -> ServiceStatus | None:
     """Read the last snapshot; None where there is none. Raises BadInput for a file that is not one."""
     try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            fields = json.loads(file.read(LARGEST_BYTES))
         window = fields["last_window"]
         if window is not None:
             fields["last_window"] = WindowRecord(**{**window, "flags": tuple(window["flags"])})
@@ -139,7 +143,7 @@ def read_status(path: Path) -> ServiceStatus | None:
         return None
     except OSError as error:
         raise BadInput(f"{path}: expected a status file that can be read ({error.strerror})") from None
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise BadInput(f"{path}: expected the status of a ridelog service of this version") from None
     if status.state not in get_args(ServiceState) or not isinstance(status.pid, int):
         raise BadInput(f"{path}: expected the status of a ridelog service of this version")

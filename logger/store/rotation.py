@@ -14,7 +14,7 @@ Every change to the disk goes through ``FileSystem``, so that tests can cut betw
 What is promised, whatever is cut and wherever (``tests/bench/faults.py`` tries it):
 
 1. A row that ``sync`` returned for is in the folder, once, in every later instant. The service syncs each row within
-   a second of its window being finished; a process that is killed loses no row at all that it had handed over.
+   a second of handing it over; a process that is killed loses no row at all that it had handed over.
 2. No damaged row is ever taken for good: a row counts only with its CRC-32.
 3. After the next start every file is finished and beside its sidecar, its rows follow one another without a gap but
    where the disk itself lost them, and no session number is given twice.
@@ -44,6 +44,7 @@ COUNTER_NAME = "last-session"
 SIDECAR_BYTES = 1_000_000
 """Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
 
+LATEST_UTC_US = 4_102_444_800_000_000  # 2100-01-01
 CLOCK_STEP_US = 100_000
 """A clock map that has moved by less than this need not reach the disk before the file is finished."""
 
@@ -305,6 +306,8 @@ def read_sidecar(log: Path) -> dict[str, Any] | None:
         found = json.loads(text)
     except RecursionError:
         raise ValueError("expected no such deep nesting") from None
+    except ValueError:
+        raise ValueError("expected a JSON object") from None
     if not isinstance(found, dict):
         raise ValueError("expected a JSON object")
     return found
@@ -461,10 +464,10 @@ def _is_of_open_part(sidecar: Path) -> bool:
 
 
 def _clock_of(sidecar: dict[str, Any]) -> ClockMap | None:
-    """The clock map that a sidecar holds, if any. That of an open part holds the session's newest."""
+    """The clock map that a sidecar holds, if any that can be. That of an open part holds the session's newest."""
     stored = sidecar.get("clock_map")
     offset_us = stored.get("offset_us") if isinstance(stored, dict) else None
-    return ClockMap(offset_us) if isinstance(offset_us, int) else None
+    return ClockMap(offset_us) if type(offset_us) is int and 0 <= offset_us < LATEST_UTC_US else None
 
 
 def _replace_file(files: FileSystem, path: Path, blocks: Iterable[bytes]) -> None:

@@ -19,6 +19,8 @@ from typing import Literal, get_args
 
 FOLDER = Path("/run/ridelog-export")
 LED_MEMORY = "led-trigger"
+LARGEST_BYTES = 10_000
+"""Most that is read of a note; what is cut there is none."""
 
 StickState = Literal["copying", "unmounting", "ready"]
 
@@ -49,8 +51,9 @@ def write_note(path: Path, note: StickNote) -> None:
 def read_note(path: Path) -> StickNote | None:
     """A note; None where there is none that can be read."""
     try:
-        note = StickNote(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        with path.open("rb") as file:
+            note = StickNote(**json.loads(file.read(LARGEST_BYTES)))
+    except (OSError, ValueError, TypeError, RecursionError):
         return None
     return note if note.state in get_args(StickState) else None
 

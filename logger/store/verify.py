@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from drivers.dump import ACCELEROMETERS, intact_bytes, open_dump
+from drivers.dump import ACCELEROMETERS, LINE_BYTES, intact_bytes, open_dump
 from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
@@ -28,7 +28,7 @@ from logger.store.segment_log import Row, scan
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
-OPEN_DUMP_ENDING = ".dump.gz.part"
+OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
 SILENCE_US = US_PER_S
 """An accelerometer that says nothing for longer has left a gap in a dump."""
 
@@ -120,7 +120,7 @@ def _files_of(path: Path) -> list[Path]:
     files = sorted(file for file in path.rglob("*")
                    if file.is_file() and not file.is_symlink()
                    and (LogName.of(file) or file.name == manifest.NAME
-                        or file.name.endswith((*DUMP_ENDINGS, OPEN_DUMP_ENDING))))
+                        or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS))))
     if not files:
         raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
     return files
@@ -131,7 +131,7 @@ def _is_part(path: Path) -> bool:
 
 
 def _is_dump(path: Path) -> bool:
-    if path.name.endswith((*DUMP_ENDINGS, OPEN_DUMP_ENDING)):
+    if path.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)):
         return True
     with path.open("rb") as file:
         return file.read(len(_DUMP_START)) == _DUMP_START
@@ -191,8 +191,8 @@ def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, dam
 def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
     try:
         sidecar = read_sidecar(path)
-    except ValueError:
-        findings.wrong("sidecar: expected a JSON object")
+    except ValueError as error:
+        findings.wrong(f"sidecar: {error}")
         return
     said = sidecar.get("log") if sidecar else None
     rows = said.get("rows") if isinstance(said, dict) else None
@@ -219,11 +219,19 @@ def _check_dump(path: Path) -> FileCheck:
     if not _is_part(path):
         _take_events(findings, path)
         return findings.check(path, "dump", "dump")
-    if intact_bytes(path):
+    if _has_begun(path):
         _take_events(findings, path)
     else:
         findings.torn = 1 if path.stat().st_size else 0  # its first block is not whole yet
     return findings.check(path, "dump", "open")
+
+
+def _has_begun(path: Path) -> bool:
+    """Tell whether the first block of an open recording, or the first line of one that is not packed, is whole."""
+    if path.name.endswith(".gz.part"):
+        return intact_bytes(path) > 0
+    with path.open("rb") as file:
+        return file.readline(LINE_BYTES + 1).endswith(b"\n")
 
 
 def _take_events(findings: _Findings, path: Path) -> None:

@@ -44,7 +44,8 @@ def test_what_was_written_is_what_is_read(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"state": "recording"}', "\xff"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"state": "recording"}', "\xff", "[" * 90_000,
+                                  "[" * 10**6])
 def test_another_file_is_refused_by_name(tmp_path: Path, text: str) -> None:
     path = tmp_path / "status.json"
     path.write_bytes(text.encode("latin-1"))

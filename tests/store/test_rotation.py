@@ -439,7 +439,8 @@ def _fresh(parent: Path, name: str) -> Path:
     (b"[" * 100_000, "nesting"),
     (b'{"a":' * 100_000, "nesting"),
     (b"{}" + b" " * SIDECAR_BYTES, "at most"),
-    (b"\xff", "can't decode"),
+    (b"\xff", "JSON object"),
+    (b"{", "JSON object"),
     (b"[]", "JSON object"),
 ])
 def test_a_hostile_sidecar_is_refused_and_costs_no_row(tmp_path: Path, content: bytes, reason: str) -> None:
@@ -451,7 +452,18 @@ def test_a_hostile_sidecar_is_refused_and_costs_no_row(tmp_path: Path, content: 
     repair(tmp_path)
     assert len(read_log(tmp_path / "00001-001.csv").records) == 1
     (tmp_path / "00001-001.json").write_bytes(content)
-    assert verify([tmp_path])[0].problems == ("sidecar: expected a JSON object",)
+    (problem,) = verify([tmp_path])[0].problems
+    assert problem.startswith("sidecar: expected")
+    assert reason in problem
+
+
+@pytest.mark.parametrize("offset_us", [10**400, 10**30, -(10**18), 1.5, True, "1"])
+def test_a_clock_that_cannot_be_is_none(tmp_path: Path, offset_us: object) -> None:
+    log = SegmentLog(tmp_path, 1, SIDECAR, 10**6)
+    log.append(row(1, utc=False))
+    (tmp_path / "00001-001.json").write_text(json.dumps({"clock_map": {"offset_us": offset_us}}))
+    repair(tmp_path)
+    assert read_log(tmp_path / "00001-001.csv").records == (kept(row(1, utc=False)),)
 
 
 def test_a_sidecar_of_the_largest_size_is_read(tmp_path: Path) -> None:

@@ -37,6 +37,13 @@ def put(notes: Path, *all_notes: StickNote) -> None:
         write_note(notes / f"{note.stick}.json", note)
 
 
+@pytest.mark.parametrize("content", ["", "[]", "{", "[" * 9_000, "[" * 10**6, '{"stick": 1}'])
+def test_what_is_no_note_is_passed_over(notes: Path, content: str) -> None:
+    put(notes, DONE)
+    (notes / "sdb1.json").write_text(content)
+    assert read_notes(notes) == [DONE]
+
+
 def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
     put(notes, FAILED, COPYING)
     assert read_notes(notes) == [COPYING, FAILED]

@@ -195,8 +195,9 @@ def test_torn_damaged_and_silent_dumps(tmp_path: Path) -> None:
     assert counts(found(tmp_path / "c.dump.gz")) == (50, 1, 0, 0)
 
 
-def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_path: Path) -> None:
-    path = tmp_path / "00001.dump.gz.part"
+@pytest.mark.parametrize("name", ["00001.dump.gz.part", "00001.dump.part"])
+def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
     writer = DumpWriter(path, DumpHeader(None, {"driver": "bma220"}, {"baud": 9600}, "x"))
     ends = [0]
     for event in SAMPLES:
@@ -211,7 +212,7 @@ def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_p
         assert check.records_torn == (cut not in ends)
         assert check.records_good >= sum(end <= cut for end in ends[1:])
     assert counts(check) == (50, 0, 0, 0)
-    path.write_bytes(whole[:-40] + bytes(40))
+    path.write_bytes(whole[:-40] + bytes(39) + b"\n")
     assert (counts(found(path))[2], found(path).ok) == (1, False)
     writer.close()
 
