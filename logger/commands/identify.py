@@ -1,11 +1,18 @@
 """Vehicle parameters from drives over known roads: a grey-box prediction-error fit.
 
-Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on. What
-is free is named as in the vehicle's file; both.NAME is the front and rear axle together.
+Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was
+driven on. What is free is named as in the vehicle's file; both.NAME is the front and rear axle together.
 
   ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
   ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
       --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --low-pass 20 --out fitted.yaml
+
+What is not known of the road can be free as well: a bump (Eq 4.41) or a step of which only the kind is known, and the
+scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle, and its start is
+looked for where none is given. run2.NAME is that of one run, each.NAME one for every run.
+
+  ridelog identify drive.csv --vehicle rav4-2009 --bump height_m=0.15,width_m=2.6 --free sprung_mass_kg,bump.height_m
+  ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
 
 Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
 that leave no trace at the sensor, and numbers that can be told only together; masses, springs and dampers share one
@@ -27,7 +34,9 @@ if TYPE_CHECKING:
     from logger.identification.fit import Fit
     from logger.identification.noise import Noise
     from logger.identification.parameters import Free
-    from logger.identification.prediction import Record, VehicleModel
+    from logger.identification.prediction import VehicleModel
+    from logger.identification.record import Record
+    from logger.identification.road_input import RoadInput
     from logger.vehicle.vehicle import Vehicle
 
 NOISES = ("auto", "white", "ar", "road")
@@ -37,11 +46,15 @@ _MOST_TRIES = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv, or a drive.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); "
                              "what is not free stays as it says")
     parser.add_argument("--free", required=True, metavar="PARAM,...", help="what to find")
+    parser.add_argument("--bump", metavar="PARAM=M,...",
+                        help="a speed bump on the road: [start_m=M,]height_m=M,width_m=M; free as bump.height_m ...")
+    parser.add_argument("--step", metavar="PARAM=M,...",
+                        help="a step, up or with a negative height down: [start_m=M,]height_m=M; free as step.height_m")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
@@ -68,10 +81,11 @@ def run(args: argparse.Namespace) -> int:
     from logger.store.vehicle_file import read_vehicle
 
     vehicle = read_vehicle(vehicle_path(args.vehicle))
-    records = [_record(folder, args.skip) for folder in args.runs]
-    free = free_of(vehicle, args.free, args.start, args.bounds)
+    road, unplaced = _road(args)
+    records = [_record(path, args.skip, bool(road.obstacles)) for path in args.runs]
+    free = _free(args, vehicle, road, _starts(vehicle, records, road, unplaced))
     try:
-        model = VehicleModel(vehicle, free, records)
+        model = VehicleModel(vehicle, free, records, road)
     except ValueError as error:
         raise BadInput(f"--free: {error}") from None
     options = _options(args, model)
@@ -100,22 +114,71 @@ def run(args: argparse.Namespace) -> int:
 # --- what was asked for ---
 
 
-def free_of(vehicle: Vehicle, wanted: str, starts: list[str], bounds: list[str]) -> list[Free]:
-    """The free numbers. BadInput for names, starts and bounds that do not fit."""
+def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
+    """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
+    starts and bounds that do not fit."""
     from logger.identification.parameters import free
+    from logger.identification.road_input import expanded, free_input, is_input, run_and_name
 
-    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    runs = len(args.runs)
+    wanted = [name.strip() for name in args.free.split(",") if name.strip()]
+    names = [one for name in wanted for one in expanded(name, runs)]
     if not names or len(set(names)) < len(names):
-        raise BadInput(f"--free {wanted}: expected names with commas between them, each once")
-    start = {name: values[0] for name, values in (_numbers(one, "--start", 1) for one in starts)}
-    between = {name: (values[0], values[1]) for name, values in (_numbers(one, "--bounds", 2) for one in bounds)}
+        raise BadInput(f"--free {args.free}: expected names with commas between them, each once")
+    named = {run_and_name(name)[1] for name in names}
+    names += [name for name in found if run_and_name(name)[1] not in named]
+    start = {one: values[0] for name, values in (_numbers(text, "--start", 1) for text in args.start)
+             for one in expanded(name, runs)}
+    between = {one: (values[0], values[1]) for name, values in (_numbers(text, "--bounds", 2) for text in args.bounds)
+               for one in expanded(name, runs)}
     for option, given in (("--start", start), ("--bounds", between)):
         if unknown := set(given) - set(names):
             raise BadInput(f"{option} {sorted(unknown)[0]}: expected one of what is free ({', '.join(names)})")
+    first = {run_and_name(name)[1]: place for name, place in reversed(found.items())}
+    start = {**first, **found, **start}
     try:
-        return [free(vehicle, name, start.get(name), between.get(name)) for name in names]
+        return [free_input(road, name, start.get(name), between.get(name)) if is_input(name)
+                else free(vehicle, name, start.get(name), between.get(name)) for name in names]
     except ValueError as error:
         raise BadInput(f"--free: {error}") from None
+
+
+def _road(args: argparse.Namespace) -> tuple[RoadInput, list[str]]:
+    """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
+    from logger.identification.obstacles import Bump, Step
+    from logger.identification.road_input import RoadInput
+
+    found: dict[str, Any] = {}
+    unplaced = []
+    for name, kind, needed in (("bump", Bump, ("height_m", "width_m")), ("step", Step, ("height_m",))):
+        text = getattr(args, name)
+        if text is None:
+            continue
+        numbers = {key: values[0] for key, values in (_numbers(one, f"--{name}", 1) for one in text.split(","))}
+        if not set(needed) <= set(numbers) <= {"start_m", *needed}:
+            raise BadInput(f"--{name} {text}: expected [start_m=M,]{','.join(f'{one}=M' for one in needed)}")
+        if "start_m" not in numbers:
+            unplaced.append(name)
+        try:
+            found[name] = kind(**{"start_m": 0.0, **numbers})
+        except ValueError as error:
+            raise BadInput(f"--{name} {text}: {error}") from None
+    return RoadInput(**found), unplaced
+
+
+def _starts(vehicle: Vehicle, records: list[Record], road: RoadInput, unplaced: list[str]) -> dict[str, float]:
+    """Where an obstacle that was given no start begins in each run, by the names of these numbers."""
+    from logger.identification.locate import located
+    from logger.identification.road_input import EACH, expanded
+
+    found = {}
+    for part in unplaced:
+        for name, record in zip(expanded(f"{EACH}.{part}.start_m", len(records)), records, strict=True):
+            try:
+                found[name] = located(vehicle, record, road, part)
+            except ValueError as error:
+                raise BadInput(f"--{error}") from None
+    return found
 
 
 def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
@@ -129,15 +192,23 @@ def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
     return name, values
 
 
-def _record(folder: Path, skip_s: float) -> Record:
-    from logger.identification.prediction import Record
-    from logger.store.drive_file import read_run
+def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
+    import numpy as np
 
-    drive = read_run(folder)
+    from logger.identification.record import Record
+    from logger.roads.track import Track
+    from logger.store.drive_file import DRIVE, PROFILE, Run, read_drive, read_run
+
+    folder = path.is_dir()
+    if flat_will_do and not (folder and (path / PROFILE).exists()):
+        drive = read_drive(path / DRIVE if folder else path)
+    else:
+        drive = read_run(path)
+    track = drive.track if isinstance(drive, Run) else Track(1.0, np.zeros(2))
     if not 0 <= skip_s < len(drive.time_s) / drive.rate_hz - _LEAST_SAMPLES / drive.rate_hz:
-        raise BadInput(f"{folder}: expected at least {_LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
+        raise BadInput(f"{path}: expected at least {_LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
                        f"left out (--skip), found {len(drive.time_s) / drive.rate_hz:g} s in all")
-    return Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, drive.track, skip_s)
+    return Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
 
 
 def _options(args: argparse.Namespace, model: VehicleModel) -> Any:

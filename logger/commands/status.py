@@ -75,6 +75,7 @@ def advice(status: ServiceStatus) -> list[str]:
     if status.free_bytes is not None and status.free_bytes < _LITTLE_ROOM_BYTES:
         steps.append(f"Disk: {status.free_bytes / 1e6:.0f} MB left in {status.log_directory}. Copy the finished logs "
                      "away and delete them.")
+    steps += status.notices
     return steps or ["Nothing: all is well."]
 
 

@@ -151,8 +151,9 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
         start = {}
         for index, one in enumerate(free):
             share = (0.5 + number / ratio ** (index + 1)) % 1.0
-            if one.positive:
-                low, high = max(one.low, one.start / _FAR), min(one.high, one.start * _FAR)
+            if one.by_factors:
+                near, far = sorted((one.start / _FAR, one.start * _FAR))
+                low, high = max(one.low, near), min(one.high, far)
                 start[one.name] = float(low * (high / low) ** share)
             else:
                 start[one.name] = one.low + share * (one.high - one.low)
@@ -185,8 +186,8 @@ class _Point:
 
 @dataclass(eq=False)
 class _Problem:
-    """A model and its measurements. A coordinate is the logarithm of a number that is positive; of any other, the
-    number over half the width of its bounds."""
+    """A model and its measurements. A coordinate is the logarithm of the size of a number that keeps its sign; of any
+    other, the number over half the width of its bounds."""
 
     model: Model
     measured: Sequence[Array]
@@ -197,19 +198,19 @@ class _Problem:
         if not self.free:
             raise ValueError("expected at least one free number")
         self.low_pass = LowPass(self.options.rate_hz, self.options.low_pass_hz)
-        self.log = np.array([one.positive for one in self.free])
-        self.unit = np.array([1.0 if one.positive else (one.high - one.low) / 2 for one in self.free])
-        self.low, self.high = (self.coordinates(np.array([getattr(one, end) for one in self.free]))
-                               for end in ("low", "high"))
+        self.log = np.array([one.by_factors for one in self.free])
+        self.unit = np.array([np.sign(one.start) if one.by_factors else (one.high - one.low) / 2 for one in self.free])
+        ends = [self.coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high")]
+        self.low, self.high = np.minimum(*ends), np.maximum(*ends)
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         self.floor = LEAST_SHARE * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2))) or LEAST_SHARE
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
 
     def coordinates(self, values: Array) -> Array:
-        return np.where(self.log, np.log(np.where(self.log, values, 1.0)), values / self.unit)
+        return np.where(self.log, np.log(np.where(self.log, np.abs(values), 1.0)), values / self.unit)
 
     def values(self, x: Array) -> Array:
-        return np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x * self.unit)
+        return self.unit * np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x)
 
     def per_coordinate(self, values: Array) -> Array:
         """Derivatives of the numbers by their coordinates (p,)."""
@@ -366,7 +367,8 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
     at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
                 if x - low < _AT_BOUND or high - x < _AT_BOUND]
     if not findings:
-        findings = problem.structural_findings(point.x) or statistical(names, relative)
+        findings = problem.structural_findings(point.x) or statistical(
+            names, relative, np.array([one.weakest for one in problem.free]))
         if findings and problem.options.refuse:
             raise NotIdentifiable(findings)
     values = problem.values(point.x)

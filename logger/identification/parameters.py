@@ -19,6 +19,8 @@ _BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_w
 _AXLE = ("cg_distance_m", "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
          "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
 _PLACE = {"half_car": ("ahead_m",), "full_car": ("ahead_m", "left_m")}
+WEAKEST = 0.5
+"""A number whose standard error is larger than this share of it has not been measured."""
 # How far from its start a number may go when nothing else is said: a factor, and limits for places on the car [m].
 _FACTOR = 20.0
 _LENGTH_FACTOR = 3.0
@@ -28,7 +30,13 @@ _LONGEST_PATCH_M = 1.0
 
 @dataclass(frozen=True)
 class Free:
-    """A number that a fit may change: where it starts, and the bounds it stays between.
+    """A number that a fit may change.
+
+    start       where it starts
+    low, high   the bounds it stays between
+    place       it is one, whatever its bounds
+    weakest     the largest standard error of what is still an estimate, as a share of its size or, of a place, of half
+                the width of its bounds
 
     ValueError unless low < high and the start lies between them.
     """
@@ -37,6 +45,8 @@ class Free:
     start: float
     low: float
     high: float
+    place: bool = False
+    weakest: float = WEAKEST
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -44,9 +54,10 @@ class Free:
                              f"{self.low:g} to {self.high:g}")
 
     @property
-    def positive(self) -> bool:
-        """Whether it is a size, which moves by factors, and not a place, which moves by differences."""
-        return self.low > 0
+    def by_factors(self) -> bool:
+        """Whether it is a size, which keeps its sign and moves by factors, and not a place, which moves by
+        differences."""
+        return not self.place and self.low * self.high > 0
 
 
 def names(vehicle: Vehicle) -> list[str]:

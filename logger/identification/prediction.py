@@ -24,26 +24,27 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.parameters import AXLES, BOTH, Free, changed, read
+from logger.identification.record import Record
+from logger.identification.road_in_time import RoadInTime
+from logger.identification.road_input import (
+    RoadInput,
+    changed_input,
+    check_names,
+    is_input,
+    read_input,
+    run_and_name,
+)
 from logger.roads.iso8608 import displacement_psd
-from logger.roads.track import Track
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
+from logger.vehicle.simulate import recorder_taps
 from logger.vehicle.structure import Structure, body_acceleration_response, body_point
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-SKIP_S = 2.0
-"""What the beginning of a run is left out, as its past is not known [s]."""
-# The car has come to the first sample as fast as it goes there for so long [s].
-_APPROACH_S = 3.0
-# How long the road behind a record takes to come back to where it began [s].
-_RETURN_S = 6.0
-_ROUND_THE_END = 1e-4
 # Steps of the differences that derivatives of matrices (exact: they are quadratic at most) and of roads are taken by.
 _RELATIVE_STEP = 1e-3
-_EVEN = 1e-3
 # Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
 _SPEEDS = 12
 _SLOWEST_MPS = 0.5
@@ -70,86 +71,73 @@ class Differentiable(Model, Protocol):
         """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
-    """One run, evenly sampled: arrays (n,).
-
-    time_s           [s]
-    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
-    distance_m       where the front tires stand on the track [m]
-    speed_mps        [m/s]
-    skip_s           how much of the beginning is left out of fits and errors [s]
-
-    ValueError for arrays of different lengths, or nothing left after the beginning.
-    """
-
-    time_s: Array
-    measured_mps2: Array
-    distance_m: Array
-    speed_mps: Array
-    track: Track
-    skip_s: float = SKIP_S
-
-    def __post_init__(self) -> None:
-        lengths = {len(one) for one in (self.time_s, self.measured_mps2, self.distance_m, self.speed_mps)}
-        if len(lengths) != 1 or len(self.time_s) - self.first < 2:
-            raise ValueError(f"record: expected columns of one length, longer than {self.skip_s:g} s")
-
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second."""
-        return float((len(self.time_s) - 1) / (self.time_s[-1] - self.time_s[0]))
-
-    @property
-    def first(self) -> int:
-        """The first sample that is not left out."""
-        return int(np.ceil(self.skip_s * self.rate_hz - _EVEN))
-
-    @property
-    def kept_mps2(self) -> Array:
-        """What was measured, without the beginning."""
-        return self.measured_mps2[self.first:]
-
-
 class VehicleModel:
-    """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle``.
+    """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle`` and ``road``.
 
-    The car comes to the first sample of a record at the speed it has there, over the road that the track has there.
-    ValueError for a name that the vehicle has no number of, or that sets what another one sets.
+    A free number is the car's (``parameters.names``) or the road's (``road_input``). The car comes to the first sample
+    of a record at the speed it has there, over the road that the track has there. ValueError for a name that neither
+    has a number of, or that sets what another one sets.
     """
 
-    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record]) -> None:
+    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record],
+                 road: RoadInput | None = None) -> None:
         self.vehicle, self.parameters, self.records = vehicle, list(parameters), list(records)
+        self.road = road or RoadInput()
         wanted = [one.name for one in parameters]
+        check_names(wanted, len(records))
         for name in wanted:
-            read(vehicle, name)
+            read_input(self.road, name) if is_input(name) else read(vehicle, name)
             part, _, leaf = name.rpartition(".")
             if wanted.count(name) > 1 or (part in AXLES and f"{BOTH}.{leaf}" in wanted):
                 raise ValueError(f"expected every number once, found {name} twice")
-        self._roads = [_RoadInTime(record) for record in records]
+        self._roads = [RoadInTime(record) for record in records]
         self.measured = [record.kept_mps2 for record in records]
 
     def vehicle_with(self, values: Array) -> Vehicle:
         """The vehicle with these values of its free numbers."""
-        names = [one.name for one in self.parameters]
-        return changed(self.vehicle, dict(zip(names, map(float, values), strict=True)))
+        return changed(self.vehicle, {name: value for name, value in self._named(values) if not is_input(name)})
+
+    def road_with(self, values: Array, run: int) -> RoadInput:
+        """The road's input in a run, counted from 0, with these values of the free numbers."""
+        return changed_input(self.road, {name: value for name, value in self._named(values) if is_input(name)}, run)
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
         car = _car(self.vehicle_with(values))
-        return [road.samples(_responses(car, road)[0]) for road in self._roads]
+        return [road.samples(_response(car, road.s, road.under_wheels(car.structure, self.road_with(values, run))))
+                for run, road in enumerate(self._roads)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``Differentiable``; derivatives are exact but for those by places and lengths, which shift the road."""
+        """As ``Differentiable``; derivatives are exact but for those by places and lengths of the car, which shift the
+        road."""
         vehicle = self.vehicle_with(values)
-        changes = [_change(vehicle, one) for one in self.parameters]
         car = _car(vehicle)
+        changes = {index: _change(vehicle, one) for index, one in enumerate(self.parameters) if not is_input(one.name)}
         predictions, slopes = [], []
-        for road in self._roads:
-            acceleration, derivatives = _responses(car, road, changes)
-            predictions.append(road.samples(acceleration))
+        for run, road in enumerate(self._roads):
+            at = self.road_with(values, run)
+            under = road.under_wheels(car.structure, at)
+            q, w = _solved(car, road.s, under)
+            derivatives = np.zeros((len(self.parameters), len(road.s)), dtype=complex)
+            for index, change in changes.items():
+                moved = None
+                if change.shifts_road:
+                    before, after = (road.under_wheels(one.structure, at) for one in (change.before, change.after))
+                    moved = (after - before) / change.apart
+                derivatives[index] = _by_car(car, change, road.s, under, q, w, moved)
+            for index, name in self._inputs_of(run):
+                derivatives[index] = _through(car, w, road.by_input(car.structure, at, name))
+            predictions.append(road.samples(road.s**2 * (q @ car.row)))
             slopes.append(road.samples(derivatives).T)
         return predictions, slopes
+
+    def _inputs_of(self, run: int) -> list[tuple[int, str]]:
+        """Which free numbers change the road's input in a run: their indices, and their names for all runs."""
+        names = [(index, *run_and_name(one.name)) for index, one in enumerate(self.parameters) if is_input(one.name)]
+        return [(index, name) for index, only, name in names if only in (None, run)]
+
+    def _named(self, values: Array) -> list[tuple[str, float]]:
+        return list(zip([one.name for one in self.parameters], map(float, values), strict=True))
 
     def road_spectra(self, values: Array, f_hz: Array) -> list[Array]:
         """What the sensor makes of a random road of Gd(n0) = 1 cm3 under the whole of each record: one-sided spectra
@@ -157,8 +145,9 @@ class VehicleModel:
         vehicle = self.vehicle_with(values)
         structure = structure_of(vehicle)
         spectra = []
-        for record in self.records:
-            speed = np.quantile(record.speed_mps[record.first:], (np.arange(_SPEEDS) + 0.5) / _SPEEDS)[:, None]
+        for run, record in enumerate(self.records):
+            true_mps = record.speed_mps[record.first:] / self.road_with(values, run).speed_scale
+            speed = np.quantile(true_mps, (np.arange(_SPEEDS) + 0.5) / _SPEEDS)[:, None]
             speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
             f = np.maximum(f_hz, 1 / _LONGEST_S)
             response = np.abs(body_acceleration_response(structure, f, speed, vehicle.sensor)) ** 2
@@ -166,10 +155,12 @@ class VehicleModel:
             spectra.append((response * displacement_psd(f / speed, 1.0) / speed).mean(axis=0) * recorder)
         return spectra
 
-    def inputs(self) -> list[Array]:
-        """Vertical acceleration of the road under the wheels (n, w) per record [m/s2], band-limited, for tests."""
+    def inputs(self, values: Array) -> list[Array]:
+        """Vertical acceleration of the road under the wheels (n, w) per record with these values [m/s2], band-limited,
+        for tests."""
         structure = structure_of(self.vehicle)
-        return [road.samples(road.s**2 * road.under_wheels(structure).T).T for road in self._roads]
+        return [road.samples(road.s**2 * road.under_wheels(structure, self.road_with(values, run)).T).T
+                for run, road in enumerate(self._roads)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +198,7 @@ def _car(vehicle: Vehicle) -> _Car:
 
 def _change(vehicle: Vehicle, one: Free) -> _Change:
     value = read(vehicle, one.name)
-    step = _RELATIVE_STEP * (abs(value) if one.positive else 1.0)
+    step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
     before, after = (_car(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
     low, high, apart = before.structure, after.structure, 2 * step
     return _Change((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
@@ -215,111 +206,41 @@ def _change(vehicle: Vehicle, one: Free) -> _Change:
                    (after.row - before.row) / apart, before, after, apart)
 
 
-def _responses(car: _Car, road: _RoadInTime, changes: Sequence[_Change] = ()) -> tuple[Complex, Complex]:
-    """Transforms of the sensor's acceleration (f,) and of its derivatives (p, f).
+def _response(car: _Car, s: Complex, under: Complex) -> Complex:
+    """Transform (f,) of the sensor's acceleration, of a road (f, w) under the wheels."""
+    forces = under @ car.structure.road.T
+    return np.asarray(s**2 * (np.linalg.solve(_dynamic(car, s), forces[..., None])[..., 0] @ car.row))
 
-    With D = s2 M + s C + K, D q = R z and y = s2 r q: dy = s2 dr q + w (dR z + R dz - dD q), where D w = s2 r.
-    """
-    s, z, structure = road.s, road.under_wheels(car.structure), car.structure
+
+def _solved(car: _Car, s: Complex, under: Complex) -> tuple[Complex, Complex]:
+    """q and w (f, n), with D = s2 M + s C + K, D q = R z and D w = s2 r; the sensor reads y = s2 r q."""
+    forces = np.stack([under @ car.structure.road.T, (s * s)[:, None] * car.row], axis=-1)
+    q, w = np.moveaxis(np.linalg.solve(_dynamic(car, s), forces), -1, 0)
+    return q, w
+
+
+def _dynamic(car: _Car, s: Complex) -> Complex:
+    structure = car.structure
+    return np.asarray((s * s)[:, None, None] * structure.mass + s[:, None, None] * structure.damping
+                      + structure.stiffness)
+
+
+def _through(car: _Car, w: Complex, moved: Complex) -> Complex:
+    """What the sensor makes (f,) of a change (f, w) of the road under the wheels: w R dz."""
+    return np.asarray((w * (moved @ car.structure.road.T)).sum(axis=1))
+
+
+def _by_car(car: _Car, change: _Change, s: Complex, under: Complex, q: Complex, w: Complex,
+            moved: Complex | None) -> Complex:
+    """Derivative (f,) of the sensor's acceleration by a number of the car: s2 dr q + w (dR z - dD q) + w R dz."""
     s2 = s * s
-    dynamic = s2[:, None, None] * structure.mass + s[:, None, None] * structure.damping + structure.stiffness
-    forces = np.stack([z @ structure.road.T, s2[:, None] * car.row], axis=-1)
-    q, w = np.moveaxis(np.linalg.solve(dynamic, forces), -1, 0)
-    derivatives = np.empty((len(changes), len(s)), dtype=complex)
-    for index, change in enumerate(changes):
-        force = z @ change.road.T - s2[:, None] * (q @ change.mass.T) - s[:, None] * (q @ change.damping.T)
-        force -= q @ change.stiffness.T
-        if change.shifts_road:
-            moved = road.under_wheels(change.after.structure) - road.under_wheels(change.before.structure)
-            force += moved @ structure.road.T / change.apart
-        derivatives[index] = (w * force).sum(axis=1) + s2 * (q @ change.row)
-    return s2 * (q @ car.row), derivatives
+    force = under @ change.road.T - s2[:, None] * (q @ change.mass.T) - s[:, None] * (q @ change.damping.T)
+    force -= q @ change.stiffness.T
+    derivative = (w * force).sum(axis=1) + s2 * (q @ change.row)
+    return np.asarray(derivative if moved is None else derivative + _through(car, w, moved))
 
 
 def _recorder_gain(f_of_rate: Array) -> Array:
     """The size of the recorder's gain at shares of its rate (f,)."""
     gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
     return np.interp(f_of_rate * _GAIN_GRID / _GAIN_STEPS, np.arange(len(gains)), gains)
-
-
-class _RoadInTime:
-    """The road under the wheels of one record, transformed.
-
-    s    (f,) where the transform is taken [1/s]
-    """
-
-    def __init__(self, record: Record) -> None:
-        rate_hz = record.rate_hz
-        self._track = record.track
-        self._steps = int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN))
-        fine_hz = rate_hz * self._steps
-        lead, half = int(np.ceil(_APPROACH_S * rate_hz)), (len(recorder_taps(1)) - 1) // 2
-        distance = record.distance_m
-        pace_m = distance[1] - distance[0]
-        ahead_m = distance[-1] - distance[-2]
-        way = np.concatenate([distance[0] + pace_m * np.arange(-lead, 0), distance,
-                              distance[-1] + ahead_m * np.arange(1, 2 * half)])
-        self._way_m = _finer(way, self._steps)
-        self._count = _smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
-        self._kept = slice(lead + record.first, lead + len(distance))
-        damping = -np.log(_ROUND_THE_END) * rate_hz / self._count
-        f_hz = np.arange(self._count // 2) * rate_hz / self._count
-        self.s = damping + 2j * np.pi * f_hz
-        self._fading = np.exp(-damping * np.arange(self._count * self._steps) / fine_hz)
-        self._growth = np.exp(damping * np.arange(self._count) / rate_hz)[self._kept]
-        # The mean over a step is the road times this, and the recorder's filter follows.
-        over = self.s / fine_hz
-        taps = recorder_taps(self._steps)
-        place = np.arange(len(taps)) - (len(taps) - 1) / 2
-        fading_taps = np.zeros(self._count * self._steps)
-        fading_taps[: len(taps)] = taps * np.exp(-damping * place / fine_hz)
-        filtered = np.fft.rfft(fading_taps)[: len(f_hz)] * np.exp(2j * np.pi * f_hz * (len(taps) - 1) / 2 / fine_hz)
-        self._filter = filtered * over / np.expm1(over) / self._steps
-        self._known: dict[tuple[float, ...], Complex] = {}
-
-    def under_wheels(self, structure: Structure) -> Complex:
-        """Transforms (f, w) of the elevations under the wheels, counted from where they began [m s]."""
-        place = (structure.contact_patch_m, *structure.behind_m, *structure.left_m)
-        if place not in self._known:
-            if len(self._known) > 2:
-                self._known.clear()
-            paths = self._track.tire_paths(structure.contact_patch_m)
-            wheels = [
-                self._transform((paths[-1] if left_m < 0 else paths[0]).step_means(self._way_m - behind_m)[1])
-                for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True)
-            ]
-            self._known[place] = np.stack(wheels, axis=1)
-        return self._known[place]
-
-    def samples(self, transform: Complex) -> Array:
-        """The samples (..., n) of transforms (..., f), without the beginning."""
-        return np.fft.irfft(transform, self._count)[..., self._kept] * self._growth
-
-    def _transform(self, means: Array) -> Complex:
-        rise = means - means[0]
-        back = np.zeros(len(self._fading))
-        back[: len(rise)] = rise
-        rest = len(back) - len(rise)
-        back[len(rise):] = rise[-1] * 0.5 * (1 + np.cos(np.pi * np.arange(rest) / rest))
-        return np.fft.rfft(back * self._fading)[: len(self.s)] * self._filter
-
-
-def _finer(distance: Array, steps: int) -> Array:
-    """Distances ``steps`` times as dense: cubics with the slopes that the neighbours give."""
-    slope = np.gradient(distance)
-    along = np.arange(steps) / steps
-    rise = np.diff(distance)[:, None]
-    first, last = slope[:-1, None], slope[1:, None]
-    curve = distance[:-1, None] + along * (first + along * (3 * rise - 2 * first - last
-                                                            + along * (first + last - 2 * rise)))
-    return np.append(curve.ravel(), distance[-1])
-
-
-def _smooth_length(least: int) -> int:
-    """An even number from ``least`` on that has no prime factor above 5, so that transforms are quick."""
-    best = 2 ** int(np.ceil(np.log2(least)))
-    for fives in range(4):
-        for threes in range(6):
-            odd = 5**fives * 3**threes
-            best = min(best, odd * 2 ** max(1, int(np.ceil(np.log2(least / odd)))))
-    return best

@@ -19,7 +19,7 @@ _DOUBTFUL = 0.1
 def tests(model: VehicleModel, fit: Fit) -> tuple[Test, Test]:
     """Whether the fit's residuals are white, and whether they are free of the road."""
     inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
-              zip(fit.noise.whiteners, model.inputs(), strict=True)]
+              zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
     return (autocorrelation(fit.white, fit.noise.parameters - 1),
             cross_correlation(fit.white, inputs, fit.sensitivities))
 
@@ -54,7 +54,7 @@ def _p_value(test: Test) -> float | None:
 def interval(fit: Fit, name: str) -> tuple[float, float]:
     """The 95 % interval of an estimate; of a size in the logarithm, so that it stays above 0."""
     value, error = fit.parameters[name], fit.standard_errors[name]
-    if next(one for one in fit.free if one.name == name).positive:
+    if next(one for one in fit.free if one.name == name).by_factors:
         factor = float(np.exp(NORMAL_95 * error / value))
         return value / factor, value * factor
     return value - NORMAL_95 * error, value + NORMAL_95 * error
@@ -139,7 +139,8 @@ def _limits(fit: Fit) -> Iterator[str]:
 def _least_known(fit: Fit) -> str:
     """The combination that is known worst: the longest axis of the error ellipsoid in relative changes."""
     names = list(fit.parameters)
-    scale = np.array([abs(fit.parameters[one.name]) if one.positive else (one.high - one.low) / 2 for one in fit.free])
+    scale = np.array([abs(fit.parameters[one.name]) if one.by_factors else (one.high - one.low) / 2
+                      for one in fit.free])
     powers, directions = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
     ends = [directions[:, 0], directions[:, -1]]
     said = []

@@ -7,7 +7,8 @@ of each number and in units of the noise, are looked at before anything is belie
 - a number whose derivative is nothing is silent;
 - numbers whose derivatives cancel in some combination can be told only together (a vanishing singular value of the
   scaled derivatives), whatever the noise;
-- a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak.
+- a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak; of some
+  numbers, such as a speed that was recorded, a rougher estimate than they came with is worth nothing.
 """
 
 from __future__ import annotations
@@ -19,12 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import CheckFailed
+from logger.identification.parameters import WEAKEST
 
 Array = npt.NDArray[np.float64]
 
 SILENT, TOGETHER, WEAK = "silent", "together", "weak"
-WEAKEST = 0.5
-"""Largest standard error of what is still an estimate, relative to its size or half the width of its bounds."""
 NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
 _PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
@@ -77,18 +77,22 @@ def structural(names: Sequence[str], derivatives: Array, size: float, nothing: f
     return findings
 
 
-def statistical(names: Sequence[str], covariance: Array) -> list[Finding]:
-    """What the noise leaves too uncertain: covariance (p, p) of the relative changes."""
+def statistical(names: Sequence[str], covariance: Array, weakest: Array | None = None) -> list[Finding]:
+    """What the noise leaves too uncertain: covariance (p, p) of the relative changes.
+
+    weakest    (p,) the largest deviation of each that is still an estimate; None: ``WEAKEST``
+    """
     deviations = np.sqrt(np.diag(covariance))
-    weak = deviations > WEAKEST
+    limits = np.full(len(names), WEAKEST) if weakest is None else weakest
+    weak = deviations > limits
     if not weak.any():
         return []
     findings = []
-    powers, directions = np.linalg.eigh(covariance)
+    powers, directions = np.linalg.eigh(covariance / np.outer(limits, limits))
     for power, direction in zip(powers[::-1], directions.T[::-1], strict=True):
-        if power <= WEAKEST**2 or not weak.any():
+        if power <= 1 or not weak.any():
             break
-        shares = _shares(names, direction)
+        shares = _shares(names, direction * limits)
         told = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
         if len(shares) == 1:
             (name, error), = told.items()

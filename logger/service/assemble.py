@@ -116,6 +116,15 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
 
 
+def notices(vehicle: Vehicle) -> tuple[str, ...]:
+    """What the settings allow and somebody should know all the same."""
+    if not vehicle.sensor.left_m:
+        return ()
+    side = "left" if vehicle.sensor.left_m > 0 else "right"
+    return (f"vehicle {vehicle.name}: the sensor sits {abs(vehicle.sensor.left_m):g} m {side} of the middle "
+            "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
+
+
 def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {

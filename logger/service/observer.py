@@ -40,6 +40,7 @@ class Observer:
         gps: Supervisor,
         counters: Mapping[str, Callable[[], dict[str, int]]],
         deadlines: Deadlines,
+        notices: tuple[str, ...] = (),
     ) -> None:
         self._config = config
         self._core = core
@@ -48,6 +49,7 @@ class Observer:
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
         self._deadlines = deadlines
+        self._notices = notices
         self._began_us = monotonic_us()
         self._told_us = self._began_us
         self._state_since: dict[str, tuple[str, int]] = {}
@@ -111,6 +113,7 @@ class Observer:
             free_bytes=_free_bytes(str(self._config.log.directory)),
             last_window=self._core.last_record,
             storage=storage,
+            notices=self._notices,
             counters={
                 "missed_samples": self._deadlines.missed,
                 "late_samples": self._pipeline.late_samples,

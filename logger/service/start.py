@@ -59,7 +59,10 @@ def _serve(config: Config, stop: threading.Event) -> None:
     pace = deadlines.wait if config.accelerometer.driver == "bma220" else gather
     listeners = [Listener(accelerometer, events, pace), Listener(gps, events, gather)]
     counters = {"accelerometer": sensor.counters, "gps": lambda: asdict(decoder.counters)}
-    observer = Observer(config, core, storage, pipeline, accelerometer, gps, counters, deadlines)
+    notices = assemble.notices(vehicle)
+    for notice in notices:
+        log.warning("%s", notice)
+    observer = Observer(config, core, storage, pipeline, accelerometer, gps, counters, deadlines, notices)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:

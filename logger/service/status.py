@@ -94,6 +94,7 @@ class ServiceStatus:
     distance_m      travelled since the start of the service [m]
     free_bytes      room left where the logs are; None: not known
     last_window     the newest row; None before the first
+    notices         what the settings allow and somebody should know all the same
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
     """
 
@@ -114,6 +115,7 @@ class ServiceStatus:
     free_bytes: int | None = None
     last_window: WindowRecord | None = None
     storage: StorageStatus = StorageStatus()
+    notices: tuple[str, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -138,6 +140,7 @@ def read_status(path: Path) -> ServiceStatus | None:
         fields["accelerometer"] = _sensor(fields["accelerometer"])
         fields["gps"] = _sensor(fields["gps"])
         fields["storage"] = StorageStatus(**fields["storage"])
+        fields["notices"] = tuple(map(str, fields["notices"]))
         status = ServiceStatus(**fields)
     except FileNotFoundError:
         return None

@@ -40,7 +40,7 @@ def test_both_axles_get_one_value() -> None:
 def test_bounds_of_their_own() -> None:
     assert free(CAR, "sprung_mass_kg") == Free("sprung_mass_kg", 875, 43.75, 17_500)
     assert free(CAR, "sprung_mass_kg", 700, (500, 1000)) == Free("sprung_mass_kg", 700, 500, 1000)
-    assert (free(CAR, "sensor.ahead_m").low, free(CAR, "sensor.ahead_m").positive) == (-3.0, False)
+    assert (free(CAR, "sensor.ahead_m").low, free(CAR, "sensor.ahead_m").by_factors) == (-3.0, False)
     assert free(CAR, "contact_patch_m", 0.5).high == 1.0
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from drivers.dump import Event, open_dump
+from logger.shipped import vehicle_file
 
 PATIENCE_S = 20.0
 
@@ -195,6 +196,20 @@ def test_accelerometer_missing_at_start_while_the_rest_goes_on(
     assert status["last_window"]["a_w_mps2"] is None
     assert status["last_window"]["lat_deg"] is not None
     assert service.terminate() == 0
+
+
+def test_a_sensor_beside_the_middle_line_is_told_of(start: Callable[[], Service], tmp_path: Path) -> None:
+    car = vehicle_file("rav4-2009-full").read_text()
+    (tmp_path / "car.yaml").write_text(f"{car}\nsensor: {{left_m: -0.3}}\n")
+    write_config(tmp_path, "250")
+    with (tmp_path / "ridelog.yaml").open("a") as settings:
+        settings.write("vehicle: ./car.yaml\n")
+    service = start()
+    (notice,) = service.wait_for(lambda status: True)["notices"]
+    assert "0.3 m right of the middle" in notice
+    assert "roll is not corrected" in notice
+    assert service.terminate() == 0
+    assert service.errors.read_text().count(notice) == 1
 
 
 def test_status_for_a_person_and_for_a_program(

@@ -39,8 +39,9 @@ def test_what_was_written_is_what_is_read(tmp_path: Path) -> None:
     path = tmp_path / "status.json"
     assert read_status(path) is None
     write_status(path, replace(STATUS, last_window=None))
-    write_status(path, STATUS)
-    assert read_status(path) == STATUS
+    known = replace(STATUS, notices=("roll is not corrected", "another"))
+    write_status(path, known)
+    assert read_status(path) == known
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -100,6 +101,7 @@ def test_the_screen_of_a_healthy_service_says_so() -> None:
     ({"storage": StorageStatus(rows_lost=3)}, "3 rows were lost"),
     ({"storage": StorageStatus(recording_trouble="little room")}, "not recorded: little room"),
     ({"storage": StorageStatus(dumps_lost=2)}, "2 dumps were removed"),
+    ({"notices": ("roll is not corrected",)}, "roll is not corrected"),
 ])
 def test_the_screen_says_what_to_do_next(change: dict[str, object], step: str) -> None:
     lines = screen(replace(STATUS, **change), None)
