@@ -41,7 +41,7 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
     """
     data = data.removeprefix(_BYTE_ORDER_MARK).rstrip()
     refuse_long_lines(data, file)
-    first = data.split(b"\n", 1)[0].decode("ascii", "replace").strip()
+    first = data.split(b"\n", 1)[0].decode("utf-8", "replace").strip()
     names = tuple(name.strip() for name in first.split(","))
     wanted = choose(names)
     if wanted is None:
@@ -86,7 +86,7 @@ def _by_line(data: bytes, file: str, names: Names, wanted: Names) -> Array:
         for name, place in places.items():
             if not _NUMBER.fullmatch(fields[place]) or not isfinite(float(fields[place])):
                 found = shown(fields[place].decode("ascii", "replace").strip())
-                raise BadInput(f"{file}:{line}: expected a number for {name}, found {found}")
+                raise BadInput(f"{file}:{line}: expected a number for {shown(name)}, found {found}")
             table.append(float(fields[place]))
     return np.frombuffer(table).reshape(-1, len(wanted))
 

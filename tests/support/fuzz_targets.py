@@ -29,6 +29,7 @@ from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.assemble import config_for_dump
 from logger.service.config import load_config
+from logger.store.channel_file import read_channels
 from logger.store.drive_file import read_run
 from logger.store.profile_file import read_profile
 from logger.store.record_file import read_record
@@ -530,6 +531,26 @@ def drive(folder: Path) -> Target:
                   file=str(file.path))
 
 
+def channels(folder: Path) -> Target:
+    rows = b"".join(b"%.2f,%d,%.1f\n" % (0.01 * k, k % 3, 0.1 * (k % 5)) for k in range(12))
+    plain = b"t_s,first,second\n" + rows
+    text = b"n,second,t_s,first\n" + b"".join(b"a,%d,%.2f,%d\n" % (k % 2, 0.01 * k, k % 4) for k in range(9))
+    file = _File(folder, "channels.csv")
+
+    def read(data: bytes, rng: random.Random) -> Hashable:
+        only = ("first", "second") if rng.random() < 0.5 else ()
+        found = read_channels(file.hold(data), only)
+        promise(0 < found.rate_hz < float("inf") and isfinite(found.start_s), "no rate")
+        promise(found.samples.shape[1] == len(found.names) and found.names == (only or found.names), "other channels")
+        promise(bool(np.isfinite(found.samples).all()), "a sample that is no number")
+        told = {word.strip() for word in re.split(r"[,\n]", data.decode("utf-8-sig", "replace").partition("\n")[0])}
+        promise(set(found.names) <= told, "a channel that the header does not name")
+        return len(found.names), len(found.samples) > 12, bool(only)
+    return Target("channel csv", [plain, text], read,
+                  (b"t_s", b"first,", b"second", b"1e12", b"1e300", b"1e-300", b"t_s,t_s", b",c" * 64, b"0.01,1,1\n"),
+                  file=str(file.path))
+
+
 TARGETS: dict[str, Callable[[Path], Target]] = {
     "nmea": lambda folder: nmea(),
     **{f"pasco_{name}": lambda folder, name=name: pasco(name) for name in shipped_profiles()},
@@ -543,6 +564,7 @@ TARGETS: dict[str, Callable[[Path], Target]] = {
     "erd": erd,
     "record_csv": record,
     "drive_csv": drive,
+    "channel_csv": channels,
 }
 
 

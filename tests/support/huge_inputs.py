@@ -23,6 +23,7 @@ from drivers.errors import DriverError
 from drivers.pasco import load_profile
 from logger.errors import BadInput
 from logger.service.config import load_config
+from logger.store.channel_file import read_channels
 from logger.store.drive_file import read_run
 from logger.store.profile_file import read_profile
 from logger.store.record_file import read_record
@@ -149,6 +150,8 @@ def cases(folder: Path, size: int) -> dict[str, Callable[[], object]]:
         "binary numbers without end: ERD": lambda: (
             line_without_end(at("26.erd.bin"), size),
             read_profile(text(at("26.erd"), b"ERDFILEV2.00\n1,-1,1,1,2,0.1\nXUNITS m\nUNITSNAMm\nEND\n")))[1],
+        "line without end: channels": lambda: read_channels(line_without_end(at("27.csv"), size)),
+        "a million columns: channels": lambda: read_channels(text(at("28.csv"), b"t_s,", million, b"\n1,2\n")),
         "a folder where the drive should be": lambda: (at("run").mkdir(), at("run/drive.csv").mkdir(),
                                                         read_run(at("run")))[2],
     }
