@@ -46,7 +46,8 @@ _MOST_TRIES = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv, or a drive.csv")
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
+                        help="folder with drive.csv and profile.csv, or a drive.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); "
                              "what is not free stays as it says")

@@ -7,16 +7,18 @@ least is taken; near enough for a fit to begin.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.identification.parameters import Free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.road_input import RoadInput
 from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
 
 # Places are so much of a bump's width apart, and so many seconds of the way at most.
 _OF_WIDTH, _OF_TIME_S = 0.15, 0.05
@@ -40,19 +42,18 @@ def located(vehicle: Vehicle, record: Record, road: RoadInput, part: str) -> flo
         raise ValueError(f"{part}: expected a start_m, for it to be looked for over {last_m - first_m:g} m")
     place = f"{part}.start_m"
     model = VehicleModel(vehicle, [Free(place, first_m, first_m - 1, last_m + 1, place=True)], [record], road)
-    bare = VehicleModel(vehicle, [], [record], replace(road, **{part: None}))
-    rest = record.kept_mps2 - bare.predict(np.empty(0))[0]
-    fine = apart_m / _REFINED * 2
-    coarse = _best(model, rest, list(np.linspace(first_m, last_m, max(count, 2))), bare)
-    return _best(model, rest, [coarse + fine * step for step in range(-_REFINED // 2, _REFINED // 2 + 1)], bare)
+    without = replace(road, bump=None) if part == "bump" else replace(road, step=None)
+    bare = VehicleModel(vehicle, [], [record], without).predict(np.empty(0))[0]
+    coarse = _best(model, record.kept_mps2, bare, np.linspace(first_m, last_m, max(count, 2)))
+    return _best(model, record.kept_mps2, bare, coarse + apart_m * np.linspace(-1, 1, _REFINED))
 
 
-def _best(model: VehicleModel, rest: np.ndarray, places: Sequence[float], bare: VehicleModel) -> float:
-    """The place whose response, times the best factor above 0, leaves the least of ``rest``."""
-    road = bare.predict(np.empty(0))[0]
+def _best(model: VehicleModel, measured: Array, bare: Array, places: Array) -> float:
+    """The place whose response, times the best factor above 0, leaves the least of what was ``measured``; ``bare`` is
+    the response without the obstacle."""
     gains = []
     for place in places:
-        felt = model.predict(np.array([place]))[0] - road
+        felt = model.predict(np.array([place]))[0] - bare
         power = float(felt @ felt)
-        gains.append(max(float(felt @ rest), 0.0) ** 2 / power if power > 0 else 0.0)
+        gains.append(max(float(felt @ (measured - bare)), 0.0) ** 2 / power if power > 0 else 0.0)
     return float(places[int(np.argmax(gains))])

@@ -92,8 +92,8 @@ def _table(fit: Fit) -> Iterator[str]:
     for one in fit.free:
         value, error = fit.parameters[one.name], fit.standard_errors[one.name]
         low, high = interval(fit, one.name)
-        relative = f"{error / abs(value):.2%}" if value else "-"
-        moved = f"{value / one.start - 1:+.1%}" if one.start else f"{value:+.3g}"
+        relative = f"{error / abs(value):.2%}" if one.by_factors else "-"
+        moved = f"{value / one.start - 1:+.1%}" if one.by_factors else f"{value - one.start:+.3g}"
         mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
         yield (f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g} {relative:>9}   "
                f"{low:9.5g} to {high:9.5g}  {moved}{mark}")
@@ -126,8 +126,9 @@ def _limits(fit: Fit) -> Iterator[str]:
                "standard error means nothing. Widen --bounds, or ask what the model lacks.")
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
+    sizes = [one.name for one in fit.free if one.by_factors]
     vague = {name: error / abs(fit.parameters[name]) for name, error in fit.standard_errors.items()
-             if fit.parameters[name] and error > _DOUBTFUL * abs(fit.parameters[name])}
+             if name in sizes and error > _DOUBTFUL * abs(fit.parameters[name])}
     if vague:
         yield "Hardly told by these runs: " + ", ".join(f"{name} ({share:.0%})" for name, share in vague.items()) + "."
     elif not fit.verdict and not fit.at_bound:

@@ -14,7 +14,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from logger.identification.obstacles import Bump, Obstacle, Step
+import numpy as np
+
+from logger.identification.obstacles import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, Step
 from logger.identification.parameters import WEAKEST, Free
 
 SPEED_SCALE, EACH = "speed_scale", "each"
@@ -99,7 +101,7 @@ def free_input(
     """A free number of a road's input: from its present value, unless something else is said.
 
     Heights stay within a factor of 20 and keep their sign, widths within 4, the scale of speed within 1.5, places
-    within 5 m. ValueError as ``read_input`` and ``Free``.
+    within 5 m. ValueError as ``read_input`` and ``Free``, and for bounds that a size cannot have.
     """
     value = read_input(road, name)
     value = value if start is None else start
@@ -108,7 +110,11 @@ def free_input(
         low, high = bounds or (value - _PLACE_M, value + _PLACE_M)
         return Free(name, value, low, high, place=True, weakest=_WEAKEST_PLACE)
     factor = {"height_m": _HEIGHT_FACTOR, "width_m": _WIDTH_FACTOR, SPEED_SCALE: _SPEED_FACTOR}[leaf]
-    low, high = bounds or sorted((value / factor, value * factor))
+    most = {"height_m": LARGEST_HEIGHT_M, "width_m": LARGEST_WIDTH_M, SPEED_SCALE: np.inf}[leaf]
+    far = float(np.sign(value)) * min(abs(value) * factor, most)
+    low, high = bounds or sorted((value / factor, far))
+    if not (low * high > 0 and max(abs(low), abs(high)) <= most):
+        raise ValueError(f"{name}: expected bounds of one sign, within {most:g}, found {low:g} to {high:g}")
     return Free(name, value, low, high, weakest=_WEAKEST_SPEED if leaf == SPEED_SCALE else WEAKEST)
 
 

@@ -86,7 +86,31 @@ def test_what_the_runs_cannot_tell(runs: list[str], capsys: pytest.CaptureFixtur
     assert printed.err.count("\n") == 1
 
 
+def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    drives = []
+    for run in runs:
+        drives.append(tmp_path / f"drive{len(drives)}.csv")
+        drives[-1].write_bytes((Path(run) / "drive.csv").read_bytes())
+    files = [str(path) for path in drives]
+    assert identify(files, f"{MASS},each.bump.height_m", "--bump", "height_m=0.12,width_m=2.6", "--json",
+                    "--start", "each.bump.height_m=0.13", "--bounds", "run2.bump.height_m=0.05,0.2") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["converged"] is True
+    for name, truth in ((MASS, 875), ("run1.bump.height_m", 0.15), ("run2.bump.height_m", 0.10),
+                        ("run1.bump.start_m", 12.0), ("run2.bump.start_m", 12.0)):
+        assert told["parameters"][name] == pytest.approx(truth, abs=4 * told["standard_errors"][name])
+    assert told["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
+    assert identify(files[:1], "step.height_m", "--step", "start_m=12,height_m=0.1", "--noise", "white") == 0
+    assert "yes, the model misses something of the car" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(("free", "more", "message"), [
+    (MASS, ("--bump", "start_m=5,height_m=0.1"), r"expected \[start_m=M,\]height_m=M,width_m=M"),
+    (MASS, ("--step", "height=0.1"), r"expected \[start_m=M,\]height_m=M"),
+    (MASS, ("--step", "start_m=5,height_m=0"), "expected a height other than 0"),
+    ("bump.height_m", (), "give it a bump or a step first"),
+    ("run3.speed_scale", (), "there are 2 runs"),
     ("mass", (), "no parameter 'mass'; expected one of sprung_mass_kg"),
     ("", (), "expected names with commas"),
     ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every number once"),
