@@ -11,13 +11,14 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.store.bounded import read_bounded
-from logger.store.number_table import parse_columns, shown
+from logger.store.number_table import parse_columns
 from logger.store.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 
 MAX_VALUE = 1e12  # beyond it, squares lose their digits
 MAX_CHANNELS = 64
+LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -50,15 +51,15 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     samples = table[:, 1:].copy()
     if (wild := np.abs(samples) > MAX_VALUE).any():
         row, column = (int(place[0]) for place in np.nonzero(wild))
-        raise BadInput(f"{file}:{row + 2}: expected {shown(wanted[column + 1])} within {MAX_VALUE:g}, found "
+        raise BadInput(f"{file}:{row + 2}: expected {wanted[column + 1]} within {MAX_VALUE:g}, found "
                        f"{samples[row, column]:g}")
     for column, name in enumerate(wanted[1:]):
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
-            raise BadInput(f"{file}:2: expected {shown(name)} to move, found {samples[0, column]:g} all along; "
+            raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
                            f"choose columns with --columns")
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 
 def _is_name(name: str) -> bool:
     """Something that can be shown and typed, of bytes that are text."""
-    return bool(name) and name.isprintable() and "\ufffd" not in name
+    return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "\ufffd" not in name

@@ -86,7 +86,7 @@ def _by_line(data: bytes, file: str, names: Names, wanted: Names) -> Array:
         for name, place in places.items():
             if not _NUMBER.fullmatch(fields[place]) or not isfinite(float(fields[place])):
                 found = shown(fields[place].decode("ascii", "replace").strip())
-                raise BadInput(f"{file}:{line}: expected a number for {shown(name)}, found {found}")
+                raise BadInput(f"{file}:{line}: expected a number for {name}, found {found}")
             table.append(float(fields[place]))
     return np.frombuffer(table).reshape(-1, len(wanted))
 

@@ -59,7 +59,7 @@ def header(**changes: str) -> str:
     (load_config, "accelerometer: {pasco: {calibration: {x: [1e300, 1, -1e300, 1.1], y: [1, 0, 9, 1], "
                   "z: [1, 0, 9, 1]}}}\n", ":1: "),
     (read_channels, "t_s,a\x17\n0,1\n0.01,1e300\n", ":1: "),
-    (read_channels, "t_s," + "a" * 3000 + "\n0,1\n0.01,x\n", ":3: "),
+    (read_channels, "t_s," + "a" * 3000 + "\n0,1\n0.01,x\n", ":1: "),
     (read_vehicle, "name: !<x%0Ay> 1\n", ":1: "),
     (read_vehicle, 'a: 1\nb: "\\UFFFFFFFF"\n', ":2: "),
     (read_profile, "distance_m,elevation_m\n0,0\n1e300,0\n", ":3: "),
