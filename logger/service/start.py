@@ -22,6 +22,7 @@ from logger.service.core import Core
 from logger.service.live import Deadlines, Listener, LiveService, gather, monotonic_us
 from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
+from logger.service.priority import go_first
 from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
@@ -37,6 +38,7 @@ log = logging.getLogger(__name__)
 
 def serve(config: Config, stop: threading.Event) -> None:
     """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError where no folder can be."""
+    go_first()
     _make(config.log.directory)
     with FolderLock(config.log.directory):
         _serve(config, stop)

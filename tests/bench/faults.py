@@ -64,8 +64,12 @@ when it was tried. It is made by `python tests/bench/faults.py`; the counts are 
   finished, beside its sidecar, and `ridelog verify` has nothing against it. No session number is given twice.
 - **Disk.** Full, failing or read-only: the service stays up and says so; what was written stays; rows wait in memory
   and are written as soon as the disk takes them. Raw dumps make room for logs; an unexported log is never removed.
+  A card that does not even refuse (an fsync that never returns) stops the main loop: systemd's watchdog ends the
+  service after 30 s and starts it again, rows that were not yet synced are lost. A process that is stuck in the kernel
+  ends only when the kernel lets it go; then nothing but the next turn of the ignition key helps.
 - **Sensors.** What one does wrong costs its own readings only. It is tried again until it is back, rows are flagged,
-  and no figure is made up.
+  and no figure is made up. What a frozen sensor says looks like a smooth road until it has lasted for half a minute:
+  rows that were written before that keep their figures.
 - **Sticks.** Only what was read back from the stick counts as exported. Pulled at any instant nothing is lost, and the
   next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there.
 - **Input.** Every file and every byte from a wire is read as it stands or refused in one line that names it: no crash,

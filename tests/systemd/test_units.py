@@ -16,6 +16,7 @@ from logger.commands import export as export_command
 from logger.commands import run as run_command
 from logger.service.config import MACHINE_CONFIG, Config
 from logger.service.live import HANG_US
+from logger.service.priority import PRIORITY
 from logger.service.start import LONGEST_BEAT_S
 from logger.shipped import shipped
 from logger.store import stick_notes
@@ -129,6 +130,16 @@ def test_it_is_watched_and_never_given_up() -> None:
     assert service["Restart"] == ["always"]
     assert "RestartPreventExitStatus" not in service
     assert service["StartLimitIntervalSec"] == settings(EXPORT)["StartLimitIntervalSec"] == ["0"]
+
+
+def test_real_time_is_permitted_and_no_condition() -> None:
+    service = settings(SERVICE)
+    assert service["LimitRTPRIO"] == [str(PRIORITY)]
+    assert int(service["Nice"][0]) < 0
+    assert not {"CPUSchedulingPolicy", "CPUSchedulingPriority", "RestrictRealtime"} & set(service)
+    allowed = [line for line in service["SystemCallFilter"] if not line.startswith("~")]
+    assert allowed == ["@system-service", "sched_setscheduler"]
+    assert service["SystemCallFilter"][-1] == "sched_setscheduler"
 
 
 def test_nothing_waits_for_a_clock_or_a_network() -> None:
