@@ -1,0 +1,118 @@
+"""Drives that the studies stand on: the car of Table 4.2 over one obstacle, simulated.
+
+The car is stepped through time by ``logger.vehicle.simulate``, which the fits know nothing of. The profile that goes
+with a record is what the driver believes the road to be: the obstacle alone, of the size that was taken for its own,
+while the road that was driven may be rough and its obstacle of another size (4.4.1: the roughness is left out of the
+input, as it would not be known).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.record import Record
+from logger.roads.bumps import speed_bump
+from logger.roads.iso8608 import gd_n0_from_iri, generate
+from logger.roads.obstacles import step
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.units import STANDARD_GRAVITY_MPS2
+from logger.vehicle.models import structure_of
+from logger.vehicle.simulate import drive
+from logger.vehicle.structure import body_point
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Shape = Callable[[Array], Array]
+
+RATE_HZ = 100
+BUMP_MPS, BRIDGE_MPS = 16.1 / 3.6, 48.3 / 3.6
+BUMP_HEIGHT_M, BUMP_WIDTH_M, STEP_M = 0.150, 2.60, 0.0381
+SPACING_M = 0.02
+_BEFORE_M, _BEHIND_M = 80.0, 80.0
+_LEAD_S = 3.0
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Of a drive: the sensor's noise and its step [m/s2], and the IRI of the road around the obstacle [m/km]."""
+
+    noise_mps2: float = 0.05
+    step_mps2: float = 0.0
+    iri_m_per_km: float = 0.0
+    seed: int = 0
+
+
+PS_2119 = Conditions(noise_mps2=0.03, step_mps2=0.01 * STANDARD_GRAVITY_MPS2)
+"""The sensor of 5.2: steps of 0.01 g; its noise is taken for a third of a step."""
+
+
+@cache
+def rav4() -> Vehicle:
+    """The half car of Table 4.2."""
+    return read_vehicle(vehicle_file("rav4-2009"))
+
+
+def bump(start_m: float, height_m: float = BUMP_HEIGHT_M, width_m: float = BUMP_WIDTH_M) -> Shape:
+    """Eq 4.41, of the size that 5.5.2 measured unless another is given."""
+    return lambda place_m: speed_bump(place_m, start_m, height_m, width_m)
+
+
+def bridge(start_m: float, height_m: float = STEP_M) -> Shape:
+    """The step of 4.4.5."""
+    return lambda place_m: step(place_m, start_m, height_m)
+
+
+def record_of(obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions) -> Record:
+    """A drive over an obstacle at a steady speed, with the obstacle as its known profile."""
+    time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    distance_m = speed_mps * time_s
+    place_m = np.arange(-_BEFORE_M, distance_m[-1] + _BEHIND_M, SPACING_M)
+    known = obstacle(place_m)
+    road = known
+    if conditions.iri_m_per_km:
+        length_m = SPACING_M * (len(place_m) + 1)
+        road = known + generate(gd_n0_from_iri(conditions.iri_m_per_km), length_m, SPACING_M,
+                                conditions.seed)[: len(place_m)]
+    clean = _driven(rav4(), Track(SPACING_M, road, float(place_m[0])), distance_m)
+    sensed = clean + conditions.noise_mps2 * np.random.default_rng(conditions.seed).standard_normal(len(clean))
+    if conditions.step_mps2:
+        sensed = conditions.step_mps2 * np.round(sensed / conditions.step_mps2)
+    track = Track(SPACING_M, known, float(place_m[0]))
+    return Record(time_s, sensed, distance_m, np.full(len(time_s), speed_mps), track, skip_s=0.0)
+
+
+def believed(record: Record, obstacle: Shape, speed_factor: float = 1.0) -> Record:
+    """The same readings, of which another obstacle is believed, or another speed: ``speed_factor`` times the true one.
+
+    The driver knows when the front tires meet the obstacle, so where they stood then stays.
+    """
+    track = record.track
+    place_m = track.start_m + track.spacing_m * np.arange(len(track.elevation_m), dtype=np.float64)
+    elevation_m = obstacle(place_m)
+    meets_m = float(place_m[np.flatnonzero(elevation_m)[0]]) if elevation_m.any() else 0.0
+    distance_m = meets_m + speed_factor * (record.distance_m - meets_m)
+    return replace(record, track=Track(track.spacing_m, elevation_m, track.start_m), distance_m=distance_m,
+                   speed_mps=speed_factor * record.speed_mps)
+
+
+def until(record: Record, distance_m: float) -> Record:
+    """The part of a record up to where the front tires are at a place."""
+    kept = slice(int(np.searchsorted(record.distance_m, distance_m)))
+    return replace(record, time_s=record.time_s[kept], measured_mps2=record.measured_mps2[kept],
+                   distance_m=record.distance_m[kept], speed_mps=record.speed_mps[kept])
+
+
+def _driven(vehicle: Vehicle, track: Track, distance_m: Array) -> Array:
+    """What the sensor would record; the car has come to the start as fast as it goes there."""
+    lead = np.arange(-_LEAD_S * RATE_HZ, 0)
+    way_m = np.concatenate([distance_m[0] + (distance_m[1] - distance_m[0]) * lead, distance_m])
+    structure = structure_of(vehicle)
+    sensor = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
+    return np.asarray(drive(structure, [sensor], track, np.arange(len(way_m)) / RATE_HZ, way_m)[len(lead):, 0])

@@ -1,0 +1,62 @@
+"""``ridelog study`` as people and programs call it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.commands.study import _tell
+from logger.errors import BadInput
+
+
+def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "--list"]) == 0
+    text = capsys.readouterr().out
+    assert "table-4-4  " in text
+    assert "Table 4.4, section 4.4.4" in text
+    assert main(["study", "--list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["studies"]
+    assert len(listed) == len(text.splitlines())
+    assert set(listed[0]) == {"name", "where", "title"}
+
+
+def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "study.html"
+    assert main(["study", "fig-4-25", "--quick", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("Fig 4.25, section 4.4.2: Peak acceleration")
+    assert "0.8703" in text
+    assert text.endswith(f"Page: {out}\n")
+    assert max(map(len, text.splitlines())) <= 118
+    assert out.read_text().count("<svg") == 1
+
+
+def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "fig-4-25", "--quick", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == ["study", "title", "where", "how", "tables", "verdict", "figures"]
+    table = told["tables"][0]
+    assert all(len(row) == len(table["columns"]) for row in table["rows"])
+    assert told["figures"][0]["lines"][0]["name"] == "102 mm"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [(["table-9-9"], "study 'table-9-9': expected one of table-4-"), ([], "expected the NAME of a study, or --list"),
+     (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25")],
+)
+def test_wrong_use(arguments: list[str], complaint: str) -> None:
+    with pytest.raises(BadInput, match=complaint):
+        main(["study", *arguments])
+
+
+def test_progress_wipes_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    for done in range(3):
+        _tell(done, 2)
+    shown = capsys.readouterr().err.split("\r")
+    assert shown[1].startswith("[" + " " * 30 + "] 0 of 2")
+    assert shown[2].startswith("[" + "#" * 15)
+    assert shown[3].strip() == ""
