@@ -18,7 +18,7 @@ models:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +60,8 @@ class Structure:
     body                        (n, 3) a point of the body moves up by ``(1, ahead_m, left_m) @ body.T @ q``
     wheels                      (w, n) each wheel's height is ``wheels @ q``
     travel                      (w, n) each suspension's extension, body end minus wheel, is ``travel @ q``
+    springs, dampers, tires     (w,) what stands in the matrices for each wheel's spring [N/m], damper [N s/m] and
+                                tire [N/m]
     """
 
     mass: Array
@@ -72,6 +74,9 @@ class Structure:
     body: Array
     wheels: Array
     travel: Array
+    springs: Array
+    dampers: Array
+    tires: Array
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""
@@ -122,13 +127,14 @@ def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_
     places = np.array([[1.0, corner.ahead_m, corner.left_m] for corner in corners])
     travel = places @ body.T - wheels
     axles = [corner.axle for corner in corners]
-    springs = np.diag([axle.suspension_stiffness_n_per_m for axle in axles])
-    dampers = np.diag([axle.suspension_damping_n_s_per_m for axle in axles])
-    road = wheels.T @ np.diag([axle.tire_stiffness_n_per_m for axle in axles])
+    springs = np.array([axle.suspension_stiffness_n_per_m for axle in axles])
+    dampers = np.array([axle.suspension_damping_n_s_per_m for axle in axles])
+    tires = np.array([axle.tire_stiffness_n_per_m for axle in axles])
+    road = wheels.T * tires
     return Structure(
         mass=np.diag([*body_inertias, *(axle.unsprung_mass_kg for axle in axles)]),
-        damping=travel.T @ dampers @ travel,
-        stiffness=travel.T @ springs @ travel + road @ wheels,
+        damping=(travel.T * dampers) @ travel,
+        stiffness=(travel.T * springs) @ travel + road @ wheels,
         road=road,
         behind_m=places[0, 1] - places[:, 1],
         left_m=places[:, 2],
@@ -136,6 +142,9 @@ def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_
         body=body,
         wheels=wheels,
         travel=travel,
+        springs=springs,
+        dampers=dampers,
+        tires=tires,
     )
 
 
@@ -193,3 +202,33 @@ def body_acceleration_response(
     wave_number = f / speed
     delays = np.exp(-2j * np.pi * wave_number[..., None] * structure.behind_m)
     return (per_wheel * delays).sum(axis=-1) * np.sinc(wave_number * structure.contact_patch_m)
+
+
+def hung(structure: Structure, mass: float, stiffness: float, damping: float, attached: Array,
+         travel: Array | None = None) -> Structure:
+    """The structure with one more degree of freedom on a spring and a damper.
+
+    mass, stiffness, damping    of the newcomer
+    attached                    (n,) its spring's other end moves as ``attached @ q``; all zero: it stands on nothing
+    travel                      (w,) how much each suspension's body end moves with it; None: not at all
+    """
+    n, w = len(structure.mass), len(structure.wheels)
+    column = np.zeros(w) if travel is None else travel
+    wider = np.hstack([structure.travel, column[:, None]])
+    relative = np.append(-attached, 1.0)
+
+    def with_newcomer(matrix: Array, corners: Array, own: float) -> Array:
+        """The matrix, with what the suspensions do along their new travel and the newcomer's own part."""
+        plain = np.pad(matrix - (structure.travel.T * corners) @ structure.travel, (0, 1))
+        return plain + (wider.T * corners) @ wider + own * np.outer(relative, relative)
+
+    return replace(
+        structure,
+        mass=np.pad(structure.mass, (0, 1)) + np.diag(np.append(np.zeros(n), mass)),
+        damping=with_newcomer(structure.damping, structure.dampers, damping),
+        stiffness=with_newcomer(structure.stiffness, structure.springs, stiffness),
+        road=np.pad(structure.road, ((0, 1), (0, 0))),
+        body=np.pad(structure.body, ((0, 1), (0, 0))),
+        wheels=np.pad(structure.wheels, ((0, 0), (0, 1))),
+        travel=wider,
+    )

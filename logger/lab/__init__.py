@@ -1,0 +1,1 @@
+"""The lab: where a model and measurements differ, which physical effect is missing, and the model with it."""

@@ -1,0 +1,107 @@
+"""What a car with effects would have recorded on the runs that were driven.
+
+Problem: the lab asks for hundreds of predictions of the same runs, by cars that differ in a number or an effect.
+Solution: ``Runs`` keeps each run laid out in time (``Passage``), also for the few other position signals (a speed that
+is off by a factor, a distance that wandered) that were asked for last.
+
+``error`` is, everywhere in the lab, the normalised root-mean-square error: rms(measured - model) / rms(measured) over
+all samples, the first 2 s of each run left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.track import Track
+from logger.vehicle.compose import Car, Response, recorded, respond
+from logger.vehicle.passage import Passage
+
+Array = npt.NDArray[np.float64]
+
+SKIP_S = 2.0
+_KEPT_PASSAGES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One drive over one road, evenly sampled: arrays (n,).
+
+    name             as the user knows it
+    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder
+    distance_m       where the front tires stood on the track, as it was recorded
+
+    ValueError for columns of different lengths, or nothing left behind the first 2 s.
+    """
+
+    name: str
+    rate_hz: float
+    measured_mps2: Array
+    distance_m: Array
+    speed_mps: Array
+    track: Track
+
+    def __post_init__(self) -> None:
+        if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
+            raise ValueError(f"{self.name}: expected columns of one length, longer than {SKIP_S:g} s")
+
+    @property
+    def first(self) -> int:
+        """The first sample that counts."""
+        return int(np.ceil(SKIP_S * self.rate_hz - 1e-3))
+
+    @property
+    def count(self) -> int:
+        """How many samples there are."""
+        return len(self.measured_mps2)
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road is known under the right wheels too."""
+        return self.track.elevation_m.ndim == 2
+
+
+class Runs:
+    """Runs, and predictions of them."""
+
+    def __init__(self, runs: Sequence[Run]) -> None:
+        self.runs = list(runs)
+        self._passages: list[dict[bytes, Passage]] = [{} for _ in self.runs]
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def predict(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Array]:
+        """What would have been recorded in each run, (n,) whole [m/s2].
+
+        moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
+        """
+        return [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
+
+    def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
+        """The same with the motions of suspensions and tires."""
+        return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
+
+    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
+        found = []
+        for index, (run, known) in enumerate(zip(self.runs, self._passages, strict=True)):
+            distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
+            distance = car.driven(distance)
+            key = distance.tobytes()
+            if key not in known:
+                if len(known) >= _KEPT_PASSAGES:
+                    del known[next(iter(known))]
+                known[key] = Passage(run.track, run.rate_hz, distance)
+            found.append(known[key])
+        return found
+
+
+def error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
+    """rms(measured - model) / rms(measured) over all samples that count."""
+    left = sum(float(((run.measured_mps2 - one)[run.first:] ** 2).sum())
+               for run, one in zip(runs, predictions, strict=True))
+    whole = sum(float((run.measured_mps2[run.first:] ** 2).sum()) for run in runs)
+    return float(np.sqrt(left / whole)) if whole > 0 else float("nan")

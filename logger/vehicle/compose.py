@@ -1,0 +1,167 @@
+"""A car with its effects, put together, and what its sensor records.
+
+Problem: effects sit at different places between road and record, alone or together, and a fit asks for the record
+hundreds of times. Solution: ``compose`` applies the effects in the physical order of their kinds and gives a ``Car``:
+matrices, laws of the corners, the sensor's row and what lies behind it. ``respond`` drives it through a ``Passage``. A
+car whose laws are all linear is stepped in blocks; only one with other laws goes through the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import BodyEffect, Chosen, DriveEffect, ForceEffect, SensorEffect, VehicleEffect
+from logger.vehicle.laws import CornerLaws, linear
+from logger.vehicle.models import structure_of
+from logger.vehicle.passage import Passage
+from logger.vehicle.state_space import driven_outputs, straight_step
+from logger.vehicle.stepping import force_input, march
+from logger.vehicle.structure import Structure, body_point
+from logger.vehicle.vehicle import Axle, Vehicle
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Car:
+    """A vehicle with its effects.
+
+    vehicle      as its effects made it
+    structure    with what hangs on the body
+    laws         one per wheel, front first, left before right
+    row          (n,) of the sensor's acceleration
+    sensors      effects between body and record, in order
+    drives       effects on the position signal, in order
+    """
+
+    vehicle: Vehicle
+    structure: Structure
+    laws: tuple[CornerLaws, ...]
+    row: Array
+    sensors: tuple[Chosen, ...]
+    drives: tuple[Chosen, ...]
+    bends_laws: bool
+
+    def factor(self, s: Complex) -> Complex:
+        """What lies between the body and the recorder, at s (f,) [1/s]."""
+        result = np.ones_like(s)
+        for one in self.sensors:
+            assert isinstance(one.effect, SensorEffect)
+            result = result * one.effect.factor(one.p, s)
+        return result
+
+    def driven(self, distance_m: Array) -> Array:
+        """Where the front tires truly were (n,) when these distances were recorded [m]."""
+        for one in self.drives:
+            assert isinstance(one.effect, DriveEffect)
+            distance_m = one.effect.driven(one.p, distance_m)
+        return distance_m
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a car did on a passage of N samples.
+
+    accel_z_mps2                   (N,) as the recorder keeps it
+    travel_m, rate_mps             (N, w) extension of the suspensions and its rate
+    deflection_m, deflection_mps   (N, w) height of the wheels over the road from rest, and its rate
+    """
+
+    accel_z_mps2: Array
+    travel_m: Array
+    rate_mps: Array
+    deflection_m: Array
+    deflection_mps: Array
+
+
+def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
+    """A vehicle with its effects. ValueError when it lacks what its model or an effect needs."""
+    ordered = sorted(effects, key=lambda one: (one.effect.stage, one.effect.name))
+    for one in ordered:
+        if isinstance(one.effect, VehicleEffect):
+            vehicle = one.effect.vehicle(one.p, vehicle)
+    structure = structure_of(vehicle)
+    for one in ordered:
+        if isinstance(one.effect, BodyEffect):
+            structure = one.effect.structure(one.p, structure)
+    forces = [one for one in ordered if isinstance(one.effect, ForceEffect)]
+    laws = []
+    for axle in _axles(vehicle):
+        corner = linear(axle.suspension_damping_n_s_per_m)
+        for one in forces:
+            assert isinstance(one.effect, ForceEffect)
+            corner = one.effect.laws(one.p, corner)
+        laws.append(corner)
+    row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
+    return Car(vehicle, structure, tuple(laws), row,
+               tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
+               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces))
+
+
+def recorded(car: Car, passage: Passage) -> Array:
+    """What the recorder keeps of the sensor's acceleration (N,) [m/s2].
+
+    The passage is over where the car truly was: ``car.driven`` of what was recorded.
+    """
+    if car.bends_laws:
+        return passage.recorded(_nonlinear(car, passage)[0], car.factor)
+    return passage.recorded(_linear(car, passage), car.factor)
+
+
+def respond(car: Car, passage: Passage) -> Response:
+    """The record with the motions behind it."""
+    structure = car.structure
+    accel, states, elevation = _nonlinear(car, passage)
+    n = len(structure.mass)
+    states, elevation = passage.sampled(states), passage.sampled(elevation)
+    coordinates, velocities = states[:, :n], states[:, n:]
+    road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
+    return Response(
+        passage.recorded(accel, car.factor), coordinates @ structure.travel.T, velocities @ structure.travel.T,
+        coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps,
+    )
+
+
+def _axles(vehicle: Vehicle) -> list[Axle]:
+    """The axle of each wheel, in the order of the structure's wheels."""
+    axles = [vehicle.front] if vehicle.rear is None else [vehicle.front, vehicle.rear]
+    return [axle for axle in axles for _ in range(2)] if vehicle.model == "full_car" else axles
+
+
+def _linear(car: Car, passage: Passage) -> Array:
+    """The sensor's acceleration at the fine instants (M,), of a car without laws of its own."""
+    structure = car.structure
+    elevation, mean = passage.under_wheels(structure)
+    a, b = structure.state_space()
+    around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
+    transition, at_start, at_end = straight_step(a, b, passage.step_s)
+    gain = np.hstack([at_start + at_end, at_end - at_start])
+    n = len(structure.mass)
+    rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
+    inputs = np.hstack([mean, (around[2:] - around[:-2]) / 4])
+    observe = (car.row @ a[n:])[None]
+    seen = driven_outputs(transition, gain, observe, inputs, rest)[:, 0]
+    return np.asarray(seen + elevation @ (car.row @ b[n:]))
+
+
+def _nonlinear(car: Car, passage: Passage) -> tuple[Array, Array, Array]:
+    """The sensor's acceleration (M,), the states (M, 2 n) and the elevations (M, w) at the fine instants."""
+    structure = car.structure
+    elevation, mean = passage.under_wheels(structure)
+    motion = march(structure, car.laws, elevation, mean, passage.step_s)
+    a, b = structure.state_space()
+    n = len(structure.mass)
+    accel = motion.states @ (car.row @ a[n:]) + elevation @ (car.row @ b[n:])
+    accel += motion.forces @ (car.row @ force_input(structure)[n:])
+    return accel, motion.states, elevation
+
+
+def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:
+    """The effects with one more, or with another value of one that is there."""
+    others = [other for other in effects if other.effect.name != one.effect.name]
+    return (*others, one)

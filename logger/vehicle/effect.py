@@ -1,0 +1,198 @@
+"""What a physical effect is to the programs that simulate, fit, diagnose and explain it.
+
+Problem: a car does more than its linear model, in some twenty ways that come alone and together; and users bring ways
+of their own. Simulation, fits, diagnosis and reports must not know any of them by name. Solution: an effect is one file
+that offers ``EFFECT``: a name, its parameters with units and bounds, a source, words on what it leaves in a
+measurement, and one function. There are five kinds of function, one for each place between road and record:
+
+    DriveEffect     where the car was                    distance recorded -> distance driven
+    VehicleEffect   the numbers of the car               vehicle -> vehicle
+    BodyEffect      what hangs on the body               structure -> structure
+    ForceEffect     springs, dampers and tires           the laws of a corner -> the laws of a corner
+    SensorEffect    between the body and the record      s -> transfer factor
+
+They are applied in this order, and within a kind in the order of ``stage``, so that the order in which a vehicle's file
+names them does not matter. An effect changes nothing in place.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import product
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.laws import CornerLaws
+from logger.vehicle.structure import Structure
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+class Scale(Enum):
+    """The coordinate in which a parameter is moved by a fit."""
+
+    LINEAR = "linear"
+    LOG = "log"
+    RECIPROCAL = "reciprocal"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of an effect.
+
+    name       ends in its unit
+    start      a sensible value
+    low, high  what it may be
+    null       where the effect vanishes, which may be infinite; None: this number alone cannot make it vanish
+    scale      how fits move it: LOG needs low > 0, RECIPROCAL too (for a null at infinity)
+    trials     values that a search begins at
+    meaning    in words
+    choices    if not empty, the only values there are; a fit tries each
+    default    what it is when nothing is said; None: it must be said
+    """
+
+    name: str
+    start: float
+    low: float
+    high: float
+    null: float | None
+    scale: Scale
+    trials: tuple[float, ...]
+    meaning: str
+    choices: tuple[float, ...] = ()
+    default: float | None = None
+
+    def coordinate(self, value: float) -> float:
+        """Where a value lies on the scale that fits move on."""
+        if self.scale is Scale.LOG:
+            return float(np.log(value))
+        return 1.0 / value if self.scale is Scale.RECIPROCAL else value
+
+    def value(self, coordinate: float) -> float:
+        """The value at a coordinate, kept within the bounds."""
+        if self.scale is Scale.LOG:
+            found = float(np.exp(min(coordinate, 700.0)))
+        elif self.scale is Scale.RECIPROCAL:
+            found = 1.0 / max(coordinate, 1.0 / self.high)
+        else:
+            found = coordinate
+        return float(min(max(found, self.low), self.high))
+
+
+class Effect(ABC):
+    """What every effect offers.
+
+    name         as the file's, and as users write it
+    title        in a few words
+    parameters   its numbers, maybe none
+    source       where the law is from
+    signature    what it leaves in a measurement that a model without it is compared with
+    shown_by     the drive that would show it best, as an instruction
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...] = ()
+    source: str
+    signature: str
+    shown_by: str
+    stage: int = 0
+
+    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
+        """Why it cannot be there in this vehicle on this road; None if it can."""
+        return None
+
+    def trials(self) -> list[dict[str, float]]:
+        """Values of all its parameters that a search begins at."""
+        names = [one.name for one in self.parameters]
+        return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
+
+    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The values with defaults filled in. ValueError for an unknown or missing name, or a value out of bounds."""
+        known = {one.name: one for one in self.parameters}
+        for name in values:
+            if name not in known:
+                expected = ", ".join(known) or "no parameters"
+                raise ValueError(f"{self.name} has no parameter {name!r}; expected {expected}")
+        found = {}
+        for name, one in known.items():
+            value = values.get(name, one.default)
+            if value is None:
+                raise ValueError(f"{self.name}: expected a value of {name} ({one.meaning})")
+            if not one.low <= value <= one.high or (one.choices and value not in one.choices):
+                allowed = " or ".join(f"{choice:g}" for choice in one.choices) or f"{one.low:g} to {one.high:g}"
+                raise ValueError(f"{self.name}: expected {name} of {allowed}, found {value:g}")
+            found[name] = float(value)
+        return found
+
+
+class DriveEffect(Effect):
+    """The position signal."""
+
+    @abstractmethod
+    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
+        """Where the front tires truly were (n,) when these distances were recorded [m]."""
+
+
+class VehicleEffect(Effect):
+    """The numbers of the car."""
+
+    @abstractmethod
+    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+        """The car as it is."""
+
+
+class BodyEffect(Effect):
+    """Something with a motion of its own on the body; use ``structure.hung``."""
+
+    @abstractmethod
+    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        """The structure with it."""
+
+
+class ForceEffect(Effect):
+    """A law of springs, dampers and tires, the same at every wheel."""
+
+    @abstractmethod
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        """The laws of a corner with it."""
+
+
+class SensorEffect(Effect):
+    """Between the body's motion and the record; linear."""
+
+    @abstractmethod
+    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+        """What an acceleration exp(s t) is multiplied by, s (...) [1/s]."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """An effect with values for its parameters.
+
+    standard_errors    of those that were fitted, by name; empty if they were not
+    file               where a user's own effect is written, as the vehicle's file says it; None: it comes with ridelog
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float] = field(default_factory=dict)
+    file: str | None = None
+
+    @property
+    def p(self) -> SimpleNamespace:
+        """The values by attribute."""
+        return SimpleNamespace(**self.values)
+
+
+def chosen(effect: Effect, values: Mapping[str, float], **more: Any) -> Chosen:
+    """An effect with checked values. ValueError as ``Effect.checked``."""
+    return Chosen(effect, effect.checked(values), **more)

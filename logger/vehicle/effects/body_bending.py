@@ -1,0 +1,42 @@
+"""A body is not rigid: its first bending mode is driven by the axles and felt where the sensor sits.
+
+The mode's coordinate e follows e'' + 2 z w e' + w^2 e = p F / m, with F the forces of the suspensions on the body, m
+the body's mass and p the participation; the sensor reads the rigid body's acceleration plus e''. The body's ends move
+by p e, so that the forces work on what they move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from logger.vehicle.effect import BodyEffect, Parameter, Scale
+from logger.vehicle.structure import Structure, hung
+
+
+class BodyBending(BodyEffect):
+    name = "body_bending"
+    title = "first bending mode of the body"
+    parameters = (
+        Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, (12.0, 16.0, 21.0, 27.0, 35.0), "of the mode"),
+        Parameter("damping_ratio", 0.04, 0.003, 0.5, None, Scale.LOG, (0.04,), "of the mode"),
+        Parameter("participation", 0.5, -10.0, 10.0, 0.0, Scale.LINEAR, (-0.5, 0.5),
+                  "how strongly the axles' forces drive the mode at the sensor"),
+    )
+    source = "T. D. Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 5; modal superposition"
+    signature = "a narrow peak above wheel hop that follows the forces of the suspensions, with a dip beside it"
+    shown_by = "drive a rough road at two speeds: the peak keeps its frequency and grows with the road"
+
+    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        omega, mass = 2 * np.pi * p.frequency_hz, structure.mass[0, 0]
+        ends = np.full(len(structure.wheels), p.participation)
+        bent = hung(structure, mass, mass * omega**2, 2 * p.damping_ratio * omega * mass,
+                    np.zeros(len(structure.mass)), ends)
+        body = bent.body.copy()
+        body[-1, 0] = 1.0
+        return replace(bent, body=body)
+
+
+EFFECT = BodyBending()

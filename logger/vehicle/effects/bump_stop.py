@@ -1,0 +1,32 @@
+"""A rubber stop ends the way of a suspension in compression.
+
+Beyond a clearance c of compression from rest it adds the force k (compression - c).
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import CornerLaws
+
+
+class BumpStop(ForceEffect):
+    name = "bump_stop"
+    title = "a stiff stop at the end of the suspension's way in compression"
+    parameters = (
+        Parameter("clearance_m", 0.04, 0.001, 0.3, None, Scale.LINEAR, (0.01, 0.02, 0.03, 0.045, 0.06),
+                  "compression from rest at which the stop is met"),
+        Parameter("stop_stiffness_n_per_m", 1e5, 0.0, 2e6, 0.0, Scale.LINEAR, (1e5,), "of the stop alone"),
+    )
+    source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), 5.3: additional springs"
+    signature = "short hard blows upward where the suspension is pressed most; all else is as in the model"
+    shown_by = "drive over a large bump so fast that the suspension comes to its end"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return laws.with_spring(lambda travel_m: p.stop_stiffness_n_per_m * np.minimum(travel_m + p.clearance_m, 0.0))
+
+
+EFFECT = BumpStop()

@@ -1,0 +1,42 @@
+"""The centre of gravity sits ahead of where the model puts it, or behind.
+
+The axles stay where they are, and so does the sensor, so that all of them come to lie farther back from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.vehicle import Vehicle
+
+_LEAST_ARM_M = 0.05
+
+
+class CgShift(VehicleEffect):
+    name = "cg_shift"
+    title = "the centre of gravity sits ahead of where the model puts it, or behind"
+    parameters = (
+        Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, 0.15), "ahead positive, behind negative"),
+    )
+    source = "rigid-body mechanics (Eq 4.12 of Blum 2015 with other distances)"
+    signature = "one axle is heard more than the model says, the other one less"
+    shown_by = "drive one bump at two speeds, or weigh the axles"
+
+    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
+        return "a quarter car has one axle" if vehicle.rear is None else None
+
+    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+        front, rear = vehicle.front, vehicle.rear
+        assert rear is not None
+        shift = min(max(p.shift_m, _LEAST_ARM_M - rear.cg_distance_m), front.cg_distance_m - _LEAST_ARM_M)
+        return replace(
+            vehicle,
+            front=replace(front, cg_distance_m=front.cg_distance_m - shift),
+            rear=replace(rear, cg_distance_m=rear.cg_distance_m + shift),
+            sensor=replace(vehicle.sensor, ahead_m=vehicle.sensor.ahead_m - shift),
+        )
+
+
+EFFECT = CgShift()

@@ -1,0 +1,41 @@
+"""Dampers resist rebound (extension) more than bump (compression), so that a wheel is not thrown up but held back.
+
+With r the ratio of the two slopes and their mean kept, rebound has 2 r / (1 + r) and bump 2 / (1 + r) of the mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import CornerLaws
+
+Array = npt.NDArray[np.float64]
+
+
+class DamperAsymmetry(ForceEffect):
+    name = "damper_asymmetry"
+    title = "rebound damping differs from bump damping"
+    parameters = (
+        Parameter("rebound_to_bump_ratio", 1.5, 0.1, 10.0, 1.0, Scale.LOG, (0.67, 1.5, 3.0),
+                  "slope of the damper in extension over that in compression; the mean of the two stays"),
+    )
+    source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
+    signature = "the body is drawn down while it shakes: peaks up and down differ, and twice each frequency appears"
+    shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        rebound = 2 * p.rebound_to_bump_ratio / (1 + p.rebound_to_bump_ratio)
+        damper = laws.damper
+
+        def uneven(rate_mps: Array) -> Array:
+            return damper(rate_mps) * np.where(rate_mps > 0, rebound, 2 - rebound)
+
+        return replace(laws, damper=uneven)
+
+
+EFFECT = DamperAsymmetry()

@@ -1,0 +1,43 @@
+"""Beyond a knee velocity the valves of a damper open, and its force grows more slowly: a digressive damper.
+
+Up to the knee the force is that of the damper without it; beyond, what it would grow by is multiplied by the ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import CornerLaws
+
+Array = npt.NDArray[np.float64]
+
+
+class DamperBlowOff(ForceEffect):
+    name = "damper_blow_off"
+    title = "digressive dampers: beyond a knee velocity the slope falls"
+    parameters = (
+        Parameter("knee_velocity_m_per_s", 0.15, 0.005, 2.0, None, Scale.LOG, (0.05, 0.12, 0.25, 0.5),
+                  "rate of the suspension from which on the slope is smaller"),
+        Parameter("slope_ratio", 0.4, 0.0, 1.0, 1.0, Scale.LINEAR, (0.4,),
+                  "slope beyond the knee over that before it"),
+    )
+    source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 6: digressive characteristics"
+    signature = "the damping falls as the road gets rougher; strong shakes ring on, weak ones are as in the model"
+    shown_by = "drive the same road slowly and fast, or a smooth and a rough one: the damping must differ"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        damper, knee = laws.damper, p.knee_velocity_m_per_s
+
+        def digressive(rate_mps: Array) -> Array:
+            inner = np.clip(rate_mps, -knee, knee)
+            return damper(inner) + p.slope_ratio * (damper(rate_mps) - damper(inner))
+
+        return replace(laws, damper=digressive)
+
+
+EFFECT = DamperBlowOff()

@@ -1,0 +1,30 @@
+"""Bushings, seals and leaves rub: a force that opposes motion, whatever its speed, and holds the suspension at rest.
+
+While the suspension slides the force is F sign(x'); while it sticks, whatever keeps it stuck, up to F.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import CornerLaws
+
+
+class DryFriction(ForceEffect):
+    name = "dry_friction"
+    title = "Coulomb friction in each suspension"
+    parameters = (
+        Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
+                  "of each suspension, front and rear alike"),
+    )
+    source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"
+    signature = "on smooth stretches the springs lock and the body rides on its tires; rough ones change little"
+    shown_by = "drive a smooth road slowly, so that the suspension hardly moves"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n)
+
+
+EFFECT = DryFriction()

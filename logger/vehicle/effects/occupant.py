@@ -1,0 +1,34 @@
+"""People ride on seats: a mass on a spring and a damper upon the body, at its centre of gravity.
+
+The mass is more than what the model's sprung mass says; frequency and damping ratio are those of the seat with it.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from logger.vehicle.effect import BodyEffect, Parameter, Scale
+from logger.vehicle.structure import Structure, hung
+
+
+class Occupant(BodyEffect):
+    name = "occupant"
+    title = "passengers on their seats"
+    parameters = (
+        Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,), "that rides on the seats"),
+        Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0), "of that mass on its seats"),
+        Parameter("damping_ratio", 0.3, 0.02, 1.5, None, Scale.LOG, (0.25,), "of the seats"),
+    )
+    source = "M. J. Griffin, Handbook of Human Vibration (1990), chapter 9: seated people resonate at 4 to 6 Hz"
+    signature = "at 3 to 6 Hz the body moves less than the model says, and a little more below"
+    shown_by = "drive with and without the people, or a road with much of its strength at 2 to 8 Hz"
+
+    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        omega = 2 * np.pi * p.frequency_hz
+        return hung(structure, p.mass_kg, p.mass_kg * omega**2, 2 * p.damping_ratio * omega * p.mass_kg,
+                    structure.body[:, 0])
+
+
+EFFECT = Occupant()

@@ -1,0 +1,25 @@
+"""More on the springs than the model says: luggage, fuel, people on firm seats. It lies at the centre of gravity."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.vehicle import Vehicle, with_load
+
+
+class Payload(VehicleEffect):
+    name = "payload"
+    title = "more sprung mass than the model says"
+    parameters = (
+        Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (60.0, 200.0), "beyond the model's sprung mass"),
+    )
+    source = "Newton's second law; 4.4 of Blum 2015 finds the sprung mass from a bump"
+    signature = "the body bounces more slowly and shakes less above its bounce, on every road alike"
+    shown_by = "drive a road with long waves, or weigh the car"
+
+    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+        return with_load(vehicle, p.mass_kg)
+
+
+EFFECT = Payload()

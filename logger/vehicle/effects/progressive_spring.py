@@ -1,0 +1,29 @@
+"""Suspension springs harden with travel: a cubic term beside the linear rate.
+
+F = k x + k3 x^3, with x the travel from where the car rests.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import CornerLaws
+
+
+class ProgressiveSpring(ForceEffect):
+    name = "progressive_spring"
+    title = "cubic hardening of the suspension springs"
+    parameters = (
+        Parameter("cubic_stiffness_n_per_m3", 1e6, -2e7, 1e9, 0.0, Scale.LINEAR, (3e5, 3e6, 3e7),
+                  "force per cube of the travel from rest, of each suspension"),
+    )
+    source = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3 (the equation of Duffing)"
+    signature = "large travel meets more force: the body's bounce is quicker on bumps than on a smooth road"
+    shown_by = "drive slowly over large bumps or dips, so that the suspension travels several centimetres"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return laws.with_spring(lambda travel_m: p.cubic_stiffness_n_per_m3 * travel_m**3)
+
+
+EFFECT = ProgressiveSpring()

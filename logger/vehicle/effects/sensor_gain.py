@@ -1,0 +1,30 @@
+"""A sensor that reads every acceleration too large, or too small, by the same factor."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Parameter, Scale, SensorEffect
+
+Complex = npt.NDArray[np.complex128]
+
+
+class SensorGain(SensorEffect):
+    name = "sensor_gain"
+    title = "scale error of the sensor"
+    parameters = (
+        Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "what is read over what there was"),
+    )
+    source = "data sheets of accelerometers give scale errors of some per cent"
+    signature = "the measurement is the model times one factor, at every frequency, speed and strength"
+    shown_by = "turn the sensor over at rest: the readings must differ by 2 g"
+    stage = 2
+
+    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+        return np.full_like(s, p.gain)
+
+
+EFFECT = SensorGain()

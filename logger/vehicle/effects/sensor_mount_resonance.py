@@ -1,0 +1,37 @@
+"""A sensor on a bracket or a console rides on a small spring of its own.
+
+Between body and sensor lies the transmissibility (2 z w s + w^2) / (s^2 + 2 z w s + w^2).
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Parameter, Scale, SensorEffect
+
+Complex = npt.NDArray[np.complex128]
+
+
+class SensorMountResonance(SensorEffect):
+    name = "sensor_mount_resonance"
+    title = "the bracket or console under the sensor resonates"
+    parameters = (
+        Parameter("frequency_hz", 25.0, 2.0, 400.0, float("inf"), Scale.RECIPROCAL, (12.0, 17.0, 24.0, 33.0, 60.0),
+                  "natural frequency of the sensor on its bracket"),
+        Parameter("damping_ratio", 0.08, 0.002, 1.5, None, Scale.LOG, (0.05, 0.25), "of the bracket"),
+    )
+    source = "C. M. Harris, A. G. Piersol, Shock and Vibration Handbook (2002), chapter 2: transmissibility"
+    signature = "a peak at a frequency that no part of the car has, at every speed and on every road"
+    shown_by = "drive a rough road at two speeds, and knock on the console while the car stands"
+    stage = 1
+
+    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+        omega = 2 * np.pi * p.frequency_hz
+        through = 2 * p.damping_ratio * omega * s + omega**2
+        return np.asarray(through / (s * s + through))
+
+
+EFFECT = SensorMountResonance()

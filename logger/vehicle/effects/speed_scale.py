@@ -1,0 +1,32 @@
+"""The wheels are larger or smaller than the speed signal believes: speed and distance are recorded too large.
+
+The car was where the recorded distance, divided by the scale, says.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import DriveEffect, Parameter, Scale
+
+Array = npt.NDArray[np.float64]
+
+
+class SpeedScale(DriveEffect):
+    name = "speed_scale"
+    title = "the recorded speed and distance are wrong by a factor"
+    parameters = (
+        Parameter("scale", 1.01, 0.7, 1.4, 1.0, Scale.LOG, (0.98, 1.02), "what is recorded over what is true"),
+    )
+    source = "UN Regulation 39: a speedometer may read up to a tenth too much; worn tires change the rest"
+    signature = "model and measurement drift apart along the road, the more the farther"
+    shown_by = "drive a long stretch with a mark at each end, and measure it"
+
+    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
+        return distance_m / p.scale
+
+
+EFFECT = SpeedScale()

@@ -1,0 +1,30 @@
+"""Two clocks, or a slow bus: the acceleration that is written down is late against the position beside it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Parameter, Scale, SensorEffect
+
+Complex = npt.NDArray[np.complex128]
+
+
+class TimeOffset(SensorEffect):
+    name = "time_offset"
+    title = "the acceleration is late against the position"
+    parameters = (
+        Parameter("delay_s", 0.02, -2.0, 2.0, 0.0, Scale.LINEAR, (-0.02, 0.02), "late positive, early negative"),
+    )
+    source = "the shift theorem of the Laplace transform"
+    signature = "model and measurement have the same shape, shifted by the same time at every speed"
+    shown_by = "drive one bump at two speeds: the distance it seems moved by grows with the speed"
+    stage = 4
+
+    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+        return np.exp(-s * p.delay_s)
+
+
+EFFECT = TimeOffset()

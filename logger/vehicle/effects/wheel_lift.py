@@ -1,0 +1,26 @@
+"""A tire pushes and cannot pull: where the road falls away faster than the wheel follows, contact is lost.
+
+The tire's whole force, its static load included, is never below 0. The static loads follow from the weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from logger.vehicle.effect import ForceEffect
+from logger.vehicle.laws import CornerLaws
+
+
+class WheelLift(ForceEffect):
+    name = "wheel_lift"
+    title = "a tire cannot pull: contact is lost when its force reaches zero"
+    source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on wheel loads"
+    signature = "after hard edges the wheel comes down late; the body falls freely meanwhile"
+    shown_by = "drive over a sharp bump or a rough road so fast that a wheel leaves the ground"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return replace(laws, tire_pulls=False)
+
+
+EFFECT = WheelLift()

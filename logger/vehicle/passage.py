@@ -1,0 +1,120 @@
+"""A drive over a road, laid out in fine steps of time: what passes under each wheel, and what a recorder keeps.
+
+Problem: a nonlinear car has to be stepped finely, and fits step it hundreds of times over the same road, of which only
+what changed should be computed again; and a recorder's filter, a sensor's own dynamics and a late clock lie between the
+body and each sample. Solution: a ``Passage`` holds the elevations under the wheels, exact means over each step as in
+``simulate``, for the last few places that wheels stood at; and everything linear behind the body, down to the
+recorder's filter and the choice of one step in ten, is one product in frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.track import Track
+from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
+from logger.vehicle.structure import Structure
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+# The car comes to the first sample over so much road, at the speed it has there, and drives on after the last one.
+APPROACH_S = 2.0
+_TAIL_S = 1.0
+# What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
+_REST_S = 1.0
+_KEPT_PLACES = 3
+_EVEN = 1e-3
+
+
+class Passage:
+    """One drive: N samples at an even rate.
+
+    track         the road
+    rate_hz       samples a second
+    distance_m    (N,) where the front tires stand at each sample [m]
+
+    ValueError unless there are two or more finite distances.
+    """
+
+    def __init__(self, track: Track, rate_hz: float, distance_m: Array) -> None:
+        if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
+            raise ValueError("expected two or more finite distances")
+        self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
+        self.count = len(distance_m)
+        self.steps = max(1, int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN)))
+        self.step_s = 1 / (rate_hz * self.steps)
+        self._lead, self._tail = round(APPROACH_S * rate_hz), round(_TAIL_S * rate_hz)
+        pace_m, ahead_m = distance_m[1] - distance_m[0], distance_m[-1] - distance_m[-2]
+        way = np.concatenate([distance_m[0] + pace_m * np.arange(-self._lead, 0), distance_m,
+                              distance_m[-1] + ahead_m * np.arange(1, self._tail + 1)])
+        self._way_m = finer(way, self.steps)
+        coarse = len(way) + round(_REST_S * rate_hz)
+        self._coarse = smooth_length(coarse)
+        f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
+        self._s = 2j * np.pi * f_hz
+        taps = recorder_taps(self.steps)
+        centred = np.zeros(self._coarse * self.steps)
+        half = len(taps) // 2
+        centred[: half + 1], centred[-half:] = taps[half:], taps[:half]
+        self._recorder = np.fft.rfft(centred)[: len(f_hz)].real / self.steps
+        self._known: dict[tuple[float, ...], tuple[Array, Array]] = {}
+
+    @property
+    def fine_count(self) -> int:
+        """Instants that a car is stepped through, one more than the steps."""
+        return len(self._way_m)
+
+    def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
+        """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
+        from where the front left wheel begins."""
+        place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m))
+        if place not in self._known:
+            if len(self._known) >= _KEPT_PLACES:
+                del self._known[next(iter(self._known))]
+            paths = self.track.tire_paths(structure.contact_patch_m)
+            wheels = [
+                (paths[-1] if left_m < 0 else paths[0]).step_means(self._way_m - behind_m)
+                for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True)
+            ]
+            level = wheels[0][0][0]
+            self._known[place] = (np.stack([one for one, _ in wheels], axis=1) - level,
+                                  np.stack([mean for _, mean in wheels], axis=1) - level)
+        return self._known[place]
+
+    def recorded(self, fine: Array, factor: Callable[[Complex], Complex] | None = None) -> Array:
+        """What the recorder keeps of an acceleration at the fine instants (M,): samples (N,).
+
+        factor    of what lies between the body and the recorder, by s (f,) [1/s]; None: nothing
+        """
+        behind = self._recorder if factor is None else self._recorder * factor(self._s)
+        transform = np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * behind
+        return np.fft.irfft(transform, self._coarse)[self._lead : self._lead + self.count]
+
+    def sampled(self, fine: Array) -> Array:
+        """Fine instants (M, ...) at the samples (N, ...), as they are."""
+        return fine[self._lead * self.steps :: self.steps][: self.count]
+
+
+def finer(distance: Array, steps: int) -> Array:
+    """Distances ``steps`` times as dense: cubics with the slopes that the neighbours give."""
+    slope = np.gradient(distance)
+    along = np.arange(steps) / steps
+    rise = np.diff(distance)[:, None]
+    first, last = slope[:-1, None], slope[1:, None]
+    curve = distance[:-1, None] + along * (first + along * (3 * rise - 2 * first - last
+                                                            + along * (first + last - 2 * rise)))
+    return np.append(curve.ravel(), distance[-1])
+
+
+def smooth_length(least: int) -> int:
+    """An even number from ``least`` on that has no prime factor above 5, so that transforms are quick."""
+    best = 2 ** int(np.ceil(np.log2(least)))
+    for fives in range(4):
+        for threes in range(6):
+            odd = 5**fives * 3**threes
+            best = min(best, odd * 2 ** max(1, int(np.ceil(np.log2(least / odd)))))
+    return best
