@@ -1,0 +1,156 @@
+"""Roads for the examination: random ones after ISO 8608, with what else lies on real roads.
+
+Problem: a product that makes its own roads knows their spectrum and their phases too well.
+
+Solution: a road is a sum of sines with wave numbers spread evenly in their logarithm, jittered, and random phases, so
+that its displacement density is Gd(n) = Gd(0.1 c/m) * (n / 0.1 c/m)^-w (ISO 8608:2016, eq. 7). The right track shares
+the left one's long waves and has short ones of its own. Bumps, potholes and slab joints are added to both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+Array = NDArray[np.float64]
+
+CLASS_GD_M3 = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}  # ISO 8608:2016, table C.2, geometric means
+_LINES = 1100
+_LONGEST_M, _SHORTEST_M = 90.0, 0.09
+_OWN_FROM_PER_M = 0.25  # where the tracks begin to go their own ways, cycles per metre
+
+
+@dataclass(frozen=True)
+class Road:
+    """A measured stretch: the two tracks and how they came about."""
+
+    spacing_m: float
+    left_m: Array
+    right_m: Array
+    grade: str
+    waviness: float
+
+    @property
+    def distance_m(self) -> Array:
+        return np.arange(self.left_m.size) * self.spacing_m
+
+    def scaled(self, factor: float) -> Road:
+        """The same road, so many times as high."""
+        return Road(self.spacing_m, factor * self.left_m, factor * self.right_m, self.grade, self.waviness)
+
+    def blurred(self, width_m: float) -> Road:
+        """The road as a profiler with so wide a footprint reports it: a Gaussian of half that standard deviation."""
+        left, right = (gaussian_filter1d(track, 0.5 * width_m / self.spacing_m, mode="nearest")
+                       for track in (self.left_m, self.right_m))
+        return Road(self.spacing_m, left, right, self.grade, self.waviness)
+
+    def with_tracks_apart(self, share: float) -> Road:
+        """The right track moved towards the left one, until only ``share`` of the difference remains."""
+        right = self.left_m + share * (self.right_m - self.left_m)
+        return Road(self.spacing_m, self.left_m, right, self.grade, self.waviness)
+
+
+@njit(cache=True)
+def _sum_of_sines(wave_per_m, height_m, phase, spacing_m, count):
+    """Sum by turning each line's pointer a step per sample."""
+    total = np.zeros(count)
+    for i in range(wave_per_m.size):
+        turn = 2 * np.pi * wave_per_m[i] * spacing_m
+        c, s = np.cos(turn), np.sin(turn)
+        re, im = height_m[i] * np.cos(phase[i]), height_m[i] * np.sin(phase[i])
+        for k in range(count):
+            total[k] += re
+            re, im = c * re - s * im, s * re + c * im
+    return total
+
+
+def random_road(
+    rng: np.random.Generator, length_m: float, spacing_m: float, grade: str, features: bool,
+) -> Road:
+    """A road of a class (its level spread over most of the class), with bumps and the like if ``features``."""
+    waviness = rng.uniform(1.85, 2.15)
+    level_m3 = CLASS_GD_M3[grade] * 10 ** rng.uniform(-0.22, 0.22)
+    highest = min(1 / _SHORTEST_M, 0.45 / spacing_m)
+    edges = np.geomspace(1 / _LONGEST_M, highest, _LINES + 1)
+    waves = edges[:-1] + rng.random(_LINES) * np.diff(edges)
+    heights = np.sqrt(2 * level_m3 * (waves / 0.1) ** -waviness * np.diff(edges))
+    own = waves / np.hypot(waves, _OWN_FROM_PER_M)
+    phases = rng.uniform(0, 2 * np.pi, (2, _LINES))
+    count = int(np.ceil(length_m / spacing_m)) + 1
+    left = _sum_of_sines(waves, heights, phases[0], spacing_m, count)
+    shared = _sum_of_sines(waves, heights * np.sqrt(1 - own**2), phases[0], spacing_m, count)
+    right = shared + _sum_of_sines(waves, heights * own, phases[1], spacing_m, count)
+    if features:
+        both = _features(rng, np.arange(count) * spacing_m)
+        left, right = left + both, right + both
+    return Road(spacing_m, left, right, grade, waviness)
+
+
+def _features(rng: np.random.Generator, at_m: Array) -> Array:
+    """Bumps, potholes or joints, 15 to 80 m apart."""
+    height = np.zeros_like(at_m)
+    kinds = rng.choice(["bump", "hump", "pothole", "joints"], size=rng.integers(1, 3), replace=False)
+    gap_m = rng.uniform(15, 80)
+    for kind in kinds:
+        place = rng.uniform(10, 40)
+        while place < at_m[-1] - 10:
+            height += _feature(str(kind), rng, at_m - place)
+            place += rng.uniform(5, 9) if kind == "joints" else gap_m * rng.uniform(0.5, 1.5)
+    return height
+
+
+def _feature(kind: str, rng: np.random.Generator, x: Array) -> Array:
+    """One of them, beginning at x = 0."""
+    if kind == "bump":  # raised cosine
+        length = rng.uniform(0.4, 3.0)
+        top = rng.uniform(0.015, 0.05) * min(1.0, length)
+        return np.where((x > 0) & (x < length), 0.5 * top * (1 - np.cos(2 * np.pi * x / length)), 0.0)
+    if kind == "hump":  # ramp, plateau, ramp
+        ramp, flat, top = rng.uniform(0.6, 1.5), rng.uniform(1.0, 3.0), rng.uniform(0.03, 0.07)
+        return top * np.interp(x, [0, ramp, ramp + flat, 2 * ramp + flat], [0, 1, 1, 0])
+    if kind == "pothole":
+        edge, flat, depth = rng.uniform(0.1, 0.3), rng.uniform(0.2, 0.8), rng.uniform(0.015, 0.05)
+        return -depth * np.interp(x, [0, edge, edge + flat, 2 * edge + flat], [0, 1, 1, 0])
+    step = rng.uniform(0.002, 0.006)  # a slab stands higher at its end and the next begins low
+    return np.where((x > 0) & (x < 4.5), step * x / 4.5, 0.0)
+
+
+def wheel_path(road: Array, spacing_m: float, at_m: Array, speed_mps: Array, patch_m: float) -> tuple[Array, Array]:
+    """Elevation and its rate under a tire that averages the road over its contact patch.
+
+    The road is straight between samples and flat beyond both ends, so that its integral is exact by trapezoids and
+    pieces of parabolas: no sampling of the average is involved.
+    """
+    if patch_m <= 0:
+        height, slope = _piecewise(road, spacing_m, at_m)
+        return height, slope * speed_mps
+    ahead, behind = at_m + 0.5 * patch_m, at_m - 0.5 * patch_m
+    area = np.concatenate([[0.0], np.cumsum(0.5 * spacing_m * (road[1:] + road[:-1]))])
+    height = (_integral(road, area, spacing_m, ahead) - _integral(road, area, spacing_m, behind)) / patch_m
+    rate = (_piecewise(road, spacing_m, ahead)[0] - _piecewise(road, spacing_m, behind)[0]) / patch_m * speed_mps
+    return height, rate
+
+
+def _piecewise(road: Array, spacing_m: float, at_m: Array) -> tuple[Array, Array]:
+    """Elevation and slope of the straight pieces."""
+    place = at_m / spacing_m
+    piece = np.clip(np.floor(place).astype(np.int64), 0, road.size - 2)
+    part = np.clip(place - piece, 0.0, 1.0)
+    rise = road[piece + 1] - road[piece]
+    slope = np.where((place >= 0) & (place < road.size - 1), rise / spacing_m, 0.0)
+    return road[piece] + part * rise, slope
+
+
+def _integral(road: Array, area: Array, spacing_m: float, at_m: Array) -> Array:
+    """Integral of the elevation from the first sample to each place."""
+    place = at_m / spacing_m
+    piece = np.clip(np.floor(place).astype(np.int64), 0, road.size - 2)
+    part = np.clip(place - piece, 0.0, 1.0)
+    inside = area[piece] + spacing_m * part * (road[piece] + 0.5 * part * (road[piece + 1] - road[piece]))
+    before = spacing_m * np.minimum(place, 0.0) * road[0]
+    after = spacing_m * np.maximum(place - (road.size - 1), 0.0) * road[-1]
+    return inside + before + after
