@@ -1,10 +1,12 @@
 """Everything that goes wrong with a logger, tried: power, kills, disks, sensors, sticks, hostile input, a long day.
 
     python faults.py [--quick] [--out FILE] [--inputs N] [--huge-gb G]
+    python faults.py --fuzzed FILE [--out FILE]
 
 Runs the trials of each fault (``tests/support``; the tests run a few of each), prints goals, and writes the table
 ``docs/faults.md``; exit 1 when a promise was broken. ``--quick`` takes a few cases of each fault, leaves the long day
 out, and writes nothing but where ``--out`` says. Damaged input and the day are those of ``fuzz.py`` and ``soak.py``.
+With ``--fuzzed`` nothing is tried: the table that is there gets the counts of a long run of ``fuzz.py --record FILE``.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ import sensor_faults  # noqa: E402
 import stick_faults  # noqa: E402
 from fault_trials import Hazard, Line, run  # noqa: E402
 from fuzz_targets import TARGETS  # noqa: E402
+from fuzzing import Counts, read_counts  # noqa: E402
 
 TABLE = BENCH.parents[1] / "docs" / "faults.md"
 MEMORY = Path("/dev/shm")
@@ -44,8 +47,7 @@ TRIED = {
     "USB sticks": stick_faults.HAZARDS,
 }
 ENOUGH_CRASHES = 1000
-_READER = re.compile(r"(\S+) +(\d+) inputs +(\d+) accepted +(\d+) refused +(\d+) ends +slowest (\S+ s) +"
-                     r"memory \+(\S+ MB) +\S+/s +(\d+) broken")
+_HOSTILE = re.compile(r"## Hostile input\n.*?(?=\n## |\Z)", re.DOTALL)
 
 HEAD = """\
 # Faults
@@ -98,11 +100,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a minute or two")
     parser.add_argument("--out", type=Path, help="where the table goes (default: docs/faults.md; none with --quick)")
+    parser.add_argument("--fuzzed", type=Path, help="only put the counts of this record into the table")
     parser.add_argument("--inputs", type=int, help="damaged inputs per reader (default: 20000, with --quick 300)")
     parser.add_argument("--huge-gb", type=float, help="size of huge inputs (default: 10, with --quick 0.02)")
     args = parser.parse_args()
     if sys.flags.optimize:
         parser.error("expected Python without -O: the trials are assertions")
+    if args.fuzzed:
+        return _recount(args.fuzzed, args.out or TABLE)
     logging.disable(logging.CRITICAL)
     inputs = args.inputs or (300 if args.quick else 20_000)
     huge_gb = args.huge_gb or (0.02 if args.quick else 10.0)
@@ -148,17 +153,40 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
         "an answer or a refusal; memory bounded by the largest file that a desk command takes (1 GB)",
         f"slowest {max(float(row[2]) for row in huge):.0f} s, memory +{max(int(row[3]) for row in huge)} MB"
         if not failed else f"**BROKEN**: {'; '.join(failed)}", len(huge), wrong=failed)]
-    for name, count, accepted, refused, ends, slowest, memory, broken in _READER.findall(done.stdout):
-        lines.append(Line(
-            f"`{name}`", "damaged valid input", "read as it stands, or refused in one line; within 2 s",
-            f"{accepted} read, {refused} refused, {ends} different ends, slowest {slowest}, memory +{memory}"
-            if broken == "0" else f"**BROKEN**: {broken} inputs", int(count),
-            wrong=(f"{name}: {broken} inputs",) * (broken != "0")))
+    lines += _readers(read_counts(done.stdout))
     _check_ended(done, lines, len(TARGETS) + 1)
-    return Group("Hostile input", (
-        f"{inputs} damaged inputs for each reader. The tool is the project's own: bits, bytes, spans, lines, fields "
-        "and numbers of valid examples are changed, repeated and spliced, check values are mended half of the time, "
-        "and inputs that end at a new place in the sources are damaged further."), lines)
+    return Group("Hostile input", _tool(inputs), lines)
+
+
+def _readers(counts: dict[str, Counts]) -> list[Line]:
+    return [Line(
+        f"`{name}`", "damaged valid input", "read as it stands, or refused in one line; within 2 s",
+        f"{one.accepted} read, {one.refused} refused, {one.ends} different ends, slowest {one.slowest_s:.2f} s, "
+        f"memory +{one.memory_mb:.0f} MB" if not one.broken else f"**BROKEN**: {one.broken} inputs", one.inputs,
+        wrong=(f"{name}: {one.broken} inputs",) * bool(one.broken)) for name, one in counts.items()]
+
+
+def _tool(fewest: int) -> str:
+    return (f"{fewest} damaged inputs or more for each reader, by `tests/bench/fuzz.py`. The tool is our own: bits, bytes, "
+            "spans, lines, fields and numbers of valid examples are changed, repeated and spliced, check values are "
+            "mended half of the time, and inputs that end at a new place in the sources are damaged further.")
+
+
+def _recount(record: Path, table: Path) -> int:
+    """Put the counts of a record of ``fuzz.py`` into the table; 1 when a promise was broken."""
+    counts = read_counts(record.read_text(encoding="utf-8"))
+    page = table.read_text(encoding="utf-8")
+    section = _HOSTILE.search(page)
+    if missing := set(TARGETS) - set(counts):
+        raise SystemExit(f"{record}: expected a line for each reader, none for {', '.join(sorted(missing))}")
+    if section is None:
+        raise SystemExit(f"{table}: expected the section 'Hostile input'")
+    huge = [Line(*cells[:4], int(cells[4])) for row in section[0].splitlines() if row.startswith("| huge input")
+            for cells in [row.strip("| ").split(" | ")]]
+    lines = _readers({name: counts[name] for name in TARGETS})
+    group = Group("Hostile input", _tool(min(counts[name].inputs for name in TARGETS)), [*huge, *lines])
+    table.write_text(page.replace(section[0], _section(group)), encoding="utf-8")
+    return 1 if any(line.wrong for line in lines) else 0
 
 
 def _long_day() -> Group:
@@ -198,16 +226,17 @@ def _page(groups: Sequence[Group]) -> str:
              "\n".join(f"- {words}" for words in told) + "\n",
              "When nothing is wrong: \"Nothing: all is well.\" What each stick is doing, and whether it may be pulled, "
              "stands above all else.\n"]
-    for group in groups:
-        trials = sum(line.trials for line in group.lines)
-        parts.append(f"## {group.title}\n")
-        parts += [f"{group.words}\n"] if group.words else []
-        parts.append("\n".join([
-            "| fault | how it is injected | what is promised | what happened | trials |",
-            "| --- | --- | --- | --- | --- |",
-            *(f"| {line.name} | {line.injected} | {line.promised} | {_cell(line.happened)} | {line.trials} |"
-              for line in group.lines), f"| **all** | | | | **{trials}** |"]) + "\n")
-    return "\n".join(parts)
+    return "\n".join([*parts, *map(_section, groups)])
+
+
+def _section(group: Group) -> str:
+    trials = sum(line.trials for line in group.lines)
+    words = f"{group.words}\n\n" if group.words else ""
+    return f"## {group.title}\n\n{words}" + "\n".join([
+        "| fault | how it is injected | what is promised | what happened | trials |",
+        "| --- | --- | --- | --- | --- |",
+        *(f"| {line.name} | {line.injected} | {line.promised} | {_cell(line.happened)} | {line.trials} |"
+          for line in group.lines), f"| **all** | | | | **{trials}** |"]) + "\n"
 
 
 def _cell(words: str) -> str:

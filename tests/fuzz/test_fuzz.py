@@ -13,7 +13,7 @@ import pytest
 
 import huge_inputs
 from fuzz_targets import TARGETS, Workshop
-from fuzzing import fuzz
+from fuzzing import Counts, fuzz, read_counts
 
 INPUTS = {"vehicle_yaml": 250, "config_yaml": 300, "pasco_profile_yaml": 250, "pasco_ps2119": 300}
 MEMORY_MB = 150
@@ -39,3 +39,15 @@ def test_what_is_huge_outside_or_inside_takes_little_time_and_memory(tmp_path: P
     for name, _, seconds, _ in rows:
         assert float(seconds) < LONGEST_S, name
     assert int(rows[-1][3]) < MEMORY_MB
+
+
+def test_counts_of_several_runs_add_up() -> None:
+    with Workshop() as folder:
+        target = TARGETS["bma220"](folder)
+        runs = [Counts.of(fuzz(target, seed, inputs), 0.5) for seed, inputs in ((1, 30), (2, 50))]
+    record = "\n".join(["noise", runs[0].line("bma220"), runs[0].line("nmea"), "", runs[1].line("bma220")])
+    counts = read_counts(record)
+    assert list(counts) == ["bma220", "nmea"]
+    assert (counts["bma220"].inputs, counts["bma220"].accepted, counts["nmea"].inputs) == (80, 80, 30)
+    assert counts["bma220"].seconds == pytest.approx(1.0)
+    assert counts["bma220"].ends == max(run.ends for run in runs)

@@ -37,6 +37,8 @@ COMMON_TOKENS = (
     b"../" * 20, b"/dev/zero", b"%s%n", b"[", b"]", b"{", b"}", b"[" * 200, b"{" * 200,
 )
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?")
+_LINE = re.compile(r"(\S+) +(\d+) inputs +(\d+) accepted +(\d+) refused +(\d+) ends +slowest (\S+) s +"
+                   r"memory \+(\S+) MB +(\d+)/s +(\d+) broken")
 
 
 class ViolationError(AssertionError):
@@ -79,6 +81,48 @@ class Tally:
     memory_mb: float = 0.0
     failures: list[tuple[str, bytes]] = field(default_factory=list)
     without_line: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What runs of one reader have counted. ``ends``, ``slowest_s`` and ``memory_mb`` are those of the run that had most."""
+
+    inputs: int = 0
+    accepted: int = 0
+    refused: int = 0
+    ends: int = 0
+    slowest_s: float = 0.0
+    memory_mb: float = 0.0
+    seconds: float = 0.0
+    broken: int = 0
+
+    @classmethod
+    def of(cls, tally: Tally, seconds: float) -> Counts:
+        """Those of one run."""
+        return cls(tally.inputs, tally.accepted, tally.refused, tally.places, tally.slowest_s, tally.memory_mb, seconds,
+                   len(tally.failures))
+
+    def plus(self, other: Counts) -> Counts:
+        """Both runs together."""
+        return Counts(self.inputs + other.inputs, self.accepted + other.accepted, self.refused + other.refused,
+                      max(self.ends, other.ends), max(self.slowest_s, other.slowest_s),
+                      max(self.memory_mb, other.memory_mb), self.seconds + other.seconds, self.broken + other.broken)
+
+    def line(self, name: str) -> str:
+        """For people, and for ``read_counts``."""
+        return (f"{name:20} {self.inputs:8} inputs {self.accepted:8} accepted {self.refused:8} refused "
+                f"{self.ends:4} ends  slowest {self.slowest_s:.2f} s  memory +{self.memory_mb:.0f} MB  "
+                f"{self.inputs / max(self.seconds, 1e-3):.0f}/s  {self.broken} broken")
+
+
+def read_counts(text: str) -> dict[str, Counts]:
+    """Sums by reader, in order of their first lines."""
+    sums: dict[str, Counts] = {}
+    for name, inputs, accepted, refused, ends, slowest_s, memory_mb, rate, broken in _LINE.findall(text):
+        one = Counts(int(inputs), int(accepted), int(refused), int(ends), float(slowest_s), float(memory_mb),
+                     int(inputs) / max(int(rate), 1), int(broken))
+        sums[name] = sums.get(name, Counts()).plus(one)
+    return sums
 
 
 def fuzz(target: Target, seed: int, inputs: int, until_s: float = float("inf")) -> Tally:
