@@ -167,9 +167,9 @@ def _readers(counts: dict[str, Counts]) -> list[Line]:
 
 
 def _tool(fewest: int) -> str:
-    return (f"{fewest} damaged inputs or more for each reader, by `tests/bench/fuzz.py`. The tool is our own: bits, bytes, "
-            "spans, lines, fields and numbers of valid examples are changed, repeated and spliced, check values are "
-            "mended half of the time, and inputs that end at a new place in the sources are damaged further.")
+    return (f"{fewest} damaged inputs or more for each reader, by `tests/bench/fuzz.py`. The tool is our own: bits, "
+            "bytes, spans, lines, fields and numbers of valid examples are changed, repeated and spliced, check values "
+            "are mended half of the time, and inputs that end at a new place in the sources are damaged further.")
 
 
 def _recount(record: Path, table: Path) -> int:

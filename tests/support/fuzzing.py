@@ -85,7 +85,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Counts:
-    """What runs of one reader have counted. ``ends``, ``slowest_s`` and ``memory_mb`` are those of the run that had most."""
+    """What runs of one reader have counted. ``ends``, ``slowest_s`` and ``memory_mb`` are those of the largest."""
 
     inputs: int = 0
     accepted: int = 0
