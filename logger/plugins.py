@@ -3,15 +3,26 @@
 Problem: a list of what there is, kept beside the files themselves, is forgotten when a file is added. Solution: each
 file of a folder offers one thing under an agreed name, and the folder is read. The thing is called after its file. The
 one file that offers nothing is the one that says what such a thing is (``weighting.py`` for the offers ``WEIGHTING``).
+
+A user's own file outside the package offers its one thing in the same way. It is Python that nobody has checked, so
+whatever goes wrong in it becomes one line that names the file and the line in it.
 """
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
+from traceback import extract_tb
+from types import ModuleType
 from typing import Any
 
-from logger.errors import BadInput
+from logger.errors import BadInput, RidelogError
+
+_MAX_BYTES = 256 * 1024
 
 
 def catalogue(package: str, offer: str) -> dict[str, Any]:
@@ -31,3 +42,38 @@ def catalogue(package: str, offer: str) -> dict[str, Any]:
             raise BadInput(f"{module.__file__}: expected {offer} to be named {name!r}, as the file is, "
                            f"found {offers[name].name!r}")
     return offers
+
+
+def offered_by(path: Path, offer: str) -> Any:
+    """What a user's own Python file offers as ``offer``. The file is run, once per call.
+
+    Raises BadInput that names the file, and the line where there is one, for a file that cannot be read, is not Python,
+    raises, or does not offer it.
+    """
+    from logger.store.bounded import read_bounded
+
+    source = read_bounded(path, _MAX_BYTES)
+    module = ModuleType(f"ridelog_own_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # dataclasses and pickles look for it there
+    with blamed_on(path):
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    if not hasattr(module, offer):
+        raise BadInput(f"{path}: expected it to offer {offer}, as in {offer} = ...")
+    return getattr(module, offer)
+
+
+@contextmanager
+def blamed_on(path: Path) -> Iterator[None]:
+    """Turn whatever a user's own file raises, or is found to lack, into BadInput that names it, and the line in it
+    that was reached."""
+    try:
+        yield
+    except RidelogError:
+        raise
+    except SyntaxError as error:
+        raise BadInput(f"{error.filename}:{error.lineno or 1}: expected Python, found {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
+        said = f":{lines[-1]}: {type(error).__name__}: {error}" if lines else f": {error}"
+        raise BadInput(f"{path}{said}") from error

@@ -1,15 +1,25 @@
-"""Vehicle files (YAML) to vehicles and back, with complaints that name the line."""
+"""Vehicle files (YAML) to vehicles and back, with complaints that name the line.
+
+Most commands know the plain car only, and must not take a car with effects for one without: ``read_vehicle`` refuses
+it. Those that know effects read a ``Model``: the car, its effects, and how it came to them. A user's own effect is
+Python that reading it runs, which the service on board never does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import yaml
 
 from logger.errors import BadInput
 from logger.store.yaml_lines import Node, load_mapping
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
+
+if TYPE_CHECKING:
+    from logger.vehicle.effect import Chosen
 
 # What each model needs beyond the keys that all have.
 _MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
@@ -36,10 +46,33 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 }
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
 _SHORTEST_WHEELBASE_M = 0.1
+KNOW_EFFECTS = "simulate, compare, diagnose, add-effect and lab"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step in the making of a model: what was done, and the error that it left.
+
+    noise_floor_error    below which no model can come; None: not known
+    """
+
+    step: str
+    error: float
+    noise_floor_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A vehicle with its effects, and the steps that led to them, the first one first."""
+
+    vehicle: Vehicle
+    effects: tuple[Chosen, ...] = ()
+    history: tuple[Step, ...] = ()
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
-    """Read a vehicle file. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown or wrong.
+    """Read the file of a plain vehicle. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown
+    or wrong, and for a vehicle that has effects.
 
     A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
     has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
@@ -47,14 +80,36 @@ def read_vehicle(path: Path | str) -> Vehicle:
     sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference. Numbers that no car has,
     such as those in other units, are wrong too.
     """
+    vehicle, keys = _read(path)
+    if "effects" in keys and keys["effects"].items():
+        raise keys["effects"].wrong(f"no effects: this command knows the plain car only ({KNOW_EFFECTS} know effects)")
+    return vehicle
+
+
+def read_model(path: Path | str) -> Model:
+    """Read a vehicle file with its effects, those in files of the user's own too, which are run.
+
+    Raises BadInput as ``read_vehicle``, and for an effect, a parameter or a step of the history that is not what it
+    should be, or an effect that cannot be there in this vehicle.
+    """
+    from logger.store.effect_file import read_effects
+
+    vehicle, keys = _read(path)
+    return Model(
+        vehicle,
+        read_effects(keys["effects"], vehicle) if "effects" in keys else (),
+        tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
+    )
+
+
+def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
+    """The vehicle of a file, and the nodes of all its keys."""
     top = load_mapping(path)
     model_node = top.mapping().get("model")
     if model_node is None:
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
     model = model_node.choice(*_MODEL_KEYS)
-    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects"))
-    if "effects" in keys and keys["effects"].items():
-        raise keys["effects"].wrong("an empty list (effects are not supported yet)")
+    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects", "history"))
     mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
     front = _read_axle(keys["front"], model, mass_kg)
     rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
@@ -63,7 +118,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
         raise distance.wrong(f"axles at least {_SHORTEST_WHEELBASE_M:g} m apart")
     body = {key: _number_of(keys, key, mass_kg)
             for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
-    return Vehicle(
+    vehicle = Vehicle(
         name=keys["name"].text(),
         model=model,
         sprung_mass_kg=mass_kg,
@@ -75,6 +130,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
         track_width_m=body.get("track_width_m"),
         sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
     )
+    return vehicle, keys
 
 
 def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> float:
@@ -109,8 +165,53 @@ def _read_sensor(node: Node, model: str) -> SensorPlace:
     return SensorPlace(**place)
 
 
+def _read_step(node: Node) -> Step:
+    keys = node.mapping(required=("step", "error"), optional=("noise_floor_error",))
+    floor = keys.get("noise_floor_error")
+    return Step(keys["step"].text(), keys["error"].number(low=0),
+                None if floor is None or floor.is_null() else floor.number(low=0))
+
+
 def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
     """Write a vehicle as a file that ``read_vehicle`` reads back equal, to the last bit. OSError if that fails."""
+    write_model(path, Model(vehicle))
+
+
+def write_model(path: Path | str, model: Model) -> None:
+    """Write a model as a file that ``read_model`` reads back equal, to the last bit. OSError if that fails.
+
+    The file of a user's own effect is named by its way from the new file's folder. A standard error that is not finite
+    is not known, and left out.
+    """
+    from logger.store.effect_file import effect_keys
+
+    keys = _vehicle_keys(model.vehicle)
+    keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
+    if model.history:
+        keys["history"] = [_OneLine(step=one.step, error=float(one.error),
+                                    noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
+    text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
+    Path(path).write_text(text, "utf-8")
+
+
+def _float_or_none(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+class _OneLine(dict[str, object]):
+    """A mapping that is written on one line."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes plain values, as YAML's safe dumper does."""
+
+
+_Dumper.add_representer(
+    _OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(), flow_style=True)
+)
+
+
+def _vehicle_keys(vehicle: Vehicle) -> dict[str, object]:
     keys: dict[str, object] = {"name": vehicle.name, "model": vehicle.model}
     for key in ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m"):
         value = getattr(vehicle, key)
@@ -122,9 +223,7 @@ def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
     keys["contact_patch_m"] = _number(vehicle.contact_patch_m)
     if vehicle.sensor != AT_CENTRE_OF_GRAVITY:
         keys["sensor"] = {"ahead_m": _number(vehicle.sensor.ahead_m), "left_m": _number(vehicle.sensor.left_m)}
-    keys["effects"] = []
-    text = yaml.safe_dump(keys, sort_keys=False, allow_unicode=True, width=float("inf"))
-    Path(path).write_text(text, "utf-8")
+    return keys
 
 
 def _axle_keys(axle: Axle, model: str) -> dict[str, float]:

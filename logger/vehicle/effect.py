@@ -179,7 +179,7 @@ class Chosen:
     """An effect with values for its parameters.
 
     standard_errors    of those that were fitted, by name; empty if they were not
-    file               where a user's own effect is written, as the vehicle's file says it; None: it comes with ridelog
+    file               path of the Python file that a user's own effect is written in; None: it comes with ridelog
     """
 
     effect: Effect

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from logger.errors import BadInput
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.vehicle_file import read_vehicle, write_vehicle
+from logger.store.effect_file import shipped_effects
+from logger.store.vehicle_file import Model, Step, read_model, read_vehicle, write_model, write_vehicle
 from logger.store.yaml_lines import MAX_BYTES, parse_mapping
+from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import MODELS, structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle
@@ -170,7 +172,7 @@ def test_a_shipped_vehicle_names_itself_its_sources_and_its_frequencies(name: st
     ("effects: []", "sensor: {ahead_m: 300}", "sensor", "from -10 to 10"),
     ("effects: []", "sensor: {ahead_mm: 3}", "sensor", "expected one of the keys ahead_m, left_m"),
     ("effects: []", "sensor: 0.3", "sensor", "expected a mapping"),
-    ("effects: []", "effects: [{name: roll}]", "effects", "not supported yet"),
+    ("effects: []", "effects: [{name: roll}]", "effects", "this command knows the plain car only (simulate, compare"),
     ("effects: []", "effects: ", "effects", "expected a list, found nothing"),
     ("name: rav4-2009", "name: !!python/name:os.system x", "name", "plain value"),
 ])
@@ -298,3 +300,185 @@ def test_numbers_are_what_they_look_like() -> None:
             keys[key].number()
     with pytest.raises(BadInput, match="f:5: expected a whole number from 8 to 9"):
         keys["e"].integer(8, 9)
+
+
+# --- effects and history ---
+
+OWN = """\
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+
+
+class AirDrag(ForceEffect):
+    name = "air_drag"
+    title = "a damper that grows with the square of the rate"
+    parameters = (
+        Parameter("drag_n_s2_per_m2", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (100.0,), "force per square of the rate"),
+    )
+    source = "mine"
+    signature = "strong shakes are damped more"
+    shown_by = "drive a bump"
+
+    def laws(self, p, laws):
+        return laws.with_force(lambda travel_m, rate_mps: p.drag_n_s2_per_m2 * rate_mps * abs(rate_mps))
+
+
+EFFECT = AirDrag()
+"""
+
+
+@st.composite
+def chosen_effects(draw: st.DrawFn) -> Chosen:
+    effect = draw(st.sampled_from([one for one in shipped_effects().values() if one.name != "roll"]))
+    values = {
+        one.name: draw(st.sampled_from(one.choices) if one.choices else st.floats(one.low, one.high))
+        for one in effect.parameters
+    }
+    errors = {name: draw(st.floats(0, 1e6)) for name in values if draw(st.booleans())}
+    return chosen(effect, values, standard_errors=errors)
+
+
+steps_taken = st.builds(Step, names, st.floats(0, 10), st.none() | st.floats(0, 1))
+
+
+@given(st.lists(chosen_effects(), max_size=5, unique_by=lambda one: one.effect.name), st.lists(steps_taken, max_size=4))
+@settings(deadline=None, max_examples=40)
+def test_a_written_model_is_read_back_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory, effects: list[Chosen], history: list[Step]
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "model.yaml"
+    model = Model(read_vehicle(vehicle_file("rav4-2009")), tuple(effects), tuple(history))
+    write_model(path, model)
+    assert read_model(path) == model
+
+
+def test_effects_are_written_as_people_write_them(tmp_path: Path) -> None:
+    path = tmp_path / "car.yaml"
+    tire = chosen(shipped_effects()["tire_damping"], {"tire_damping_n_s_per_m": 150},
+                  standard_errors={"tire_damping_n_s_per_m": np.float64(8.5)})
+    lift = chosen(shipped_effects()["wheel_lift"], {}, standard_errors={})
+    write_model(path, Model(read_vehicle(vehicle_file("rav4-2009")), (tire, lift), (Step("plain car", 0.25, None),)))
+    assert path.read_text().split("contact_patch_m: 0.25\n")[1] == (
+        "effects:\n"
+        "- {name: tire_damping, tire_damping_n_s_per_m: 150.0, standard_errors: {tire_damping_n_s_per_m: 8.5}}\n"
+        "- {name: wheel_lift}\n"
+        "history:\n"
+        "- {step: plain car, error: 0.25, noise_floor_error: null}\n"
+    )
+    unknown = replace(tire, standard_errors={"tire_damping_n_s_per_m": float("inf")})
+    write_model(path, Model(read_vehicle(vehicle_file("rav4-2009")), (unknown,)))
+    assert read_model(path).effects[0].standard_errors == {}
+
+
+def test_a_car_without_effects_is_a_model_too(tmp_path: Path) -> None:
+    (tmp_path / "q.yaml").write_text(QUARTER)
+    assert read_model(tmp_path / "q.yaml") == Model(read_vehicle(tmp_path / "q.yaml"))
+
+
+def test_what_is_not_said_is_the_default(tmp_path: Path) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(TEXT.replace("effects: []", "effects: [{name: sensor_bandwidth, cutoff_hz: 20}]"))
+    assert read_model(path).effects[0].values == {"cutoff_hz": 20.0, "order": 1.0}
+
+
+def test_an_effect_of_ones_own_is_found_beside_the_vehicles_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, moved = tmp_path / "cars" / "car.yaml", tmp_path / "moved" / "deeper" / "car.yaml"
+    for folder in (path.parent, moved.parent):
+        folder.mkdir(parents=True)
+    (path.parent / "air_drag.py").write_text(OWN)
+    path.write_text(TEXT.replace("effects: []", "effects: [{name: air_drag, file: air_drag.py, drag_n_s2_per_m2: 7}]"))
+    model = read_model(path)
+    assert model.effects[0].values == {"drag_n_s2_per_m2": 7.0}
+    write_model(moved, model)
+    assert "file: ../../cars/air_drag.py" in moved.read_text()
+    again = read_model(moved)
+    assert (again.effects[0].effect.name, again.effects[0].values) == ("air_drag", {"drag_n_s2_per_m2": 7.0})
+    monkeypatch.chdir(moved.parent)
+    assert read_model("car.yaml").effects[0].file == "../../cars/air_drag.py"
+
+
+EFFECT_COMPLAINTS = [
+    ("{cutoff_hz: 2}", "expected the key 'name' here, it is missing"),
+    ("tire_damping", "expected a mapping (key: value lines), found 'tire_damping'"),
+    ("{name: tyre_damping}", "expected one of body_bending, bump_stop, cg_shift"),
+    ("{name: tire_damping}", "expected the key 'tire_damping_n_s_per_m' here, it is missing"),
+    ("{name: tire_damping, tire_damping_n_s_per_m: -1}", "expected a number from 0 to 3000, found '-1'"),
+    ("{name: tire_damping, tire_damping_n_s_per_m: .inf}", "expected a number from 0 to 3000, found '.inf'"),
+    ("{name: top_mount_compliance, mount_stiffness_n_per_m: 1e9}", "expected a number from 5000 to 1e+08, found '1e9'"),
+    ("{name: payload, mass_kg: 3, kg: 3}", "expected one of the keys name, mass_kg, file, standard_errors, found 'kg'"),
+    ("{name: sensor_bandwidth, cutoff_hz: 20, order: 1.5}", "expected 1 or 2, found '1.5'"),
+    ("{name: payload, mass_kg: 3, standard_errors: {kg: 3}}", "expected one of the parameters mass_kg, found 'kg'"),
+    ("{name: payload, mass_kg: 3, standard_errors: {mass_kg: -3}}", "expected a number of at least 0, found '-3'"),
+    ("{name: wheel_lift}\n- {name: wheel_lift}", "expected each effect once, found 'wheel_lift'"),
+    ("{name: drag, file: nowhere.py}", "nowhere.py: expected a readable file"),
+]
+
+
+@pytest.mark.parametrize(("effect", "words"), EFFECT_COMPLAINTS)
+def test_complaints_about_effects_name_the_line(tmp_path: Path, effect: str, words: str) -> None:
+    path = tmp_path / "car.yaml"
+    text = TEXT.replace("effects: []", f"effects:\n- {effect}")
+    path.write_text(text)
+    with pytest.raises(BadInput) as caught:
+        read_model(path)
+    last = text.count("\n") - text.split("effects:")[1].split(effect.split("\n")[-1])[1].count("\n") + 1
+    assert words in str(caught.value)
+    if "nowhere" not in words:
+        assert str(caught.value).startswith(f"{path}:{last}: ")
+
+
+def test_an_effect_that_this_car_cannot_have(tmp_path: Path) -> None:
+    path = tmp_path / "q.yaml"
+    path.write_text(QUARTER + "effects:\n- {name: sensor_offset, offset_m: 0.2}\n")
+    with pytest.raises(BadInput, match=r"q\.yaml:11: sensor_offset: a quarter car does not pitch$"):
+        read_model(path)
+
+
+@pytest.mark.parametrize(("step", "words"), [
+    ("{step: plain}", "expected the key 'error' here"), ("{error: 1}", "expected the key 'step' here"),
+    ("{step: plain, error: .nan}", "expected a number"), ("{step: plain, error: 0.2, floor: 1}", "expected one of the"),
+    ("{step: plain, error: 0.2, noise_floor_error: -1}", "expected a number of at least 0"),
+])
+def test_complaints_about_the_history_name_the_line(tmp_path: Path, step: str, words: str) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(QUARTER + f"history:\n- {step}\n")
+    with pytest.raises(BadInput) as caught:
+        read_model(path)
+    assert str(caught.value).startswith(f"{path}:11: {words}")
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("EFFECT = AirDrag()", "EFFECTS = [AirDrag()]", ": expected it to offer EFFECT, as in EFFECT = ..."),
+    ("EFFECT = AirDrag()", "EFFECT = AirDrag", ": expected EFFECT to be an object of a class made from one of"),
+    ("EFFECT = AirDrag()", "EFFECT = 1 / 0", ":18: ZeroDivisionError: division by zero"),
+    ("EFFECT = AirDrag()", "raise SystemExit(3)", ":18: SystemExit: 3"),
+    ("EFFECT = AirDrag()", "EFFECT = )", ":18: expected Python, found unmatched ')'"),
+    ('"air_drag"', '"tire_damping"', ": expected a name that no effect of ridelog has, found 'tire_damping'"),
+    ('"air_drag"', '"drag"', "car.yaml:22: expected 'drag', as EFFECT in"),
+    ('"air_drag"', '"air-drag"', ": expected a name of letters, digits and _, found 'air-drag'"),
+    ('source = "mine"', "", ": expected EFFECT to have a text 'source'"),
+    ("100.0, 0.0, 5000.0", "-1.0, 0.0, 5000.0", ": drag_n_s2_per_m2: expected finite low <= start <= high, found 0.0"),
+    ("5000.0, 0.0", 'float("inf"), 0.0', ": drag_n_s2_per_m2: expected finite low <= start <= high, found 0.0"),
+    ("Scale.LINEAR", "Scale.LOG", ": drag_n_s2_per_m2: expected low above 0 for a scale that is log, found 0.0"),
+    ("(100.0,)", "()", ": drag_n_s2_per_m2: expected trials, the values that a search begins at"),
+    ("(100.0,)", "(-100.0,)", ": drag_n_s2_per_m2: expected trials, choices and default within 0.0 to 5000.0"),
+    ('Parameter("drag_n_s2_per_m2"', 'Parameter("file"', ": expected a parameter's name of letters"),
+    ("parameters = (", "parameters = [] or (1,", ": expected parameters to be a tuple of Parameter"),
+    ("return laws.with", "laws.with", "expected laws to answer with a CornerLaws, found NoneType"),
+    ("p.drag_n_s2_per_m2 * rate_mps * abs(rate_mps)", "3.0", "expected a force to answer with an array of shape"),
+    ("rate_mps * abs(rate_mps)", "rate_mps / travel_m.min() * float('nan')", "a force to answer with finite numbers"),
+    ("p.drag_n_s2_per_m2 * rate_mps", "p.drag * rate_mps", ":15: AttributeError: 'types.SimpleNamespace' object has"),
+])
+def test_complaints_about_an_effect_of_ones_own_name_its_file(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(TEXT.replace("effects: []", "effects: [{name: air_drag, file: mine.py, drag_n_s2_per_m2: 7}]"))
+    assert old in OWN
+    (tmp_path / "mine.py").write_text(OWN.replace(old, new))
+    with pytest.raises(BadInput) as caught:
+        read_model(path)
+    assert words in str(caught.value)
+    assert f"{tmp_path / 'mine.py'}" in str(caught.value)
+    assert "\n" not in str(caught.value)
