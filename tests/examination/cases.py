@@ -185,10 +185,10 @@ def _difference_rms(one: tuple[Array, ...], other: tuple[Array, ...]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([(a - b)[skipped:] for a, b in zip(one, other, strict=True)]) ** 2)))
 
 
-def strength(scene: Scene, hidden: tuple[Hidden, ...], which: int, noise: Noise, step_s: float) -> float:
-    """R.m.s. of what one effect changes in the clean record, over the noise."""
-    changed = _difference_rms(measured(with_effects(scene, hidden), step_s),
-                              measured(without(scene, hidden, which), step_s))
+def strength(scene: Scene, hidden: tuple[Hidden, ...], which: int, noise: Noise) -> float:
+    """R.m.s. of what one effect changes in the clean record, over the noise; roughly, by long steps."""
+    changed = _difference_rms(measured(with_effects(scene, hidden), _SEARCH_STEP_S),
+                              measured(without(scene, hidden, which), _SEARCH_STEP_S))
     return changed / _noise_rms(noise)
 
 
@@ -197,11 +197,15 @@ def hide(
 ) -> tuple[Scene, Hidden]:
     """Add an effect of the wanted strength, or the nearest that its bounds allow."""
     path = effect.path(rng, scene.car)
+    bare = measured(with_effects(scene, before), _SEARCH_STEP_S)
 
     def at(u: float) -> tuple[Scene, Hidden, float]:
         staged, found = effect.stage(scene, u), Hidden(effect, path(u), wanted)
         both = (*before, found)
-        return staged, found, strength(staged, both, len(both) - 1, noise, _SEARCH_STEP_S)
+        if staged is not scene or "blur_m" in found.parameters:  # then the other side of the comparison moves too
+            return staged, found, strength(staged, both, len(both) - 1, noise)
+        changed = _difference_rms(measured(with_effects(scene, both), _SEARCH_STEP_S), bare)
+        return staged, found, changed / _noise_rms(noise)
 
     goal = np.log(wanted)
     low, high = 0.0, 1.0
@@ -278,7 +282,7 @@ def case(kind: str, seed: int, effect: str | None = None) -> Case:
     chosen = _choose(rng, kind, seed, effect)
     for attempt in range(_TRIES):
         scene, noise, hidden = _attempt(rng, chosen, attempt)
-        strengths = [strength(scene, hidden, i, noise, _SEARCH_STEP_S) for i in range(len(hidden))]
+        strengths = [strength(scene, hidden, i, noise) for i in range(len(hidden))]
         least = [max(0.9 * low, 0.5 * each.wanted) for each, (_, _, low) in zip(hidden, chosen, strict=True)]
         if all(value >= low for value, low in zip(strengths, least, strict=True)):
             break

@@ -2,9 +2,9 @@
 
 Problem: a product that makes its own roads knows their spectrum and their phases too well.
 
-Solution: a road is a sum of sines with wave numbers spread evenly in their logarithm, jittered, and random phases, so
-that its displacement density is Gd(n) = Gd(0.1 c/m) * (n / 0.1 c/m)^-w (ISO 8608:2016, eq. 7). The right track shares
-the left one's long waves and has short ones of its own. Bumps, potholes and slab joints are added to both.
+Solution: a road is white noise through a filter along the road, so that its displacement density is
+Gd(n) = Gd(0.1 c/m) * (n / 0.1 c/m)^-w (ISO 8608:2016, eq. 7) down to waves of 90 m. Both tracks share long waves and
+have short ones of their own. Bumps, potholes and slab joints are added to both.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import bilinear_zpk, butter, lfilter, sosfilt, sosfreqz, zpk2sos
 
 Array = NDArray[np.float64]
 
 CLASS_GD_M3 = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}  # ISO 8608:2016, table C.2, geometric means
-_LINES = 1100
-_LONGEST_M, _SHORTEST_M = 90.0, 0.09
+_LONGEST_M, _WARM_M = 90.0, 500.0
 _OWN_FROM_PER_M = 0.25  # where the tracks begin to go their own ways, cycles per metre
 
 
@@ -54,18 +53,22 @@ class Road:
         return Road(self.spacing_m, self.left_m, right, self.grade, self.waviness)
 
 
-@njit(cache=True)
-def _sum_of_sines(wave_per_m, height_m, phase, spacing_m, count):
-    """Sum by turning each line's pointer a step per sample."""
-    total = np.zeros(count)
-    for i in range(wave_per_m.size):
-        turn = 2 * np.pi * wave_per_m[i] * spacing_m
-        c, s = np.cos(turn), np.sin(turn)
-        re, im = height_m[i] * np.cos(phase[i]), height_m[i] * np.sin(phase[i])
-        for k in range(count):
-            total[k] += re
-            re, im = c * re - s * im, s * re + c * im
-    return total
+def _shaping(waviness: float, level_m3: float, spacing_m: float) -> Array:
+    """Second-order sections that turn white noise of variance 1 into a road.
+
+    A leaky sum gives n^-2; pole and zero pairs, eight a decade, bend that to the waviness (Oustaloup et al., IEEE
+    Trans. Circuits Syst. I 47, 2000).
+    """
+    low, high = 0.5 / _LONGEST_M, 0.5 / spacing_m
+    pairs = int(np.ceil(8 * np.log10(high / low)))
+    corner = 2 * np.pi * np.geomspace(low, high, 2 * pairs + 1)
+    bend = (corner[-1] / corner[0]) ** ((waviness - 2) / 4 / pairs)
+    zeros, poles, _ = bilinear_zpk(-corner[1::2] * bend, -corner[1::2] / bend, 1.0, 1 / spacing_m)
+    leak = np.exp(-2 * np.pi * spacing_m / _LONGEST_M)
+    sections = zpk2sos(np.append(zeros, 0.0), np.append(poles, leak), 1.0)
+    _, at_tenth = sosfreqz(sections, worN=[0.1], fs=1 / spacing_m)
+    sections[0, :3] *= np.sqrt(level_m3 / (2 * spacing_m)) / abs(at_tenth[0])
+    return sections
 
 
 def random_road(
@@ -73,17 +76,14 @@ def random_road(
 ) -> Road:
     """A road of a class (its level spread over most of the class), with bumps and the like if ``features``."""
     waviness = rng.uniform(1.85, 2.15)
-    level_m3 = CLASS_GD_M3[grade] * 10 ** rng.uniform(-0.22, 0.22)
-    highest = min(1 / _SHORTEST_M, 0.45 / spacing_m)
-    edges = np.geomspace(1 / _LONGEST_M, highest, _LINES + 1)
-    waves = edges[:-1] + rng.random(_LINES) * np.diff(edges)
-    heights = np.sqrt(2 * level_m3 * (waves / 0.1) ** -waviness * np.diff(edges))
-    own = waves / np.hypot(waves, _OWN_FROM_PER_M)
-    phases = rng.uniform(0, 2 * np.pi, (2, _LINES))
-    count = int(np.ceil(length_m / spacing_m)) + 1
-    left = _sum_of_sines(waves, heights, phases[0], spacing_m, count)
-    shared = _sum_of_sines(waves, heights * np.sqrt(1 - own**2), phases[0], spacing_m, count)
-    right = shared + _sum_of_sines(waves, heights * own, phases[1], spacing_m, count)
+    sections = _shaping(waviness, CLASS_GD_M3[grade] * 10 ** rng.uniform(-0.22, 0.22), spacing_m)
+    before, count = round(_WARM_M / spacing_m), int(np.ceil(length_m / spacing_m)) + 1
+    waves = sosfilt(sections, rng.standard_normal((3, before + count)))
+    # What both tracks share and what each has alone; the powers of the two filters add to one.
+    low = butter(1, _OWN_FROM_PER_M, fs=1 / spacing_m)
+    high = butter(1, _OWN_FROM_PER_M, "high", fs=1 / spacing_m)
+    shared, left, right = lfilter(*low, waves[0]), lfilter(*high, waves[1]), lfilter(*high, waves[2])
+    left, right = (shared + left)[before:], (shared + right)[before:]
     if features:
         both = _features(rng, np.arange(count) * spacing_m)
         left, right = left + both, right + both
