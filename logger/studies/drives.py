@@ -48,6 +48,10 @@ class Conditions:
     iri_m_per_km: float = 0.0
     seed: int = 0
 
+    def on(self, iri_m_per_km: float, seed: int) -> Conditions:
+        """The same sensor on another road; another seed, another noise and road."""
+        return replace(self, iri_m_per_km=iri_m_per_km, seed=seed)
+
 
 PS_2119 = Conditions(noise_mps2=0.03, step_mps2=0.01 * STANDARD_GRAVITY_MPS2)
 """The sensor of 5.2: steps of 0.01 g; its noise is taken for a third of a step."""
@@ -88,18 +92,10 @@ def record_of(obstacle: Shape, speed_mps: float, seconds: float, conditions: Con
     return Record(time_s, sensed, distance_m, np.full(len(time_s), speed_mps), track, skip_s=0.0)
 
 
-def believed(record: Record, obstacle: Shape, speed_factor: float = 1.0) -> Record:
-    """The same readings, of which another obstacle is believed, or another speed: ``speed_factor`` times the true one.
-
-    The driver knows when the front tires meet the obstacle, so where they stood then stays.
-    """
-    track = record.track
-    place_m = track.start_m + track.spacing_m * np.arange(len(track.elevation_m), dtype=np.float64)
-    elevation_m = obstacle(place_m)
-    meets_m = float(place_m[np.flatnonzero(elevation_m)[0]]) if elevation_m.any() else 0.0
-    distance_m = meets_m + speed_factor * (record.distance_m - meets_m)
-    return replace(record, track=Track(track.spacing_m, elevation_m, track.start_m), distance_m=distance_m,
-                   speed_mps=speed_factor * record.speed_mps)
+def without_profile(record: Record, speed_scale: float = 1.0) -> Record:
+    """The same readings, nothing known of the road; recorded speed and distance are so many times the true ones."""
+    return replace(record, track=Track(1.0, np.zeros(2)), distance_m=speed_scale * record.distance_m,
+                   speed_mps=speed_scale * record.speed_mps)
 
 
 def until(record: Record, distance_m: float) -> Record:

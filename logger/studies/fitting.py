@@ -10,9 +10,11 @@ from collections.abc import Mapping
 
 from logger.identification.fit import Fit, Options, fit
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
+from logger.identification.obstacles import Bump
 from logger.identification.parameters import free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
+from logger.identification.road_input import SPEED_SCALE, RoadInput, free_input, is_input
 from logger.studies.drives import RATE_HZ, rav4
 
 MASS = "sprung_mass_kg"
@@ -21,13 +23,27 @@ TRUTH = {MASS: 875.0, FRONT: 23_088.0, REAR: 23_088.0}
 """Table 4.2."""
 
 
-def fitted(record: Record, start: Mapping[str, float], ours: bool, low_pass_hz: float | None = None) -> Fit:
-    """The numbers in ``start`` from one record, starting there; NotIdentifiable where the record cannot tell them."""
-    model = VehicleModel(rav4(), [free(rav4(), name, value) for name, value in start.items()], [record])
+def fitted(record: Record, start: Mapping[str, float], ours: bool, road: RoadInput | None = None,
+           low_pass_hz: float | None = None) -> Fit:
+    """The numbers in ``start``, of the car or of ``road``, from one record, starting there.
+
+    NotIdentifiable where the record cannot tell them.
+    """
+    road = road or RoadInput()
+    numbers = [free_input(road, name, value) if is_input(name) else free(rav4(), name, value)
+               for name, value in start.items()]
+    model = VehicleModel(rav4(), numbers, [record], road)
     noise: list[Noise] = [White()]
     if ours:
         noise += [Autoregressive(), RoadNoise(model.road_spectra)]
     return fit(model, model.measured, Options(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))
+
+
+def mass_and_bump(record: Record, taken: Bump, low_pass_hz: float | None = None) -> Fit:
+    """Our way where the bump is not known for certain: mass, bump and speed together, beginning with what is taken."""
+    start = {MASS: TRUTH[MASS], "bump.start_m": taken.start_m, "bump.height_m": taken.height_m,
+             "bump.width_m": taken.width_m, SPEED_SCALE: 1.0}
+    return fitted(record, start, True, RoadInput(bump=taken), low_pass_hz)
 
 
 def error_percent(found: Fit, name: str) -> float:
