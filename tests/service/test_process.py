@@ -18,7 +18,7 @@ import pytest
 from drivers.dump import Event, open_dump
 from logger.shipped import vehicle_file
 
-PATIENCE_S = 20.0
+PATIENCE_S = 90.0
 
 
 class SerialDevice:
