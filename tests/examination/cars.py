@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 GRAVITY_MPS2 = 9.80665
 STEP_S = 1 / 4000
 SLIP_MPS = 0.002
-_STIFFEST = 1.2  # rate of a regularised friction times step: Runge-Kutta is stable to 2.78
+_STIFFEST = 1.2  # fastest rate of decay times step: Runge-Kutta is stable to 2.78
 
 _CORNER = np.dtype([(name, np.float64) for name in (
     "ahead", "left", "mass", "spring", "cubic", "clearance", "stop", "bump", "rebound", "knee", "slope", "square",
@@ -359,10 +359,12 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
 
 
 def finer(ready: Ready, step_s: float) -> int:
-    """Into how many parts a step must be cut for the steepest friction."""
-    if ready.sticks:
-        return 1
-    steepest = float(np.max(ready.corners["friction"] / ready.corners["mass"])) * 1.2 / SLIP_MPS
+    """Into how many parts a step must be cut for the steepest friction and the stiffest mount."""
+    corners = ready.corners
+    slopes = np.minimum(corners["slope"], 1.0) * np.minimum(corners["bump"], corners["rebound"])
+    steepest = float(np.max(corners["mount"] / slopes))
+    if not ready.sticks:
+        steepest = max(steepest, float(np.max(corners["friction"] / corners["mass"])) * 1.2 / SLIP_MPS)
     return max(1, int(np.ceil(steepest * step_s / _STIFFEST)))
 
 

@@ -63,7 +63,7 @@ def _asymmetry(rng: np.random.Generator, car: Car) -> Path:
 
 
 def _blow_off(rng: np.random.Generator, car: Car) -> Path:
-    return one("knee_velocity_m_per_s", 0.8, 0.02, slope_ratio=rng.uniform(0.15, 0.6))
+    return one("knee_velocity_m_per_s", 1.2, 0.02, slope_ratio=rng.uniform(0.15, 0.6))
 
 
 def _friction(rng: np.random.Generator, car: Car) -> Path:
@@ -98,7 +98,7 @@ def _console(rng: np.random.Generator, car: Car) -> Path:
 
 def _lowpass(rng: np.random.Generator, car: Car) -> Path:
     order = int(rng.integers(1, 3))
-    cutoff = between(150.0 if order == 1 else 80.0, 3.0 if order == 1 else 5.0)
+    cutoff = between(400.0 if order == 1 else 300.0, 3.0 if order == 1 else 5.0)
     return lambda u: {"cutoff_hz": cutoff(u), "order": order}
 
 

@@ -36,7 +36,7 @@ def _rub_one(scene: Scene, p: Parameters) -> Scene:
 
 
 def _bushing(rng: np.random.Generator, car: Car) -> Path:
-    return one("stiffness_n_per_m", 500.0, 1.2 * car.front.suspension_stiffness_n_per_m,
+    return one("stiffness_n_per_m", 200.0, 3 * car.front.suspension_stiffness_n_per_m,
                yield_m=float(np.exp(rng.uniform(*np.log([0.001, 0.006])))))
 
 
@@ -72,7 +72,7 @@ OUTSIDERS: dict[str, Outsider] = {outsider.name: outsider for outsider in (
              _field(tire_cubic="cubic_n_per_m3"), rough=1, akin=("bump_stop", "progressive_spring")),
     Outsider("one_axle_friction", _axle_friction, _rub_one, akin=("dry_friction",), models=("half_car",)),
     Outsider("damper_backlash",
-             lambda rng, car: one("gap_m", 5e-5, 0.006, stiffness_n_per_m=rng.uniform(3e5, 8e5)),
+             lambda rng, car: one("gap_m", 1e-5, 0.006, stiffness_n_per_m=3e6),
              _field(mount_gap_m="gap_m", mount="stiffness_n_per_m"), akin=("top_mount_compliance",)),
     Outsider("wheel_imbalance", _out_of_balance, _field(unround_m="imbalance_m_s2", tire_radius_m="tire_radius_m")),
     Outsider("engine_vibration", _engine, lambda scene, p: scene.with_sensor(
