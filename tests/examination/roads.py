@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import bilinear_zpk, butter, lfilter, sosfilt, sosfreqz, zpk2sos
@@ -119,38 +120,37 @@ def _feature(kind: str, rng: np.random.Generator, x: Array) -> Array:
     return np.where((x > 0) & (x < 4.5), step * x / 4.5, 0.0)
 
 
-def wheel_path(road: Array, spacing_m: float, at_m: Array, speed_mps: Array, patch_m: float) -> tuple[Array, Array]:
-    """Elevation and its rate under a tire that averages the road over its contact patch.
+@njit(cache=True, error_model="numpy")
+def wheel_path(road, spacing_m, at_m, speed_mps, patch_m):
+    """Elevation [m] and its rate [m/s] at places and speeds, under a tire that averages the road over its patch.
 
     The road is straight between samples and flat beyond both ends, so that its integral is exact by trapezoids and
     pieces of parabolas: no sampling of the average is involved.
     """
-    if patch_m <= 0:
-        height, slope = _piecewise(road, spacing_m, at_m)
-        return height, slope * speed_mps
-    ahead, behind = at_m + 0.5 * patch_m, at_m - 0.5 * patch_m
-    area = np.concatenate([[0.0], np.cumsum(0.5 * spacing_m * (road[1:] + road[:-1]))])
-    height = (_integral(road, area, spacing_m, ahead) - _integral(road, area, spacing_m, behind)) / patch_m
-    rate = (_piecewise(road, spacing_m, ahead)[0] - _piecewise(road, spacing_m, behind)[0]) / patch_m * speed_mps
+    area = np.zeros(road.size)
+    area[1:] = np.cumsum(0.5 * spacing_m * (road[1:] + road[:-1]))
+    height, rate = np.empty(at_m.size), np.empty(at_m.size)
+    for i in range(at_m.size):
+        if patch_m > 0:
+            front, front_area, _ = _look_up(road, area, spacing_m, at_m[i] + 0.5 * patch_m)
+            back, back_area, _ = _look_up(road, area, spacing_m, at_m[i] - 0.5 * patch_m)
+            height[i] = (front_area - back_area) / patch_m
+            rate[i] = (front - back) / patch_m * speed_mps[i]
+        else:
+            height[i], _, slope = _look_up(road, area, spacing_m, at_m[i])
+            rate[i] = slope * speed_mps[i]
     return height, rate
 
 
-def _piecewise(road: Array, spacing_m: float, at_m: Array) -> tuple[Array, Array]:
-    """Elevation and slope of the straight pieces."""
-    place = at_m / spacing_m
-    piece = np.clip(np.floor(place).astype(np.int64), 0, road.size - 2)
-    part = np.clip(place - piece, 0.0, 1.0)
-    rise = road[piece + 1] - road[piece]
-    slope = np.where((place >= 0) & (place < road.size - 1), rise / spacing_m, 0.0)
-    return road[piece] + part * rise, slope
-
-
-def _integral(road: Array, area: Array, spacing_m: float, at_m: Array) -> Array:
-    """Integral of the elevation from the first sample to each place."""
-    place = at_m / spacing_m
-    piece = np.clip(np.floor(place).astype(np.int64), 0, road.size - 2)
-    part = np.clip(place - piece, 0.0, 1.0)
-    inside = area[piece] + spacing_m * part * (road[piece] + 0.5 * part * (road[piece + 1] - road[piece]))
-    before = spacing_m * np.minimum(place, 0.0) * road[0]
-    after = spacing_m * np.maximum(place - (road.size - 1), 0.0) * road[-1]
-    return inside + before + after
+@njit(cache=True, error_model="numpy")
+def _look_up(road, area, spacing_m, at_m):
+    """Elevation, its integral from the first sample, and slope."""
+    place, last = at_m / spacing_m, road.size - 1
+    if place < 0:
+        return road[0], at_m * road[0], 0.0
+    if place >= last:
+        return road[last], area[last] + (place - last) * spacing_m * road[last], 0.0
+    piece = int(place)
+    part, rise = place - piece, road[piece + 1] - road[piece]
+    below = area[piece] + spacing_m * part * (road[piece] + 0.5 * part * rise)
+    return road[piece] + part * rise, below, rise / spacing_m
