@@ -14,6 +14,13 @@ looked for where none is given. run2.NAME is that of one run, each.NAME one for 
   ridelog identify drive.csv --vehicle rav4-2009 --bump height_m=0.15,width_m=2.6 --free sprung_mass_kg,bump.height_m
   ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
 
+With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of the
+waviness that is said or, with road.waviness free, found. Drives over one road at different speeds tell far more
+(--same-road).
+
+  ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
+  ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
+
 Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
 that leave no trace at the sensor, and numbers that can be told only together; masses, springs and dampers share one
 scale, so one of them has to be known.
@@ -31,18 +38,25 @@ from typing import TYPE_CHECKING, Any
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
+    from logger.identification.axle_response import AxleResponse
+    from logger.identification.crossing import Drive
     from logger.identification.fit import Fit
     from logger.identification.noise import Noise
     from logger.identification.parameters import Free
     from logger.identification.prediction import VehicleModel
     from logger.identification.record import Record
     from logger.identification.road_input import RoadInput
+    from logger.identification.shared_road import RoadFit
+    from logger.identification.verdict import NotIdentifiable
     from logger.vehicle.vehicle import Vehicle
 
 NOISES = ("auto", "white", "ar", "road")
 _SAME_RATE = 1e-6
 _LEAST_SAMPLES = 50
 _MOST_TRIES = 1000
+# Of roads that were not measured: how wavy, and how much of one is enough, and not too much, for one fit [m].
+_WAVINESS, _FLATTEST, _STEEPEST, _FREE_WAVINESS = 2.0, 1.0, 3.5, "road.waviness"
+_LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,6 +70,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a speed bump on the road: [start_m=M,]height_m=M,width_m=M; free as bump.height_m ...")
     parser.add_argument("--step", metavar="PARAM=M,...",
                         help="a step, up or with a negative height down: [start_m=M,]height_m=M; free as step.height_m")
+    parser.add_argument("--unmeasured-road", action="store_true",
+                        help="the roads were not measured; each run has one of its own")
+    parser.add_argument("--same-road", action="store_true",
+                        help="the road was not measured; all runs are over the same one, at the same places within 3 m")
+    parser.add_argument("--waviness", type=float, metavar="W",
+                        help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
@@ -74,6 +94,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog identify``."""
+    return _unmeasured(args) if args.unmeasured_road or args.same_road else _measured(args)
+
+
+def _measured(args: argparse.Namespace) -> int:
+    """A fit over roads that are known, but for a few numbers."""
     from logger.identification.fit import fit
     from logger.identification.prediction import VehicleModel
     from logger.identification.report import as_json, lines, tests
@@ -81,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
 
+    if args.waviness is not None:
+        raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
     vehicle = read_vehicle(vehicle_path(args.vehicle))
     road, unplaced = _road(args)
     records = [_record(path, args.skip, bool(road.obstacles)) for path in args.runs]
@@ -102,17 +129,90 @@ def run(args: argparse.Namespace) -> int:
         raise BadInput(f"{args.runs[0]}: {error}") from None
     checks = tests(model, found)
     if args.out is not None:
-        _write(args.out, vehicle, model, found)
+        _write(args.out, model, found)
     if args.json:
         print(json.dumps({**as_json(found, *checks), "runs": [str(folder) for folder in args.runs]}, allow_nan=False))
     else:
-        print("\n".join([_head(vehicle, records, found), *lines(found, *checks)]))
+        low = "" if found.low_pass.cutoff_hz is None else f", below {found.low_pass.cutoff_hz:g} Hz"
+        print("\n".join([_head(vehicle, len(found.free), [len(one.kept_mps2) for one in records], records[0].rate_hz,
+                               f"{low}; the first {args.skip:g} s of a run left out"), *lines(found, *checks)]))
+        if args.out is not None:
+            print(f"Vehicle: {args.out}")
+    return EXIT_DONE if found.converged else EXIT_CHECK_FAILED
+
+
+def _unmeasured(args: argparse.Namespace) -> int:
+    """A fit over roads of which only the kind is known."""
+    from logger.identification.axle_response import AxleResponse
+    from logger.identification.road_input import RoadInput
+    from logger.identification.road_report import as_json, lines
+    from logger.identification.shared_road import fit_roads
+    from logger.identification.verdict import NotIdentifiable
+    from logger.shipped import vehicle_path
+    from logger.store.vehicle_file import read_vehicle
+
+    options = _road_options(args)
+    vehicle = read_vehicle(vehicle_path(args.vehicle))
+    drives = _drives(args)
+    free = _free(args, vehicle, RoadInput(), {})
+    try:
+        car = AxleResponse(vehicle, free, drives[0].rate_hz)
+    except ValueError as error:
+        raise BadInput(f"--free: {error}") from None
+    try:
+        found = fit_roads(car, [drives] if args.same_road else [[drive] for drive in drives], options)
+    except NotIdentifiable as refusal:
+        if not args.json:
+            raise
+        print(json.dumps(_nothing_told(refusal, None), allow_nan=False))
+        print(f"ridelog: {refusal}", file=sys.stderr)
+        return EXIT_CHECK_FAILED
+    if args.out is not None:
+        _write(args.out, car, found)
+    if args.json:
+        print(json.dumps({**as_json(found, free), "runs": [str(path) for path in args.runs]}, allow_nan=False))
+    else:
+        where = "one road that was not measured" if args.same_road else "roads that were not measured"
+        print("\n".join([_head(vehicle, len(free), [len(drive.measured_mps2) for drive in drives], drives[0].rate_hz,
+                               f"; over {where}, the first {args.skip:g} s of a run left out"), *lines(found, free)]))
         if args.out is not None:
             print(f"Vehicle: {args.out}")
     return EXIT_DONE if found.converged else EXIT_CHECK_FAILED
 
 
 # --- what was asked for ---
+
+
+def _road_options(args: argparse.Namespace) -> Any:
+    from logger.identification.shared_road import Options
+
+    unused = {"--bump": args.bump, "--step": args.step, "--low-pass": args.low_pass, "--robust": args.robust,
+              "--tries": args.tries, "--noise": args.noise != "auto"}
+    if given := [option for option, value in unused.items() if value]:
+        raise BadInput(f"{given[0]}: expected a road whose profile is known, not --unmeasured-road or --same-road")
+    if args.same_road and len(args.runs) < 2:
+        raise BadInput("--same-road: expected two runs or more")
+    waviness = _WAVINESS if args.waviness is None else args.waviness
+    if not _FLATTEST <= waviness <= _STEEPEST:
+        raise BadInput(f"--waviness {waviness:g}: expected {_FLATTEST:g} to {_STEEPEST:g}")
+    names = [name.strip() for name in args.free.split(",")]
+    args.free = ",".join(name for name in names if name != _FREE_WAVINESS)
+    return Options(waviness=waviness, free_waviness=_FREE_WAVINESS in names)
+
+
+def _drives(args: argparse.Namespace) -> list[Drive]:
+    """The runs without their roads. BadInput for files that are none, runs too short, and other rates."""
+    from logger.identification.crossing import Drive
+
+    drives = []
+    for path in args.runs:
+        record = _record(path, args.skip, True)
+        drives.append(Drive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
+        length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
+        if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
+            raise BadInput(f"{path}: expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of way, found {length_m:g} m")
+    _check_rates(args.runs, [drive.rate_hz for drive in drives])
+    return drives
 
 
 def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
@@ -217,10 +317,7 @@ def _options(args: argparse.Namespace, model: VehicleModel) -> Any:
     from logger.identification.noise import Autoregressive, RoadNoise, White
 
     rate_hz = model.records[0].rate_hz
-    for folder, record in zip(args.runs, model.records, strict=True):
-        if abs(record.rate_hz / rate_hz - 1) > _SAME_RATE:
-            raise BadInput(f"{folder}: expected {rate_hz:g} samples a second as in {args.runs[0]}, "
-                           f"found {record.rate_hz:g}")
+    _check_rates(args.runs, [record.rate_hz for record in model.records])
     if args.low_pass is not None and not 0 < args.low_pass < rate_hz / 2:
         raise BadInput(f"--low-pass {args.low_pass:g}: expected above 0 and below {rate_hz / 2:g} Hz")
     if not 0 <= args.tries <= _MOST_TRIES:
@@ -231,18 +328,22 @@ def _options(args: argparse.Namespace, model: VehicleModel) -> Any:
                    starts=spread_starts(model.parameters, args.tries))
 
 
+def _check_rates(paths: list[Path], rates_hz: list[float]) -> None:
+    for path, rate_hz in zip(paths, rates_hz, strict=True):
+        if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE:
+            raise BadInput(f"{path}: expected {rates_hz[0]:g} samples a second as in {paths[0]}, found {rate_hz:g}")
+
+
 # --- what is told ---
 
 
-def _head(vehicle: Vehicle, records: list[Record], found: Fit) -> str:
-    kept = sum(len(record.kept_mps2) for record in records)
-    runs = "1 run" if len(records) == 1 else f"{len(records)} runs"
-    low = "" if found.low_pass.cutoff_hz is None else f", below {found.low_pass.cutoff_hz:g} Hz"
-    return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {len(found.free)} free, {runs}, {kept} samples at "
-            f"{records[0].rate_hz:.5g} Hz{low}; the first {records[0].skip_s:g} s of a run left out")
+def _head(vehicle: Vehicle, free: int, samples: list[int], rate_hz: float, more: str) -> str:
+    runs = "1 run" if len(samples) == 1 else f"{len(samples)} runs"
+    return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, {sum(samples)} samples at "
+            f"{rate_hz:.5g} Hz{more}")
 
 
-def _refused(model: VehicleModel, refusal: Any) -> dict[str, Any]:
+def _refused(model: VehicleModel, refusal: NotIdentifiable) -> dict[str, Any]:
     import numpy as np
 
     from logger.identification.fit import normalised_error
@@ -250,18 +351,22 @@ def _refused(model: VehicleModel, refusal: Any) -> dict[str, Any]:
     predictions = model.predict(np.array([one.start for one in model.parameters]))
     before = normalised_error(model.measured, [seen - one for seen, one in
                                                zip(model.measured, predictions, strict=True)])
-    return {"parameters": {}, "standard_errors": {}, "error_before": before if isfinite(before) else None,
-            "error_after": None, "converged": False, "cannot_tell": [finding.words for finding in refusal.findings]}
+    return _nothing_told(refusal, before if isfinite(before) else None)
 
 
-def _write(path: Path, vehicle: Vehicle, model: VehicleModel, found: Fit) -> None:
+def _nothing_told(refusal: NotIdentifiable, before: float | None) -> dict[str, Any]:
+    return {"parameters": {}, "standard_errors": {}, "error_before": before, "error_after": None, "converged": False,
+            "cannot_tell": [finding.words for finding in refusal.findings]}
+
+
+def _write(path: Path, car: VehicleModel | AxleResponse, found: Fit | RoadFit) -> None:
     """The fitted vehicle, its standard errors as comments."""
     import numpy as np
 
     from logger.store.vehicle_file import write_vehicle
 
-    write_vehicle(path, model.vehicle_with(np.array(list(found.parameters.values()))))
-    comments = [f"# {vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} before, "
+    write_vehicle(path, car.vehicle_with(np.array(list(found.parameters.values()))))
+    comments = [f"# {car.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} before, "
                 f"{found.error_after:.4f} after"]
     comments += [f"# {name}: {value:.6g}, standard error {found.standard_errors[name]:.2g}"
                  for name, value in found.parameters.items()]

@@ -200,8 +200,8 @@ class _Problem:
         self.low_pass = LowPass(self.options.rate_hz, self.options.low_pass_hz)
         self.log = np.array([one.by_factors for one in self.free])
         self.unit = np.array([np.sign(one.start) if one.by_factors else (one.high - one.low) / 2 for one in self.free])
-        ends = [self.coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high")]
-        self.low, self.high = np.minimum(*ends), np.maximum(*ends)
+        low, high = (self.coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high"))
+        self.low, self.high = np.minimum(low, high), np.maximum(low, high)
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         self.floor = LEAST_SHARE * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2))) or LEAST_SHARE
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)

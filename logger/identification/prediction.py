@@ -103,7 +103,7 @@ class VehicleModel:
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
-        car = _car(self.vehicle_with(values))
+        car = car_of(self.vehicle_with(values))
         return [road.samples(_response(car, road.s, road.under_wheels(car.structure, self.road_with(values, run))))
                 for run, road in enumerate(self._roads)]
 
@@ -111,8 +111,9 @@ class VehicleModel:
         """As ``Differentiable``; derivatives are exact but for those by places and lengths of the car, which shift the
         road."""
         vehicle = self.vehicle_with(values)
-        car = _car(vehicle)
-        changes = {index: _change(vehicle, one) for index, one in enumerate(self.parameters) if not is_input(one.name)}
+        car = car_of(vehicle)
+        changes = {index: change_of(vehicle, one) for index, one in enumerate(self.parameters)
+                   if not is_input(one.name)}
         predictions, slopes = [], []
         for run, road in enumerate(self._roads):
             at = self.road_with(values, run)
@@ -151,7 +152,7 @@ class VehicleModel:
             speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
             f = np.maximum(f_hz, 1 / _LONGEST_S)
             response = np.abs(body_acceleration_response(structure, f, speed, vehicle.sensor)) ** 2
-            recorder = _recorder_gain(f_hz / record.rate_hz) ** 2
+            recorder = recorder_gain(f_hz / record.rate_hz) ** 2
             spectra.append((response * displacement_psd(f / speed, 1.0) / speed).mean(axis=0) * recorder)
         return spectra
 
@@ -191,15 +192,15 @@ class _Change:
         return before.contact_patch_m != after.contact_patch_m or bool((before.behind_m != after.behind_m).any())
 
 
-def _car(vehicle: Vehicle) -> _Car:
+def car_of(vehicle: Vehicle) -> _Car:
     structure = structure_of(vehicle)
     return _Car(structure, body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row)
 
 
-def _change(vehicle: Vehicle, one: Free) -> _Change:
+def change_of(vehicle: Vehicle, one: Free) -> _Change:
     value = read(vehicle, one.name)
     step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
-    before, after = (_car(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
+    before, after = (car_of(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
     low, high, apart = before.structure, after.structure, 2 * step
     return _Change((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
                    (high.stiffness - low.stiffness) / apart, (high.road - low.road) / apart,
@@ -240,7 +241,7 @@ def _by_car(car: _Car, change: _Change, s: Complex, under: Complex, q: Complex, 
     return np.asarray(derivative if moved is None else derivative + _through(car, w, moved))
 
 
-def _recorder_gain(f_of_rate: Array) -> Array:
+def recorder_gain(f_of_rate: Array) -> Array:
     """The size of the recorder's gain at shares of its rate (f,)."""
     gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
     return np.interp(f_of_rate * _GAIN_GRID / _GAIN_STEPS, np.arange(len(gains)), gains)

@@ -50,7 +50,7 @@ class RoadInTime:
         way = np.concatenate([distance[0] + pace_m * np.arange(-lead, 0), distance,
                               distance[-1] + ahead_m * np.arange(1, 2 * half)])
         self._way_m = _finer(way, self._steps)
-        self._count = _smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
+        self._count = smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
         self._kept = slice(lead + record.first, lead + len(distance))
         damping = -np.log(_ROUND_THE_END) * rate_hz / self._count
         f_hz = np.arange(self._count // 2) * rate_hz / self._count
@@ -137,7 +137,7 @@ def _finer(distance: Array, steps: int) -> Array:
     return np.append(curve.ravel(), distance[-1])
 
 
-def _smooth_length(least: int) -> int:
+def smooth_length(least: int) -> int:
     """An even number from ``least`` on that has no prime factor above 5, so that transforms are quick."""
     best = 2 ** int(np.ceil(np.log2(least)))
     for fives in range(4):

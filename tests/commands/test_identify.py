@@ -15,7 +15,7 @@ from logger.shipped import vehicle_file
 from logger.store.drive_file import write_drive, write_profile
 from logger.store.vehicle_file import read_vehicle
 
-from bump_drives import bump_record
+from bump_drives import bump_record, road_record
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 MASS, DAMPERS = "sprung_mass_kg", "both.suspension_damping_n_s_per_m"
@@ -105,7 +105,38 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
     assert "yes, the model misses something of the car" in capsys.readouterr().out
 
 
+def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = []
+    for speed_mps in (10.0, 17.0):
+        record = road_record(CAR, 120.0 / speed_mps, speed_mps, 3, swing_mps=0.5)
+        files.append(str(tmp_path / f"{speed_mps:g}.csv"))
+        write_drive(Path(files[-1]), {"t_s": record.time_s, "accel_z_mps2": record.measured_mps2,
+                                      "speed_mps": record.speed_mps, "distance_m": record.distance_m})
+    out = tmp_path / "fitted.yaml"
+    assert identify(files, f"{MASS},road.waviness", "--same-road", "--start", f"{MASS}=800", "--json",
+                    "--out", str(out)) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {"parameters", "standard_errors", "error_before", "error_after", "converged"} <= told.keys()
+    assert told["parameters"][MASS] == pytest.approx(875, abs=4 * told["standard_errors"][MASS])
+    assert told["road"]["road1.gd_n0_cm3"] == pytest.approx(64, rel=0.6)
+    assert read_vehicle(out).sprung_mass_kg == told["parameters"][MASS]
+    assert identify(files[:1], MASS, "--unmeasured-road", "--waviness", "2.1") == 0
+    text = capsys.readouterr().out
+    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "taken for one of ISO 8608", "Hardly told"):
+        assert words in text
+    assert identify(files[:1], "pitch_inertia_kg_m2", "--unmeasured-road", "--json") == 1
+    assert "pitch_inertia_kg_m2" in json.loads(capsys.readouterr().out)["cannot_tell"][0]
+    with pytest.raises(NotIdentifiable):
+        identify(files[:1], "pitch_inertia_kg_m2", "--unmeasured-road")
+
+
 @pytest.mark.parametrize(("free", "more", "message"), [
+    (MASS, ("--unmeasured-road", "--bump", "height_m=0.1,width_m=2"), "--bump: expected a road whose profile is known"),
+    (MASS, ("--same-road", "--noise", "ar"), "--noise: expected a road whose profile is known"),
+    (MASS, ("--same-road", "--waviness", "9"), "--waviness 9: expected 1 to 3.5"),
+    (MASS, ("--waviness", "2"), "expected --unmeasured-road or --same-road with it"),
+    ("contact_patch_m", ("--unmeasured-road",), "cannot be found where the road is not known"),
+    ("road.waviness", ("--unmeasured-road",), "expected names with commas"),
     (MASS, ("--bump", "start_m=5,height_m=0.1"), r"expected \[start_m=M,\]height_m=M,width_m=M"),
     (MASS, ("--step", "height=0.1"), r"expected \[start_m=M,\]height_m=M"),
     (MASS, ("--step", "start_m=5,height_m=0"), "expected a height other than 0"),

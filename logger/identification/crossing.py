@@ -1,0 +1,162 @@
+"""One drive over a road that nobody measured: what the sensor reads as a linear function of the road, and back.
+
+The road is elevations on an even grid. They are read where each axle stood at each instant, averaged over the contact
+patch, and go through the car frequency by frequency, whatever the speed did. Before its first sample the car comes from
+a road that is unknown too, at the speed it had; so nothing is said of how it moved when the record began. A sensor's zero
+is not trusted: the mean of all readings is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.road_in_time import smooth_length
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_SWELL_S, _APPROACH_S, _TAIL_S, _REST_S = 2.0, 3.0, 1.0, 2.0
+# Above this share of the rate the recorder lets nothing through, and waves of the road are left out.
+_HIGHEST_OF_RATE = 0.45
+_FAST_SHARE = 0.99
+_SLOWEST_MPS = 0.5
+_SPEED_STEPS_PER_E = 20
+_MARGIN_M = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One drive, evenly sampled: arrays (n,).
+
+    rate_hz          samples a second
+    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    distance_m       where the front tires stand [m]
+    """
+
+    rate_hz: float
+    measured_mps2: Array
+    distance_m: Array
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where the road is: ``count`` places from ``start_m`` on, ``spacing_m`` apart, taken for one period."""
+
+    start_m: float
+    spacing_m: float
+    count: int
+
+    @property
+    def wave_number_cpm(self) -> Array:
+        """Of the transform of ``count`` elevations [cycle/m]."""
+        return np.asarray(np.fft.rfftfreq(self.count, self.spacing_m))
+
+
+def grid_under(drives: list[Drive], behind_m: Array, spacing_m: float, most_off_m: float) -> Grid:
+    """A grid that holds the way of all drives, from where they came to where they went on."""
+    ways = [_way(drive)[0] for drive in drives]
+    first_m = min(float(way.min()) for way in ways) - float(behind_m.max()) - most_off_m - _MARGIN_M
+    last_m = max(float(way.max()) for way in ways) + most_off_m + _MARGIN_M
+    return Grid(first_m, spacing_m, smooth_length(int((last_m - first_m) / spacing_m) + 2))
+
+
+class Crossing:
+    """A drive as a linear map of innovations (b, count) of the road to readings (b, n).
+
+    A response is (x, f) at ``f_hz``; ``waves`` (k,) makes elevations of innovations, by wave number.
+    """
+
+    def __init__(self, drive: Drive, grid: Grid, behind_m: Array, contact_patch_m: float) -> None:
+        from scipy.sparse import csr_array
+
+        self.measured_mps2, self._grid, self._axles = drive.measured_mps2, grid, len(behind_m)
+        way, lead = _way(drive)
+        self.kept = slice(lead, lead + len(drive.distance_m))
+        self._length = len(way)
+        self._count = smooth_length(len(way) + int(_REST_S * drive.rate_hz))
+        self.f_hz = np.arange(self._count // 2 + 1) * drive.rate_hz / self._count
+        place = ((way - behind_m[:, None] - grid.start_m) / grid.spacing_m).ravel()
+        low = np.floor(place).astype(np.int64)
+        rows = np.arange(len(place))
+        share = place - low
+        self._read = csr_array((np.concatenate([1 - share, share]), (np.concatenate([rows, rows]),
+                                                                     np.concatenate([low, low + 1]))),
+                               shape=(len(place), grid.count))
+        self._spread = self._read.T.tocsr()
+        self._window = _window(len(way), int(_SWELL_S * drive.rate_hz), int(_TAIL_S * drive.rate_hz))
+        self.speed_mps = np.maximum(np.abs(np.gradient(drive.distance_m)) * drive.rate_hz, _SLOWEST_MPS)
+        n = grid.wave_number_cpm
+        self.seen_cpm = _HIGHEST_OF_RATE * drive.rate_hz / float(np.quantile(self.speed_mps, _FAST_SHARE))
+        # Reading between two places by a straight line weakens short waves; the division makes up for it.
+        averaged = np.sinc(n * contact_patch_m) / np.sinc(n * grid.spacing_m) ** 2
+        self._averaged = np.where(n <= self.seen_cpm, averaged, 0.0)
+
+    def under_axles(self, innovations: Array, waves: Complex) -> Complex:
+        """Transforms (b, x, f) in time of the elevations under the axles."""
+        elevation = np.fft.irfft(np.fft.rfft(innovations) * (waves * self._averaged), self._grid.count)
+        under = (self._read @ elevation.T).T.reshape(-1, self._axles, self._length) * self._window
+        return np.asarray(np.fft.rfft(under, self._count))
+
+    def readings(self, under: Complex, response: Complex) -> Array:
+        """Readings (b, n), less the mean of each."""
+        return _level(np.fft.irfft((response * under).sum(axis=1), self._count)[:, self.kept])
+
+    def back(self, readings: Array, waves: Complex, response: Complex) -> Array:
+        """The transposed map: of readings (b, n), to innovations (b, count)."""
+        time = np.zeros((len(readings), self._count))
+        time[:, self.kept] = _level(readings)
+        transform = np.fft.rfft(time)[:, None, :] * np.conj(response)
+        under = np.fft.irfft(transform, self._count)[..., : self._length] * self._window
+        elevation = (self._spread @ under.reshape(len(readings), -1).T).T
+        return np.asarray(np.fft.irfft(np.fft.rfft(elevation) * np.conj(waves * self._averaged), self._grid.count))
+
+    def transform(self, readings: Array) -> Complex:
+        """Transforms (b, f) of readings (b, n) in the frame of ``under_axles``, so that ``products`` can be taken."""
+        time = np.zeros((len(readings), self._count))
+        time[:, self.kept] = _level(readings)
+        return np.asarray(np.fft.rfft(time))
+
+    def products(self, readings: Complex, responses: Complex, under: Complex) -> Array:
+        """Sums (b, p) of the products of readings, by their transforms (b, f), with what responses (p, x, f) make of
+        the road under the axles."""
+        weight = np.full(len(self.f_hz), 2.0 / self._count)
+        weight[0] = weight[0] / 2
+        weight[-1] = weight[-1] / (2 if self._count % 2 == 0 else 1)
+        weighed = weight * np.conj(readings)
+        return np.einsum("bxf,pxf->bp", weighed[:, None, :] * under, responses, optimize=True).real
+
+    def gain(self, response: Complex, behind_m: Array) -> Array:
+        """Sum over the samples (k,) of the squared gain from road to reading for waves of the grid."""
+        n = self._grid.wave_number_cpm
+        axle = np.exp(-2j * np.pi * n * behind_m[:, None])
+        steps = np.round(np.log(self.speed_mps) * _SPEED_STEPS_PER_E)
+        total = np.zeros(len(n))
+        for step, samples in zip(*np.unique(steps, return_counts=True), strict=True):
+            at_hz = n * np.exp(step / _SPEED_STEPS_PER_E)
+            gain = sum(np.interp(at_hz, self.f_hz, one) * delay for one, delay in zip(response, axle, strict=True))
+            total += samples * np.abs(gain) ** 2
+        return np.asarray(total * self._averaged**2 * np.sinc(n * self._grid.spacing_m) ** 4)
+
+
+def _level(readings: Array) -> Array:
+    return np.asarray(readings - readings.mean(axis=1, keepdims=True))
+
+
+def _way(drive: Drive) -> tuple[Array, int]:
+    """Distances of the drive with what came before and after it, and how many samples came before."""
+    lead, tail = (int(seconds * drive.rate_hz) for seconds in (_SWELL_S + _APPROACH_S, _TAIL_S))
+    way = drive.distance_m
+    before = way[0] + (way[1] - way[0]) * np.arange(-lead, 0)
+    after = way[-1] + (way[-1] - way[-2]) * np.arange(1, tail + 1)
+    return np.concatenate([before, way, after]), lead
+
+
+def _window(count: int, swell: int, tail: int) -> Array:
+    """1, but for both ends, where it comes and goes."""
+    window = np.ones(count)
+    window[:swell] = 0.5 * (1 - np.cos(np.pi * np.arange(swell) / swell))
+    window[count - tail:] = 0.5 * (1 + np.cos(np.pi * np.arange(1, tail + 1) / tail))
+    return window
