@@ -319,12 +319,12 @@ def _record(
 def _recording(rng: np.random.Generator, drive: Drive, noise: Noise, clean: Array) -> Recording:
     """What the recorder writes: the speed signal is noisy and rounded, the distance is its integral.
 
-    The noise is as large as the rounding, which so leaves no lasting error: after a minute the distance is wrong by
-    a few millimetres to two centimetres.
+    The noise is large enough for the rounding to leave no lasting error: after a minute the distance is wrong by a
+    millimetre to two centimetres.
     """
     t = drive.times_s
-    step = _log_uniform(rng, 0.002, 0.03)
-    speed = drive.speed_at_mps(t) + rng.uniform(0.5, 1.0) * step * rng.standard_normal(t.size)
+    step = _log_uniform(rng, 0.002, 0.02)
+    speed = drive.speed_at_mps(t) + rng.uniform(0.5, 0.7) * step * rng.standard_normal(t.size)
     speed = step * np.round(speed / step)
     wrong = np.concatenate([[0.0], np.cumsum((speed - drive.speed_at_mps(t))[:-1])]) / RATE_HZ
     return Recording(t, noise.add(clean, rng), speed, drive.distance_m(t) + wrong, clean)
