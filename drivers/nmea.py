@@ -225,7 +225,7 @@ def _zda(fields: list[bytes]) -> Zda:
     time_of_day_us = _time_of_day_us(fields[0])
     if fields[1:4] == [b"", b"", b""]:
         return Zda(time_of_day_us, None, False)
-    if not all(field.isdigit() for field in fields[1:4]) or len(fields[3]) != 4:
+    if not all(field.isdigit() for field in fields[1:4]) or max(map(len, fields[1:3])) > 2 or len(fields[3]) != 4:
         return Zda(time_of_day_us, None, True)
     return Zda(time_of_day_us, *_day(int(fields[3]), int(fields[2]), int(fields[1])))
 
