@@ -1,6 +1,10 @@
 """The loop of ``stepping``: plain numbers and arrays, so that it can be compiled.
 
 It is compiled when numba is there (the ``lab`` extra), at its first use, and kept on disk; else it runs as it stands.
+
+What the laws ask of a car, the travel and rate of each suspension and the deflection of each tire and its rate (the
+``seen``), is carried through a step beside the state. So the forces at the end of a step are tried on these few
+numbers, and the state is taken on once. Matrices stand transposed and are as wide as the processor likes it.
 """
 
 from __future__ import annotations
@@ -22,155 +26,183 @@ else:
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return numba.njit(cache=True, nogil=True)(function) if COMPILED else function
+    return numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function) if COMPILED else function
 
 
 TRAVEL_M, RATE_MPS = 0.4, 8.0
 """Tables of one variable reach from minus to plus this [m, m/s], and go on straight beyond."""
 UNIT_M, UNIT_MPS = 0.01, 0.02
 """Tables of two variables are even in arsinh of travel and rate over these."""
+LANES = 4
+"""Numbers that are summed side by side."""
 _PASSES = 2
 
 
+# Rows of the tables of one variable.
+SPRING, DAMPER, MOUNT, TIRE = range(4)
+# Columns of the numbers of a corner: whether it has these tables and one of two variables, and then
+PAIR, FRICTION_N, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING, MOST_PULL_N = range(
+    4, 13
+)
+
+
 @_compiled
-def _read(tables: Array, i: int, low: float, per_unit: float, at: float) -> float:
-    """The value of table i, on a straight line between its points and beyond them."""
+def _sum(result: Array, first: int, start: Array, by: Array, count: int, rows: Array) -> None:
+    """Let the result, from ``first`` on, be the start and ``count`` rows, each times its number in ``by``."""
+    for r in range(first, len(result), LANES):
+        one, two, three, four = start[r], start[r + 1], start[r + 2], start[r + 3]
+        for c in range(count):
+            number = by[c]
+            one += number * rows[c, r]
+            two += number * rows[c, r + 1]
+            three += number * rows[c, r + 2]
+            four += number * rows[c, r + 3]
+        result[r], result[r + 1], result[r + 2], result[r + 3] = one, two, three, four
+
+
+@_compiled
+def _read(tables: Array, kind: int, i: int, low: float, per_unit: float, at: float) -> float:
+    """The value of a table of corner i, on a straight line between its points and beyond them."""
     place = (at - low) * per_unit
-    cell = min(max(int(place), 0), tables.shape[1] - 2)
+    cell = min(max(int(place), 0), tables.shape[2] - 2)
     share = place - cell
-    return tables[i, cell] + share * (tables[i, cell + 1] - tables[i, cell])
+    return tables[kind, i, cell] + share * (tables[kind, i, cell + 1] - tables[kind, i, cell])
 
 
 @_compiled
-def _read_pair(tables: Array, corner: int, travel: float, rate: float) -> float:
+def _read_pair(pairs: Array, i: int, travel: float, rate: float) -> float:
     """The value of a table of two variables, held at its edges."""
-    _, rows, columns = tables.shape
+    _, rows, columns = pairs.shape
     row = (np.arcsinh(travel / UNIT_M) / np.arcsinh(TRAVEL_M / UNIT_M) + 1) * 0.5 * (rows - 1)
     column = (np.arcsinh(rate / UNIT_MPS) / np.arcsinh(RATE_MPS / UNIT_MPS) + 1) * 0.5 * (columns - 1)
-    i = min(max(int(row), 0), rows - 2)
-    j = min(max(int(column), 0), columns - 2)
-    x = min(max(row - i, 0.0), 1.0)
-    y = min(max(column - j, 0.0), 1.0)
-    low = tables[corner, i, j] + y * (tables[corner, i, j + 1] - tables[corner, i, j])
-    high = tables[corner, i + 1, j] + y * (tables[corner, i + 1, j + 1] - tables[corner, i + 1, j])
+    top = min(max(int(row), 0), rows - 2)
+    left = min(max(int(column), 0), columns - 2)
+    x = min(max(row - top, 0.0), 1.0)
+    y = min(max(column - left, 0.0), 1.0)
+    low = pairs[i, top, left] + y * (pairs[i, top, left + 1] - pairs[i, top, left])
+    high = pairs[i, top + 1, left] + y * (pairs[i, top + 1, left + 1] - pairs[i, top + 1, left])
     return low + x * (high - low)
 
 
 @_compiled
 def _suspension(
-    i: int, spring: Array, damper: Array, mount: Array, other: Array, numbers: Array, damping: Array, mounted: Array,
-    last_rates: Array, step_s: float, travel: float, rate: float, found: Array,
+    i: int, tables: Array, pairs: Array, numbers: Array, travel: float, rate: float, mounts: Array, step_s: float
 ) -> float:
     """What the laws of suspension i add to the linear ones, but for dry friction [N].
 
-    mounted    (w, 2) of the mounts at the beginning of the step: compression, and the damper's own rate
-    found      the same at the end, written here
+    mounts    (w, 3) of the mounts: compression and half a step of its rate, at the beginning of the step; compression
+              and the dampers' own rates at its end, which are written here
     """
-    force = _read(spring, i, -TRAVEL_M, 0.5 / TRAVEL_M * (spring.shape[1] - 1), travel)
-    stiffness = numbers[i, 1]
-    if stiffness == 0.0:
-        force += _read(damper, i, -RATE_MPS, 0.5 / RATE_MPS * (damper.shape[1] - 1), rate)
-    else:
-        carried = mounted[i, 0] + 0.5 * step_s * (last_rates[i] - mounted[i, 1] + rate)
-        found[i, 1] = _read(mount, i, numbers[i, 2], numbers[i, 3], stiffness * carried)
-        found[i, 0] = carried - 0.5 * step_s * found[i, 1]
-        force += stiffness * found[i, 0] - damping[i] * rate
-    if other.size > len(other):
-        force += _read_pair(other, i, travel, rate)
+    per_unit = 0.5 * (tables.shape[2] - 1)
+    force = 0.0
+    if numbers[i, SPRING]:
+        force += _read(tables, SPRING, i, -TRAVEL_M, per_unit / TRAVEL_M, travel)
+    if numbers[i, PAIR]:
+        force += _read_pair(pairs, i, travel, rate)
+    if numbers[i, MOUNT]:
+        stiffness = numbers[i, MOUNT_N_PER_M]
+        carried = mounts[i, 0] + 0.5 * step_s * rate
+        mounts[i, 2] = _read(tables, MOUNT, i, numbers[i, MOUNT_LOW], numbers[i, MOUNT_PER_UNIT], stiffness * carried)
+        mounts[i, 1] = carried - 0.5 * step_s * mounts[i, 2]
+        force += stiffness * mounts[i, 1] - numbers[i, DAMPING] * rate
+    elif numbers[i, DAMPER]:
+        force += _read(tables, DAMPER, i, -RATE_MPS, per_unit / RATE_MPS, rate)
     return force
 
 
 @_compiled
-def _tire(i: int, tables: Array, numbers: Array, static_n: Array, deflection: float, rate: float) -> float:
+def _tire(i: int, tables: Array, numbers: Array, deflection: float, rate: float) -> float:
     """What the laws of tire i add to its linear spring [N]."""
-    force = _read(tables, i, -TRAVEL_M, 0.5 / TRAVEL_M * (tables.shape[1] - 1), deflection) + numbers[i, 4] * rate
-    if numbers[i, 6] == 0.0:  # the tire cannot pull: the force on the road is static - k d - force, at least 0
-        force = min(force, static_n[i] - numbers[i, 5] * deflection)
-    return force
+    force = numbers[i, TIRE_DAMPING] * rate
+    if numbers[i, TIRE]:
+        force += _read(tables, TIRE, i, -TRAVEL_M, 0.5 / TRAVEL_M * (tables.shape[2] - 1), deflection)
+    # A tire that cannot pull: the force on the road, static - k d - force, is at least 0.
+    return min(force, numbers[i, MOST_PULL_N] - numbers[i, TIRE_N_PER_M] * deflection)
+
+
+@_compiled
+def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array) -> None:
+    """Find the dry friction that stops each suspension at the end of the step, as far as it reaches, and add what it
+    does to travels and rates."""
+    w = len(numbers)
+    for _ in range(2):
+        for i in range(w):
+            free = motion[m + w + i]
+            for j in range(w):
+                if j != i:
+                    free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
+            stopping = -free / by_force[2 * w + i, m + w + i]
+            forces[2 * w + i] = min(max(stopping, -numbers[i, FRICTION_N]), numbers[i, FRICTION_N])
+    for i in range(w):
+        for r in range(m, m + 4 * w):
+            motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]
+
+
+@_compiled
+def _settle(
+    motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
+    rubs: bool, road: Array, mounts: Array, step_s: float,
+) -> None:
+    """Find the forces at the end of a step (3 w) from those at its beginning, and the motion there.
+
+    before    (R,) the motion without these forces
+    road      (2 w) its heights under the wheels and their rates
+    """
+    w = len(numbers)
+    seen = m // LANES * LANES
+    for _ in range(_PASSES):
+        _sum(motion, seen, before, forces, 2 * w, by_force)
+        if rubs:
+            _rub(motion, m, forces, numbers, by_force)
+        for i in range(w):
+            forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
+            forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
+                                  motion[m + 3 * w + i] - road[w + i])
+    if rubs:
+        _sum(motion, seen, before, forces, 2 * w, by_force)
+        _rub(motion, m, forces, numbers, by_force)
+    _sum(motion, 0, before, forces, 3 * w, by_force)
 
 
 @_compiled
 def steps(
-    transition: Array, drive: Array, at_start: Array, at_end: Array, travel_of: Array, wheels_of: Array,
-    elevation: Array, road_rate: Array, start: Array, step_s: float, spring: Array, damper: Array, mount: Array,
-    other: Array, tire: Array, numbers: Array, damping: Array, static_n: Array,
+    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, start: Array,
+    around: Array, elevation: Array,
 ) -> tuple[Array, Array]:
-    """States (M, 2 n) and forces (M, 2 w); see ``stepping.march``.
+    """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
 
-    transition, at_start, at_end    of the state, and of forces that are straight lines over a step
-    drive                           (M - 1, 2 n) what the road does to the state in each step
-    spring ... tire                 (w, points) tables
-    numbers                         (w, 7): dry friction, the mount's stiffness (0: none), where its table begins and
-                                    its points per unit, the tire's damping and stiffness, and whether it pulls
+    The motion (R,) of the linear car is its state, what is seen (4 w: travels, rates, heights of the wheels, rates of
+    these), and 0 up to the next number of whole ``LANES``.
+
+    by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
+                 the road's mean and how far it rises from the middle of the step to its end
+    by_force     (3 w, R) the same by the laws' forces at the end, then by dry friction
+    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 13)
+    start        (2 n,) the first state
+    around       (M + 1, w) means of the road before, in and after the steps
+    elevation    (M, w) of the road at the instants
     """
-    count, m = len(drive) + 1, len(start)
-    n, w = m // 2, len(travel_of)
-    states, forces = np.zeros((count, m)), np.zeros((count, 2 * w))
-    held = at_start[:, :w] + at_end[:, :w]  # of forces that stay the same over a step: dry friction
-    yielding = np.zeros((w, w))  # rate of each suspension per dry friction in each
-    for i in range(w):
-        for j in range(w):
-            for c in range(n):
-                yielding[i, j] += travel_of[i, c] * held[n + c, j]
-    mounted, mounted_next = np.zeros((w, 2)), np.zeros((w, 2))
-    smooth, tried, dry = np.zeros(2 * w), np.zeros(2 * w), np.zeros(w)
-    state, base, moved = start.copy(), np.zeros(m), np.zeros(m)
-    rates, last_rates = np.zeros(w), np.zeros(w)
+    count, m, w = len(elevation), len(start), len(numbers)
+    states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
     states[0] = start
+    known, forces, road, mounts = np.zeros(m + 4 * w), np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3))
+    known[:m] = start
+    rubs = numbers[:, FRICTION_N].max() > 0.0
+    size = by_known.shape[1]
+    nothing, before, motion = np.zeros(size), np.zeros(size), np.zeros(size)
     for k in range(count - 1):
-        for r in range(m):
-            value = drive[k, r]
-            for c in range(m):
-                value += transition[r, c] * state[c]
-            for c in range(2 * w):
-                value += at_start[r, c] * smooth[c]
-            base[r] = value
-        for c in range(2 * w):
-            tried[c] = smooth[c]
-        for sweep in range(_PASSES + 1):
-            for r in range(m):
-                value = base[r]
-                for c in range(2 * w):
-                    value += at_end[r, c] * tried[c]
-                moved[r] = value
-            for i in range(w):
-                rates[i] = 0.0
-                for c in range(n):
-                    rates[i] += travel_of[i, c] * moved[n + c]
-            for _ in range(2):
-                for i in range(w):
-                    if numbers[i, 0] > 0.0:
-                        free = rates[i]
-                        for j in range(w):
-                            if j != i:
-                                free += yielding[i, j] * dry[j]
-                        dry[i] = min(max(-free / yielding[i, i], -numbers[i, 0]), numbers[i, 0])
-            for r in range(m):
-                for i in range(w):
-                    moved[r] += held[r, i] * dry[i]
-            if sweep == _PASSES:
-                break
-            for i in range(w):
-                travel, rate, height, lift = 0.0, 0.0, 0.0, 0.0
-                for c in range(n):
-                    travel += travel_of[i, c] * moved[c]
-                    rate += travel_of[i, c] * moved[n + c]
-                    height += wheels_of[i, c] * moved[c]
-                    lift += wheels_of[i, c] * moved[n + c]
-                tried[i] = _suspension(i, spring, damper, mount, other, numbers, damping, mounted, last_rates, step_s,
-                                       travel, rate, mounted_next)
-                tried[w + i] = _tire(i, tire, numbers, static_n, height - elevation[k + 1, i],
-                                     lift - road_rate[k + 1, i])
-        for r in range(m):
-            state[r] = moved[r]
-            states[k + 1, r] = moved[r]
         for i in range(w):
-            last_rates[i] = 0.0
-            for c in range(n):
-                last_rates[i] += travel_of[i, c] * state[n + c]
-            mounted[i, 0], mounted[i, 1] = mounted_next[i, 0], mounted_next[i, 1]
-            forces[k + 1, i] = tried[i] + dry[i]
-            forces[k + 1, w + i] = tried[w + i]
-        for c in range(2 * w):
-            smooth[c] = tried[c]
-    return states, forces
+            known[m + 2 * w + i] = around[k + 1, i]
+            known[m + 3 * w + i] = 0.25 * (around[k + 2, i] - around[k, i])
+            road[i] = elevation[k + 1, i]
+            road[w + i] = (around[k + 2, i] - around[k + 1, i]) / step_s
+            mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
+        _sum(before, 0, nothing, known, m + 4 * w, by_known)
+        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, rubs, road, mounts, step_s)
+        for r in range(m):
+            known[r] = motion[r]
+            states[k + 1, r] = motion[r]
+        for i in range(w):
+            known[m + i], known[m + w + i] = forces[i], forces[w + i]
+            recorded[k + 1, i], recorded[k + 1, w + i] = forces[i] + forces[2 * w + i], forces[w + i]
+    return states, recorded
