@@ -32,11 +32,14 @@ def page(study: Study, result: Result) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th class=n>{escape(column.name)}</th>" for column in table.columns)
-    rows = "".join(f"<tr>{''.join(map(_cell, table.columns, row))}</tr>" for row in table.rows)
+    """Columns of words stand left, of numbers right."""
+    sides = ["" if all(isinstance(row[index], str) for row in table.rows) else " class=n"
+             for index in range(len(table.columns))]
+    head = "".join(f"<th{side}>{escape(column.name)}</th>" for side, column in zip(sides, table.columns, strict=True))
+    rows = "".join(f"<tr>{''.join(map(_cell, sides, table.columns, row))}</tr>" for row in table.rows)
     return (f'<section><h2>{escape(table.title)}</h2><div class="scroll"><table><tr>{head}</tr>{rows}</table></div>'
             "</section>")
 
 
-def _cell(column: Column, cell: Cell) -> str:
-    return f"<td class=n>{escape(column.text(cell))}</td>"
+def _cell(side: str, column: Column, cell: Cell) -> str:
+    return f"<td{side}>{escape(column.text(cell))}</td>"
