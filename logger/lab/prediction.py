@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from logger.roads.track import Track
 from logger.vehicle.compose import Car, Response, recorded, respond
 from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import FINE_RATE_HZ
 
 Array = npt.NDArray[np.float64]
 
@@ -65,10 +67,11 @@ class Run:
 
 
 class Runs:
-    """Runs, and predictions of them."""
+    """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time."""
 
-    def __init__(self, runs: Sequence[Run]) -> None:
-        self.runs = list(runs)
+    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
+        self.runs, self.fine_hz = list(runs), fine_hz
+        self._lock = Lock()
         self._passages: list[dict[bytes, Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
@@ -91,11 +94,12 @@ class Runs:
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
             distance = car.driven(distance)
             key = distance.tobytes()
-            if key not in known:
-                if len(known) >= _KEPT_PASSAGES:
-                    del known[next(iter(known))]
-                known[key] = Passage(run.track, run.rate_hz, distance)
-            found.append(known[key])
+            with self._lock:
+                if key not in known:
+                    if len(known) >= _KEPT_PASSAGES:
+                        del known[next(iter(known))]
+                    known[key] = Passage(run.track, run.rate_hz, distance, self.fine_hz)
+                found.append(known[key])
         return found
 
 

@@ -87,6 +87,18 @@ class Parameter:
         return float(min(max(found, self.low), self.high))
 
 
+@dataclass(frozen=True)
+class Misalignment:
+    """How position and acceleration of some runs seem to lie against each other.
+
+    scale      distance recorded over distance driven, were that all
+    delay_s    how late the acceleration is, were that all [s]
+    """
+
+    scale: float
+    delay_s: float
+
+
 class Effect(ABC):
     """What every effect offers.
 
@@ -110,8 +122,8 @@ class Effect(ABC):
         """Why it cannot be there in this vehicle on this road; None if it can."""
         return None
 
-    def trials(self) -> list[dict[str, float]]:
-        """Values of all its parameters that a search begins at."""
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        """Values of all its parameters that a search begins at; some effects look at how the runs are misaligned."""
         names = [one.name for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
 

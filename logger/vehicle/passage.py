@@ -36,16 +36,17 @@ class Passage:
     track         the road
     rate_hz       samples a second
     distance_m    (N,) where the front tires stand at each sample [m]
+    fine_hz       at least so many steps a second
 
     ValueError unless there are two or more finite distances.
     """
 
-    def __init__(self, track: Track, rate_hz: float, distance_m: Array) -> None:
+    def __init__(self, track: Track, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ) -> None:
         if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
         self.count = len(distance_m)
-        self.steps = max(1, int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN)))
+        self.steps = max(1, int(np.ceil(fine_hz / rate_hz - _EVEN)))
         self.step_s = 1 / (rate_hz * self.steps)
         self._lead, self._tail = round(APPROACH_S * rate_hz), round(_TAIL_S * rate_hz)
         pace_m, ahead_m = distance_m[1] - distance_m[0], distance_m[-1] - distance_m[-2]
@@ -55,7 +56,7 @@ class Passage:
         coarse = len(way) + round(_REST_S * rate_hz)
         self._coarse = smooth_length(coarse)
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
-        self._s = 2j * np.pi * f_hz
+        self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
         taps = recorder_taps(self.steps)
         centred = np.zeros(self._coarse * self.steps)
         half = len(taps) // 2
@@ -72,26 +73,25 @@ class Passage:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins."""
         place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m))
-        if place not in self._known:
-            if len(self._known) >= _KEPT_PLACES:
-                del self._known[next(iter(self._known))]
+        known = self._known.get(place)  # another thread may take it out at any time
+        if known is None:
             paths = self.track.tire_paths(structure.contact_patch_m)
             wheels = [
                 (paths[-1] if left_m < 0 else paths[0]).step_means(self._way_m - behind_m)
                 for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True)
             ]
             level = wheels[0][0][0]
-            self._known[place] = (np.stack([one for one, _ in wheels], axis=1) - level,
-                                  np.stack([mean for _, mean in wheels], axis=1) - level)
-        return self._known[place]
+            known = (np.stack([one for one, _ in wheels], axis=1) - level,
+                     np.stack([mean for _, mean in wheels], axis=1) - level)
+            self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}
+        return known
 
-    def recorded(self, fine: Array, factor: Callable[[Complex], Complex] | None = None) -> Array:
+    def recorded(self, fine: Array, factor: Callable[[Complex], Complex]) -> Array:
         """What the recorder keeps of an acceleration at the fine instants (M,): samples (N,).
 
-        factor    of what lies between the body and the recorder, by s (f,) [1/s]; None: nothing
+        factor    of what lies between the body and the recorder, by s (f,) [1/s]
         """
-        behind = self._recorder if factor is None else self._recorder * factor(self._s)
-        transform = np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * behind
+        transform = np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * self._recorder * factor(self._s)
         return np.fft.irfft(transform, self._coarse)[self._lead : self._lead + self.count]
 
     def sampled(self, fine: Array) -> Array:

@@ -26,6 +26,8 @@ class Occupant(BodyEffect):
     shown_by = "drive with and without the people, or a road with much of its strength at 2 to 8 Hz"
 
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        if p.mass_kg == 0:
+            return structure
         omega = 2 * np.pi * p.frequency_hz
         return hung(structure, p.mass_kg, p.mass_kg * omega**2, 2 * p.damping_ratio * omega * p.mass_kg,
                     structure.body[:, 0])

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import DriveEffect, Parameter, Scale
+from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,9 @@ class SpeedScale(DriveEffect):
     source = "UN Regulation 39: a speedometer may read up to a tenth too much; worn tires change the rest"
     signature = "model and measurement drift apart along the road, the more the farther"
     shown_by = "drive a long stretch with a mark at each end, and measure it"
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        return super().trials() if seen is None else [{"scale": seen.scale}]
 
     def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
         return distance_m / p.scale

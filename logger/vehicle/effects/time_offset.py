@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 
 Complex = npt.NDArray[np.complex128]
 
@@ -22,6 +22,9 @@ class TimeOffset(SensorEffect):
     signature = "model and measurement have the same shape, shifted by the same time at every speed"
     shown_by = "drive one bump at two speeds: the distance it seems moved by grows with the speed"
     stage = 4
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        return super().trials() if seen is None else [{"delay_s": seen.delay_s}]
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         return np.exp(-s * p.delay_s)

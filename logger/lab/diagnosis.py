@@ -1,0 +1,264 @@
+"""Which physical effects a model lacks: found one after the other, judged on what no fit saw.
+
+Problem: something differs, and twenty effects, alone or together, might be why; or none of them; or nothing. Solution,
+in rounds: the car's own numbers and the wander of the distance are refitted within what is granted; every effect is
+screened; the promising ones are fitted in full; the best is taken when it passes three tests: its gain in likelihood
+would hardly come by chance in so many trials, it explains stretches that no fit saw, and what it explains is worth
+naming. Then the next round begins, on the model with it. At the end every effect that was taken must still be needed by
+the others. What is left then is compared with the noise that the sensor has where no car moves it: what stays above it
+is unexplained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+
+import numpy as np
+
+from logger.lab.candidates import Base, Screened, Tried, fitted, misalignment, screened
+from logger.lab.fitting import Problem, State, settled
+from logger.vehicle.effect import Chosen, Effect, Misalignment
+
+Progress = Callable[[str], None]
+
+MOST_EFFECTS = 4
+"""No more than so many are looked for."""
+CHANCE = 0.001
+"""How often, at most, noise alone may look like an effect, all candidates together."""
+WORTH = 0.006
+"""The least that an effect has to lower the mean logarithm of the power that is left, on stretches that no fit saw."""
+UNEXPLAINED = 0.10
+"""What stays above the noise is unexplained from this share of it on."""
+_WORTH_FITTING = 0.03
+_LEAST_PROMISE = 6.0
+_MOST_FITTED = 7
+_MOST_THREADS = 4
+# Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
+_ALIKE, _ALIKE_SHARE = 10.0, 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of the sensors: its deviation, and how certain that is [m/s2]."""
+
+    deviation_mps2: float
+    standard_error_mps2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect that was tried on the model of its round.
+
+    error              on what no fit saw
+    p_value            how often noise alone would gain as much, times the number of candidates
+    gain, judged_gain  of minus twice the log-likelihood, of all stretches and of those that no fit saw
+    confused_with      effects that explain the same as well
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+    error: float
+    p_value: float
+    gain: float
+    judged_gain: float
+    confused_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A model on the way: what was done, and the error on what no fit saw."""
+
+    words: str
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found.
+
+    candidates     of the first round, with those of later rounds in place of theirs where they were taken; best first
+    obstacles      effects that could not be tried, and why
+    verdict        effects that the model lacks, the most certain first
+    """
+
+    baseline_error: float
+    noise: Noise | None
+    noise_floor_error: float | None
+    candidates: tuple[Candidate, ...]
+    obstacles: Mapping[str, str]
+    verdict: tuple[str, ...]
+    unexplained: bool
+    excess: float
+    steps: tuple[Step, ...]
+    before: State
+    after: State
+    problem: Problem
+
+
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """An effect that was taken, as it was tried in its round."""
+
+    tried: Tried
+    rivals: tuple[str, ...]
+    count: int
+
+
+def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+             progress: Progress = lambda words: None) -> Diagnosis:
+    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks."""
+    obstacles = _obstacles(problem, effects, present)
+    left = [one for name, one in effects.items() if name not in obstacles]
+    progress("refitting the car's own numbers")
+    nominal = problem.start(present)
+    seen = misalignment(problem, nominal)
+    before = now = Base.of(problem, *settled(problem, nominal))
+    steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
+             Step("its numbers refitted within what is granted", problem.judged_error(now.state))]
+    first: list[Tried] = []
+    taken: list[_Taken] = []
+    for number in range(1, MOST_EFFECTS + 1):
+        progress(f"round {number}")
+        tried = _round(problem, now, left, seen, progress)
+        first = first or tried
+        best = next((one for one in tried if _accepted(problem, one, len(left))), None)
+        if best is None:
+            break
+        taken.append(_Taken(best, _rivals(best, tried, problem), len(left)))
+        progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
+        now = Base.of(problem, *settled(problem, best.state))
+        steps.append(Step(f"with {best.effect.name}", problem.judged_error(now.state)))
+        left = [one for one in left if one.name != best.effect.name]
+    now, needed = _needed(problem, now, taken, len(present), progress)
+    noise = _noise(problem, now.state)
+    excess = _excess(problem, now.state, noise)
+    verdict = tuple(needed)
+    return Diagnosis(
+        baseline_error=problem.judged_error(nominal), noise=noise, noise_floor_error=_floor(problem, noise),
+        candidates=_listed(problem, before, now, first, taken, verdict), obstacles=obstacles, verdict=verdict,
+        unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=now.state,
+        problem=problem,
+    )
+
+
+def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
+    """Effects that cannot be tried, and why."""
+    two_tracks = all(run.two_tracks for run in problem.runs.runs)
+    there = {one.effect.name for one in present}
+    found = {}
+    for name, effect in effects.items():
+        why = "the model has it" if name in there else effect.obstacle(problem.vehicle, two_tracks)
+        if why is not None:
+            found[name] = why
+    return found
+
+
+def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalignment,
+           progress: Progress) -> list[Tried]:
+    """Every effect tried on the model, best first."""
+    with ThreadPoolExecutor(min(_MOST_THREADS, cpu_count() or 1)) as pool:
+        promises: list[Screened] = []
+        for done, one in enumerate(pool.map(lambda effect: screened(problem, now, effect, seen), effects), 1):
+            progress(f"screened {done} of {len(effects)} effects")
+            promises.append(one)
+        promises.sort(key=lambda one: -one.gain)
+        least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
+        deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
+        tried: list[Tried] = []
+        jobs = pool.map(lambda one: fitted(problem, now, one, one.effect.name in deep), promises)
+        for done, found in enumerate(jobs, 1):
+            progress(f"fitted {done} of {len(promises)} effects")
+            tried.append(found)
+    return sorted(tried, key=lambda one: -(one.whole_gain - 2 * one.numbers))
+
+
+def _p_value(gain: float, numbers: int, count: int) -> float:
+    """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction)."""
+    from scipy.special import gammaincc
+
+    return float(min(1.0, count * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
+
+
+def _accepted(problem: Problem, one: Tried, count: int) -> bool:
+    freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, fitted=False))
+    return _p_value(one.gain, one.numbers, count) < CHANCE and one.judged_gain > WORTH * freedom
+
+
+def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
+    """Effects that explain as well what this one explains; none for one that explains nothing."""
+    worthy = [other for other in tried if _accepted(problem, other, len(tried))]
+    if one not in worthy:
+        return ()
+    near = max(_ALIKE, _ALIKE_SHARE * one.whole_gain)
+    return tuple(other.effect.name for other in worthy
+                 if other is not one and abs(other.whole_gain - one.whole_gain) < near)
+
+
+def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
+            progress: Progress) -> tuple[Base, dict[str, float]]:
+    """The model without those that were taken and are not needed by the side of the others, and what each of the
+    others is worth."""
+    worth = {taken[0].tried.effect.name: taken[0].tried.whole_gain} if len(taken) == 1 else {}
+    while len(now.state.effects) - present > 1:
+        worth = {}
+        without: dict[str, Base] = {}
+        for place in range(present, len(now.state.effects)):
+            name = now.state.effects[place].effect.name
+            progress(f"is {name} still needed?")
+            rest = now.state.effects[:place] + now.state.effects[place + 1:]
+            other = Base.of(problem, *settled(problem, problem.laid_out(rest, now.state.logs, now.state.wander), 2))
+            worth[name] = other.fitted + other.judged - now.fitted - now.judged
+            without[name] = other
+        least = min(worth, key=lambda name: worth[name])
+        freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
+        if worth[least] > WORTH * freedom:
+            break
+        now = without[least]
+        worth.pop(least)
+    return now, dict(sorted(worth.items(), key=lambda pair: -pair[1]))
+
+
+def _noise(problem: Problem, state: State) -> Noise:
+    """The sensor's noise, from where no car moves it: the highest frequencies."""
+    quiet = [one.quiet(left) for one, left in zip(problem.stretches, problem.residuals(state), strict=True)]
+    freedom = sum(n for _, n in quiet)
+    power = sum(level * n for level, n in quiet) / freedom
+    return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
+
+
+def _floor(problem: Problem, noise: Noise) -> float:
+    """The error that the noise alone makes."""
+    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
+    return float(noise.deviation_mps2 / np.sqrt((counted**2).mean()))
+
+
+def _excess(problem: Problem, state: State, noise: Noise) -> float:
+    """By what share the residual is above the noise in the run where it is most."""
+    ratios = [float(cells.freedom @ cells.power / cells.freedom.sum()) / noise.deviation_mps2**2
+              for cells in problem.cells(state, None)]
+    return float(np.sqrt(max(ratios)) - 1)
+
+
+def _listed(problem: Problem, before: Base, now: Base, first: Sequence[Tried], taken: Sequence[_Taken],
+            verdict: Sequence[str]) -> tuple[Candidate, ...]:
+    """The candidates, those of the verdict before the others."""
+    values = {one.effect.name: one.values for one in now.state.effects}
+    own = {one.tried.effect.name: one for one in taken}
+    found = []
+    for name in verdict:
+        one = own[name]
+        found.append(_candidate(problem, one.tried, one.count, one.rivals, values[name]))
+    found += [_candidate(problem, tried, len(first), _rivals(tried, first, problem), None)
+              for tried in first if tried.effect.name not in verdict]
+    return tuple(found)
+
+
+def _candidate(problem: Problem, tried: Tried, count: int, rivals: tuple[str, ...],
+               values: Mapping[str, float] | None) -> Candidate:
+    return Candidate(
+        tried.effect, tried.state.effects[-1].values if values is None else values, problem.judged_error(tried.state),
+        _p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain, rivals,
+    )

@@ -1,0 +1,326 @@
+"""Cars with effects fitted to runs: the effects' numbers, with the car's own and the distance's within what is granted.
+
+Problem: twenty candidates are to be fitted in full, each together with a dozen numbers of the car and some hundred of
+the wander of the distance, in seconds. Solution: what the numbers of the car and the wander do to a prediction hardly
+depends on the candidate, so it is computed once for a model (``Slopes``) and kept while candidates are tried; only the
+effect's own slopes are taken anew in each of Levenberg and Marquardt's steps, and every step is judged by a true
+prediction. Residuals are weighed by what is left in each band, and the weights follow the fit: the level of the noise
+is part of what is fitted (``stretches``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.nuisance import Nuisance, Tolerance, Wander, nuisance_of, wander_of
+from logger.lab.prediction import Runs, error
+from logger.lab.stretches import Cells, Stretches, Whitener, deviance
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+_LOG_STEP = 0.01
+_SHARE_STEP = 0.02
+_LEAST_SHARE = 0.1
+_FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e6
+# A step that gains less than this share of a degree of freedom ends a fit.
+_SMALL_GAIN = 0.05
+_SETTLING_STEPS, _SETTLED = 6, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A model with all its numbers, and what it predicts.
+
+    effects       with their values
+    logs          (p,) logarithms of the car's numbers over the nominal ones
+    wander        (k,) per run
+    predictions   (n,) per run, whole, wander included [m/s2]
+    """
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    wander: list[Array]
+    predictions: list[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """What the car's numbers and the wander do to the predictions of a model.
+
+    columns    (p + k, n) per run
+    anchor     the wander over which runs are laid out, (k,) per run
+    """
+
+    columns: list[Array]
+    anchor: list[Array]
+
+
+class Problem:
+    """Runs, a nominal vehicle, and what may be a little off.
+
+    whole    fit all of the runs, and leave no stretch to judge
+    """
+
+    def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False) -> None:
+        self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
+        self.nuisance: Nuisance = nuisance_of(vehicle, tolerance)
+        self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
+        self.stretches = [Stretches(run, whole) for run in runs.runs]
+        self.measured = [run.measured_mps2 for run in runs.runs]
+
+    def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
+        """The car with these numbers and effects."""
+        return compose(self.nuisance.vehicle(self.vehicle, logs), effects)
+
+    def moved_m(self, wander: Sequence[Array]) -> list[Array]:
+        """By how much the car was farther than its distance signal said (n,), per run."""
+        return [one.basis @ k for one, k in zip(self.wander, wander, strict=True)]
+
+    def laid_out(self, effects: Sequence[Chosen], logs: Array, wander: Sequence[Array]) -> State:
+        """A state whose predictions are made anew, over the road as the wander has it."""
+        predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander))
+        return State(tuple(effects), logs, list(wander), predictions)
+
+    def start(self, effects: Sequence[Chosen] = ()) -> State:
+        """The nominal car."""
+        return self.laid_out(effects, np.zeros(len(self.nuisance.names)),
+                             [np.zeros(one.basis.shape[1]) for one in self.wander])
+
+    def residuals(self, state: State) -> list[Array]:
+        """Measured minus predicted (n,), per run."""
+        return [y - one for y, one in zip(self.measured, state.predictions, strict=True)]
+
+    def cells(self, state: State, fitted: bool | None = True) -> list[Cells]:
+        """What the state leaves, per run."""
+        return [one.cells(left, fitted) for one, left in zip(self.stretches, self.residuals(state), strict=True)]
+
+    def cost(self, state: State) -> float:
+        """What the state's car and wander cost: squares of their deviations."""
+        squares = float(((state.logs / self.nuisance.deviations) ** 2).sum())
+        return squares + sum(float(k @ one.precision @ k) for one, k in zip(self.wander, state.wander, strict=True))
+
+    def deviance(self, state: State, fitted: bool | None = True) -> float:
+        """Minus twice the log-likelihood: of the fitted stretches (or all) with the cost of what is off, or of those
+        that judge."""
+        cost = self.cost(state) if fitted is not False else 0.0
+        return deviance(self.cells(state, fitted)) + cost
+
+    def error(self, state: State) -> float:
+        """Of all samples."""
+        return error(self.runs.runs, state.predictions)
+
+    def judged_error(self, state: State) -> float:
+        """Of the samples that no fit saw; of all, where nothing was kept from the fits."""
+        left = whole = 0.0
+        for stretches, residual, measured in zip(self.stretches, self.residuals(state), self.measured, strict=True):
+            unseen = ~stretches.fit if stretches.judges else stretches.fit
+            left += float((residual[stretches.first:][unseen] ** 2).sum())
+            whole += float((measured[stretches.first:][unseen] ** 2).sum())
+        return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+
+    def whiteners(self, state: State) -> list[Whitener]:
+        """Weights by what the state leaves in the fitted stretches."""
+        return [Whitener(one, cells) for one, cells in zip(self.stretches, self.cells(state), strict=True)]
+
+    def slopes(self, state: State) -> Slopes:
+        """Of a state that was laid out."""
+        count = len(self.nuisance.names)
+        by_number = [np.empty((count, len(one))) for one in self.measured]
+        moved = self.moved_m(state.wander)
+        for index in range(count):
+            step = np.zeros(count)
+            step[index] = _LOG_STEP
+            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
+            for column, there, here in zip(by_number, shifted, state.predictions, strict=True):
+                column[index] = (there - here) / _LOG_STEP
+        columns = [
+            np.vstack([numbers, one.columns(prediction, run)])
+            for numbers, one, prediction, run in zip(by_number, self.wander, state.predictions, self.runs.runs,
+                                                     strict=True)
+        ]
+        return Slopes(columns, [k.copy() for k in state.wander])
+
+    def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes) -> State:
+        """A state whose wander is counted to first order from the anchor of the slopes."""
+        count = len(logs)
+        predictions = [
+            prediction + (k - anchor) @ columns[count:]
+            for prediction, k, anchor, columns in zip(
+                self.runs.predict(self.car(effects, logs), self.moved_m(slopes.anchor)), wander, slopes.anchor,
+                slopes.columns, strict=True)
+        ]
+        return State(effects, logs, wander, predictions)
+
+
+class Weighed:
+    """Slopes, weighed; and the normal equations of what they hold."""
+
+    def __init__(self, problem: Problem, slopes: Slopes, whiteners: Sequence[Whitener]) -> None:
+        self.problem, self.slopes, self.whiteners = problem, slopes, list(whiteners)
+        self.white = [whitener(columns) for whitener, columns in zip(whiteners, slopes.columns, strict=True)]
+        p = len(problem.nuisance.names)
+        sizes = [one.basis.shape[1] for one in problem.wander]
+        ends = p + np.cumsum([0, *sizes])
+        self.places = [np.concatenate([np.arange(p), np.arange(low, high)])
+                       for low, high in pairwise(ends)]
+        self.count = int(ends[-1])
+        self.prior = np.zeros((self.count, self.count))
+        self.prior[:p, :p] = np.diag(problem.nuisance.deviations**-2.0)
+        for one, (low, high) in zip(problem.wander, pairwise(ends), strict=True):
+            self.prior[low:high, low:high] = one.precision
+        self.information = self.prior.copy()
+        for white, place in zip(self.white, self.places, strict=True):
+            self.information[np.ix_(place, place)] += white @ white.T
+
+    def joined(self, state: State) -> Array:
+        """The car's numbers and the wander of all runs as one vector."""
+        return np.concatenate([state.logs, *state.wander])
+
+    def parted(self, joined: Array) -> tuple[Array, list[Array]]:
+        """The reverse."""
+        p = len(self.problem.nuisance.names)
+        return joined[:p], [joined[place[p:]] for place in self.places]
+
+    def residual(self, state: State) -> list[Array]:
+        """Weighed."""
+        return [whitener(left) for whitener, left in zip(self.whiteners, self.problem.residuals(state), strict=True)]
+
+    def objective(self, state: State) -> float:
+        """Squares of the weighed residuals, and the cost of what is off."""
+        return sum(float(one @ one) for one in self.residual(state)) + self.problem.cost(state)
+
+    def against(self, columns: Sequence[Array]) -> Array:
+        """Products of weighed columns (m, kept) per run with the slopes: (count, m)."""
+        result = np.zeros((self.count, len(columns[0])))
+        for white, place, one in zip(self.white, self.places, columns, strict=True):
+            result[place] += white @ one.T
+        return result
+
+
+@dataclass(frozen=True)
+class Move:
+    """A number of an effect that a fit moves: which effect of the model, and which of its parameters."""
+
+    effect: int
+    parameter: int
+
+
+def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
+    """Every number that can be moved, of all effects or of some."""
+    chosen = range(len(effects)) if which is None else which
+    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if not one.choices]
+
+
+def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
+    """The effects with other values, given on the scales of their parameters (m,)."""
+    found = list(effects)
+    for move, coordinate in zip(moves, coordinates, strict=True):
+        one = found[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        found[move.effect] = replace(one, values={**one.values, parameter.name: parameter.value(float(coordinate))})
+    return tuple(found)
+
+
+def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
+    """Where the numbers stand, on the scales of their parameters (m,)."""
+    places = []
+    for move in moves:
+        one = effects[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        places.append(parameter.coordinate(one.values[parameter.name]))
+    return np.array(places)
+
+
+def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
+    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,)."""
+    steps = []
+    for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        usual = abs(parameter.coordinate(parameter.start))
+        step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
+        forward = parameter.coordinate(parameter.value(here + step)) - here
+        steps.append(step if abs(forward) > 0.5 * step else -step)
+    return np.array(steps)
+
+
+def effect_slopes(problem: Problem, slopes: Slopes, state: State, moves: Sequence[Move]) -> list[Array]:
+    """What the effects' numbers do to the predictions, on the scales of the parameters: (m, n) per run."""
+    here = coordinates_of(state.effects, moves)
+    result = [np.empty((len(moves), len(one))) for one in problem.measured]
+    for index, step in enumerate(_steps(state.effects, moves)):
+        there = here.copy()
+        there[index] += step
+        shifted = problem.predicted(moved(state.effects, moves, there), state.logs, state.wander, slopes)
+        for column, high, low in zip(result, shifted.predictions, state.predictions, strict=True):
+            column[index] = (high - low) / step
+    return result
+
+
+def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int) -> State:
+    """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander."""
+    problem, damping = weighed.problem, _FIRST_DAMPING
+    state = problem.predicted(state.effects, state.logs, state.wander, weighed.slopes)
+    now = weighed.objective(state)
+    for _ in range(most):
+        own = [whitener(columns) for whitener, columns in zip(
+            weighed.whiteners, effect_slopes(problem, weighed.slopes, state, moves), strict=True)] if moves else None
+        information, gradient = _normal(weighed, state, own)
+        gained = 0.0
+        while damping < _LARGEST_DAMPING:
+            damped = information + damping * np.diag(np.diag(information))
+            trial = _stepped(weighed, state, moves, np.asarray(np.linalg.solve(damped, gradient), float))
+            there = weighed.objective(trial)
+            if there < now:
+                gained, now, state = now - there, there, trial
+                damping = max(damping / 10, 1e-9)
+                break
+            damping *= 10
+        if gained < _SMALL_GAIN:
+            break
+    return state
+
+
+def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tuple[Array, Array]:
+    """The normal equations: information (count + m, count + m) and gradient (count + m,)."""
+    left = weighed.residual(state)
+    gradient = weighed.against([one[None] for one in left])[:, 0] - weighed.prior @ weighed.joined(state)
+    if own is None:
+        return weighed.information, gradient
+    mixed = weighed.against(own)
+    alone = np.sum([one @ one.T for one in own], axis=0)
+    information = np.block([[weighed.information, mixed], [mixed.T, alone]])
+    pulled = np.sum([one @ rest for one, rest in zip(own, left, strict=True)], axis=0)
+    return information + 1e-12 * np.eye(len(information)), np.concatenate([gradient, pulled])
+
+
+def _stepped(weighed: Weighed, state: State, moves: Sequence[Move], step: Array) -> State:
+    logs, wander = weighed.parted(weighed.joined(state) + step[: weighed.count])
+    effects = moved(state.effects, moves, coordinates_of(state.effects, moves) + step[weighed.count:])
+    return weighed.problem.predicted(effects, logs, wander, weighed.slopes)
+
+
+def settled(problem: Problem, state: State, rounds: int = 3) -> tuple[State, Slopes]:
+    """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
+
+    Returns the state, laid out, and slopes taken near it.
+    """
+    moves = moves_of(state.effects)
+    state = problem.laid_out(state.effects, state.logs, state.wander)
+    last = problem.deviance(state)
+    slopes = problem.slopes(state)
+    for done in range(1, rounds + 1):
+        state = improved(Weighed(problem, slopes, problem.whiteners(state)), state, moves, _SETTLING_STEPS)
+        state = problem.laid_out(state.effects, state.logs, state.wander)
+        now = problem.deviance(state)
+        if now > last - _SETTLED or done == rounds:
+            break
+        last, slopes = now, problem.slopes(state)
+    return state, slopes

@@ -1,0 +1,98 @@
+"""What is never quite as the vehicle's file and the run's files say, although no physics is missing.
+
+Problem: nominal masses and rates are a few per cent off, and a speed signal wanders; a lab that does not grant this
+takes every small mistake for an effect, and one that grants too much lets mistakes swallow effects. Solution: each
+number of the car may differ by a few per cent and each run's distance by a little, both with a cost: they are unknowns
+with a normal prior, whose deviation is what such numbers are usually off by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.parameters import changed, names, read
+from logger.lab.prediction import Run
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far off things usually are: standard deviations.
+
+    numbers      of masses, inertias, springs and dampers, as a share (a band of 4 % either way has 2.3 %)
+    lengths      of places on the car, as a share
+    scale        of each run's distance, as a share
+    start_m      of where each run begins [m]
+    wander_m     of the distance signal, after one second; it grows with the root of the time [m]
+    """
+
+    numbers: float = 0.025
+    lengths: float = 0.004
+    scale: float = 0.001
+    start_m: float = 0.03
+    wander_m: float = 0.015
+
+
+KNOT_S = 2.0
+"""The wander of a distance signal is straight between knots so far apart."""
+_LENGTHS = ("cg_distance_m",)
+_LEFT_ALONE = ("contact_patch_m", "track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
+_SLOWEST_MPS = 0.5
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """Numbers of a vehicle that may be a little off: names, and deviations of their logarithms (p,)."""
+
+    names: tuple[str, ...]
+    deviations: Array
+
+    def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
+        """The vehicle with its numbers moved by these logarithms (p,)."""
+        return changed(vehicle, {name: read(vehicle, name) * float(np.exp(log))
+                                 for name, log in zip(self.names, logs, strict=True)})
+
+
+def nuisance_of(vehicle: Vehicle, tolerance: Tolerance) -> Nuisance:
+    """What may be a little off in this vehicle."""
+    known = [name for name in names(vehicle) if not name.startswith(("both.", "sensor."))]
+    kept = [name for name in known if name.rpartition(".")[2] not in _LEFT_ALONE and read(vehicle, name) > 0]
+    deviations = [tolerance.lengths if name.endswith(_LENGTHS) else tolerance.numbers for name in kept]
+    return Nuisance(tuple(kept), np.array(deviations))
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """How the distance signal of one run may be off: ``basis @ k`` metres with k normal.
+
+    basis       (n, k) straight lines between knots, and the distance itself
+    precision   (k, k) inverse covariance of k
+    """
+
+    basis: Array
+    precision: Array
+
+    def columns(self, prediction: Array, run: Run) -> Array:
+        """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
+        rise = np.gradient(prediction, 1 / run.rate_hz) / np.maximum(run.speed_mps, _SLOWEST_MPS)
+        return np.asarray(self.basis.T * rise)
+
+
+def wander_of(run: Run, tolerance: Tolerance) -> Wander:
+    """The wander that is granted to a run."""
+    time_s = np.arange(run.count) / run.rate_hz
+    knots = max(2, round(time_s[-1] / KNOT_S) + 1)
+    place = time_s / time_s[-1] * (knots - 1)
+    hats = np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(knots)))
+    basis = np.column_stack([hats, run.distance_m - run.distance_m[0]])
+    steps = np.diff(np.eye(knots), axis=0) / (tolerance.wander_m * np.sqrt(time_s[-1] / (knots - 1)))
+    precision = np.zeros((knots + 1, knots + 1))
+    precision[:knots, :knots] = steps.T @ steps
+    precision[0, 0] += tolerance.start_m**-2
+    precision[knots, knots] = tolerance.scale**-2
+    return Wander(basis, precision)
