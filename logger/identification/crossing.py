@@ -2,8 +2,8 @@
 
 The road is elevations on an even grid. They are read where each axle stood at each instant, averaged over the contact
 patch, and go through the car frequency by frequency, whatever the speed did. Before its first sample the car comes from
-a road that is unknown too, at the speed it had; so nothing is said of how it moved when the record began. A sensor's zero
-is not trusted: the mean of all readings is left out.
+a road that is unknown too, at the speed it had; so nothing is said of how it moved when the record began. A sensor's
+zero is not trusted: the mean of all readings is left out.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ _NUMBERS = {"bump": ("start_m", "height_m", "width_m"), "step": ("start_m", "hei
 _HEIGHT_FACTOR, _WIDTH_FACTOR, _SPEED_FACTOR = 20.0, 4.0, 1.5
 _PLACE_M = 5.0
 # What is known without any fit: an estimate that is rougher is none. Speed relative, places as a share of 5 m.
-_WEAKEST_SPEED, _WEAKEST_PLACE = 0.03, 0.1
+_WEAKEST_SPEED, _WEAKEST_PLACE = 0.02, 0.1
 
 
 @dataclass(frozen=True)

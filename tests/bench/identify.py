@@ -16,18 +16,27 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
+from logger.identification.axle_response import AxleResponse
+from logger.identification.crossing import Drive
 from logger.identification.fit import Fit, Options, fit
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
+from logger.identification.obstacles import Bump
 from logger.identification.parameters import changed, free, names
-from logger.identification.prediction import Record, VehicleModel
+from logger.identification.prediction import VehicleModel
+from logger.identification.record import Record
+from logger.identification.road_input import RoadInput, free_input, is_input
+from logger.identification.shared_road import fit_roads
 from logger.identification.verdict import NotIdentifiable
-from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, gd_n0_from_iri
+from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
+from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
-from bump_drives import BUMP_MPS, RATE_HZ, bump_record, road_record
+from bump_drives import BUMP_MPS, RATE_HZ, SPACING_M, bump_record, recorded, road_record
 from figures import Figures
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +47,8 @@ TABLE = {MASS: 875.0, FRONT: 23088.0, REAR: 23088.0}
 IRI, NOISE_MPS2, SECONDS, BUMP_AT_M = 5.0, 0.05, 12.0, 8.0
 DRAWS, START_DRAWS = 200, 4
 GRID = 8192
+INPUT_DRAWS, ROAD_DRAWS, ROAD_M, GD_N0_CM3 = 100, 100, 400.0, 64.0
+ROAD_TABLE = {MASS: 875.0, "both.suspension_damping_n_s_per_m": 1776.0}
 
 
 def main() -> int:
@@ -48,6 +59,9 @@ def main() -> int:
     draws(figures)
     eight(figures)
     refusals(figures)
+    unknown_bump(figures)
+    unmeasured(figures)
+    no_answer_without_a_road(figures)
     return 1 if figures.missed else 0
 
 
@@ -178,6 +192,134 @@ def refusals(figures: Figures) -> None:
         words = refused(CAR, record, wanted)
         figures.at_least(f"refused: {title}", float(bool(words)), 1.0, "")
         print(f"   {words}")
+
+
+def unknown_bump(figures: Figures) -> None:
+    """4.4.3 with the input estimated: height, width, start and speed of the bump free beside the mass."""
+    truth = {MASS: 875.0, "bump.height_m": 0.15, "bump.width_m": 2.6, "bump.start_m": 2.0, "speed_scale": 1.0}
+    road = RoadInput(bump=Bump(2.2, 0.13, 3.0))
+    flat = Track(1.0, np.zeros(2))
+    records = [replace(bump_record(CAR, seed=seed), track=flat) for seed in range(INPUT_DRAWS)]
+    errors, expected, times = [], [], []
+    for record in records:
+        wanted = [free(CAR, MASS, 700.0), *(free_input(road, name) for name in list(truth)[1:])]
+        began = time.process_time()
+        model = VehicleModel(CAR, wanted, [record], road)
+        found = fit(model, model.measured)
+        times.append(time.process_time() - began)
+        errors.append([found.parameters[name] - value for name, value in truth.items()])
+        expected.append(list(found.standard_errors.values()))
+    known = RoadInput(bump=Bump(2.0, 0.15, 2.6))
+    model = VehicleModel(CAR, [free(CAR, MASS), *(free_input(known, name) for name in list(truth)[1:])], records[:1],
+                         known)
+    slopes = model.linearised(np.array(list(truth.values())))[1][0]
+    bound = NOISE_MPS2 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    judged(figures, "bump unknown", np.array(errors), np.array(expected), bound)
+    figures.at_most("bump unknown: error of the mass, rms", 100 * rms([one[0] / 875 for one in errors]), 0.5, "%")
+    print(f"   {', '.join(truth)}: bounds {bound.round(5)}; {np.median(times):.2f} s of the processor a fit")
+
+
+def unmeasured(figures: Figures) -> None:
+    """A road that nobody measured: one drive, and two at different speeds."""
+    for title, speeds in (("one drive, no profile", (14.0,)), ("two drives, no profile", (10.0, 18.0))):
+        errors, expected, times, rested = [], [], [], 0
+        for seed in range(ROAD_DRAWS):
+            drives = gaussian_drives(speeds, seed)
+            wanted = [free(CAR, name, 1.15 * value) for name, value in ROAD_TABLE.items()]
+            began = time.process_time()
+            found = fit_roads(AxleResponse(CAR, wanted, RATE_HZ), [drives])
+            times.append(time.process_time() - began)
+            rested += found.converged
+            errors.append([found.parameters[name] / value - 1 for name, value in ROAD_TABLE.items()])
+            expected.append([found.standard_errors[name] / value for name, value in ROAD_TABLE.items()])
+        bound = road_bounds(speeds)
+        judged(figures, title, np.array(errors), np.array(expected), bound)
+        figures.at_least(f"{title}: fits that came to rest", 100 * rested / ROAD_DRAWS, 100.0, "%")
+        print(f"   bounds of {', '.join(ROAD_TABLE)} from {ROAD_M:g} m: {(100 * bound).round(2)} %; "
+              f"{np.median(times):.1f} s of the processor a fit")
+
+
+def judged(figures: Figures, title: str, errors: Array, expected: Array, bound: Array) -> None:
+    """Scatter beside the bound, and how often the truth lies within two standard errors."""
+    over = np.sqrt((errors**2).mean(axis=0)) / bound
+    inside = 100 * float((np.abs(errors) < 2 * expected).mean())
+    figures.at_most(f"{title}: scatter over the bound", float(over.max()), 1.2, "")
+    figures.at_least(f"{title}: within two standard errors", inside, 93.0, "%")
+    print(f"   {len(errors)} draws; each {over.round(2)} times the bound")
+
+
+def gaussian_drives(speeds: tuple[float, ...], seed: int) -> list[Drive]:
+    """Drives over a road whose waves have chance in their heights too, as those of a real road have."""
+    generator = np.random.default_rng(1000 + seed)
+    count = int(4 * (ROAD_M + 200) / SPACING_M)
+    n = np.fft.rfftfreq(count, SPACING_M)
+    power = displacement_psd(np.maximum(n, LOWEST_CPM), GD_N0_CM3) * (n > 0) / (2 * SPACING_M)
+    road = np.fft.irfft(np.fft.rfft(generator.standard_normal(count)) * np.sqrt(power), count)
+    track = Track(SPACING_M, road[: count // 4], -100.0)
+    drives = []
+    for number, speed in enumerate(speeds):
+        distance_m = speed / RATE_HZ * np.arange(int(ROAD_M / speed * RATE_HZ))
+        drives.append(Drive(RATE_HZ, recorded(CAR, track, distance_m, NOISE_MPS2, 10 * seed + number), distance_m))
+    return drives
+
+
+def road_bounds(speeds: tuple[float, ...]) -> Array:
+    """Relative Cramer-Rao bounds of a long road: per wave number the drives' readings are Gaussian, their covariance a
+    small matrix; its derivatives by differences. Level, noise and places of the drives are unknown as well."""
+    n = np.linspace(2e-3, 0.45 * RATE_HZ / min(speeds), 6000)
+
+    def spectra(x: Array) -> npt.NDArray[np.complex128]:
+        values = {name: value * np.exp(part) for (name, value), part in zip(ROAD_TABLE.items(), x, strict=False)}
+        structure = structure_of(changed(CAR, values))
+        level, noise, places = x[2], x[3], [0.0, *x[4:]]
+        gains = [body_acceleration_response(structure, n * speed, speed) * (n * speed < 0.42 * RATE_HZ)
+                 * np.exp(2j * np.pi * n * place) for speed, place in zip(speeds, places, strict=True)]
+        gain = np.stack(gains, axis=-1)
+        road = np.exp(level) * displacement_psd(n, GD_N0_CM3)
+        white = [2 * NOISE_MPS2**2 * np.exp(2 * noise) / RATE_HZ * speed for speed in speeds]
+        return road[:, None, None] * gain[:, :, None] * gain[:, None, :].conj() + np.diag(white)
+
+    at, step = np.zeros(3 + len(speeds)), 1e-4
+    inverse = np.linalg.inv(spectra(at))
+    changes = [inverse @ (spectra(at + part) - spectra(at - part)) / (2 * step) for part in step * np.eye(len(at))]
+    per_wave = np.array([[np.trace(one @ other, axis1=1, axis2=2).real for one in changes] for other in changes])
+    information = ROAD_M * per_wave.sum(axis=-1) * (n[1] - n[0])
+    return np.sqrt(np.diag(np.linalg.inv(information)))[:2]
+
+
+def no_answer_without_a_road(figures: Figures) -> None:
+    """What cannot be told of an input, or without one."""
+    flat = replace(bump_record(CAR), track=Track(1.0, np.zeros(2)))
+    quarter = read_vehicle(vehicle_file("golden-car"))
+    one_wheel = replace(bump_record(quarter), track=Track(1.0, np.zeros(2)))
+    road = RoadInput(bump=Bump(2.0, 0.15, 2.6))
+    inputs = ["bump.width_m", "bump.start_m", "speed_scale"]
+    drives = gaussian_drives((10.0, 18.0), 0)
+    both = [name for name in names(CAR) if name.startswith("both") and not name.endswith("cg_distance_m")]
+    cases = {
+        "width and speed under one wheel": lambda: fitted_input(quarter, one_wheel, road, ["bump.height_m", *inputs]),
+        "speed, axle distances not known": lambda: fitted_input(CAR, flat, road, [*inputs, "both.cg_distance_m"]),
+        "pitch inertia without a profile": lambda: fit_roads(response_of(["pitch_inertia_kg_m2"]), [drives]),
+        "everything without a profile": lambda: fit_roads(response_of([MASS, *both]), [drives]),
+    }
+    for title, attempt in cases.items():
+        try:
+            attempt()
+            words = ""
+        except NotIdentifiable as refusal:
+            words = str(refusal)
+        figures.at_least(f"refused: {title}", float(bool(words)), 1.0, "")
+        print(f"   {words}")
+
+
+def fitted_input(car: Vehicle, record: Record, road: RoadInput, wanted: list[str]) -> Fit:
+    numbers = [free_input(road, name) if is_input(name) else free(car, name) for name in wanted]
+    model = VehicleModel(car, numbers, [record], road)
+    return fit(model, model.measured, Options(noise=[White()]))
+
+
+def response_of(wanted: list[str]) -> AxleResponse:
+    return AxleResponse(CAR, [free(CAR, name) for name in wanted], RATE_HZ)
 
 
 def refused(car: Vehicle, record: Record, wanted: list[str]) -> str:
