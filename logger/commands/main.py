@@ -32,6 +32,7 @@ VERBS = {
     "simulate": "what a vehicle's accelerometer would record on a road",
     "estimate": "IRI and profile of the road from a drive's acceleration, beside what is possible",
     "identify": "vehicle parameters from drives over known roads, each with its standard error",
+    "compare": "model against measurement: the error, where it is, and what kind of thing is missing",
     "study": "a table or figure of the reference dissertation beside its printed values",
     "modes": "natural frequencies, damping ratios and mode shapes of a vibration record",
     "fixed-point": "write the filters as C headers for integer arithmetic",

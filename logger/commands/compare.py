@@ -1,0 +1,102 @@
+"""Compare a vehicle's model with measurements: the error, where it sits, and what kind of thing is missing.
+
+Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
+
+  ridelog compare --vehicle mycar.yaml run1 run2
+  ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
+
+The error is rms(measured - model) / rms(measured), the first 2 s of each run left out. Then the car's numbers and the
+distances are refitted within what they are usually off, and what is left is read: only that is evidence of physics that
+the model lacks. ridelog diagnose says which.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.commands.lab_runs import lab_runs
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.lab.beside import Part
+    from logger.lab.compare import Comparison
+
+_PLACES = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog compare``."""
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
+    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
+                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
+    parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog compare``."""
+    from logger.lab.compare import as_json, compare
+    from logger.shipped import vehicle_path
+    from logger.store.vehicle_file import read_model
+
+    model = read_model(vehicle_path(args.vehicle))
+    runs = lab_runs(args.runs)
+    try:
+        found = compare(runs, model.vehicle, model.effects)
+    except ValueError as error:
+        raise BadInput(f"{args.vehicle}: {error}") from None
+    if args.out is not None:
+        from logger.report.lab_page import page
+
+        args.out.write_text(page(found), "utf-8")
+    if args.json:
+        print(json.dumps(as_json(found), allow_nan=False))
+    else:
+        print("\n".join(_lines(found)))
+        if args.out is not None:
+            print(f"\nPage: {args.out}")
+    return EXIT_DONE
+
+
+def _lines(found: Comparison) -> list[str]:
+    from logger.lab.compare import conclusion, evidence, headline
+
+    beside = found.plain.beside
+    seconds = sum(map(len, beside.left)) / beside.rate_hz
+    return [
+        f"{found.vehicle} on {len(beside.runs)} run{'s' * (len(beside.runs) != 1)}, {seconds:.0f} s", "",
+        *headline(found), "", "After the refit:", *(f"- {one}" for one in evidence(found)), "", conclusion(found), "",
+        *_tables(found),
+    ]
+
+
+def _tables(found: Comparison) -> list[str]:
+    """Where what is left sits, as the model stands and refitted."""
+    from logger.lab.beside import short_names
+    from logger.lab.marks import worst_places
+
+    lines = [f"{'Where':46}{'share of the rest':>13}{'error':>12}", f"{'':44}{'stands':>8}{'refit':>7}{'stands':>8}"
+                                                                    f"{'refit':>8}"]
+    plain, refitted = found.plain.where, found.refitted.where
+    for title, unit, one, other in (
+        ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
+    ):
+        lines += [title, *(_row(a, b, unit) for a, b in zip(one, other, strict=True))]
+    lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
+    names = short_names(found.plain.beside.runs)
+    lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]
+    return lines
+
+
+def _row(plain: Part | None, refitted: Part, unit: str) -> str:
+    name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
+    share, error = (f"{plain.share:.1%}", f"{plain.error:.3f}") if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error:>8.3f}"
+
+
+def _place(part: Part, run: str) -> str:
+    name = f"  {run}, {part.low:g} to {part.high:g} m"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error:>8.3f}"

@@ -1,0 +1,192 @@
+"""The page of a comparison: where a model and measurements differ, in sentences, tables and pictures.
+
+It opens with no network and runs no script; every text is escaped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.beside import Beside, Part, frequencies, segments, short_names
+from logger.lab.compare import Comparison, Standing, conclusion, evidence, headline
+from logger.lab.force_map import Curve
+from logger.lab.marks import Mark, worst_places
+from logger.report.style import STYLE
+from logger.studies.pictures import STYLE as PICTURE_STYLE
+from logger.studies.pictures import picture
+from logger.studies.study import Curves, Line
+
+Array = npt.NDArray[np.float64]
+
+_AROUND_S = 1.5
+_BODY_HZ = 5.0
+_QUIET_DB = -80.0
+_MOST_RUNS = 8
+_WORST = 8
+
+
+def page(found: Comparison) -> str:
+    """The comparison as one HTML document."""
+    beside = found.refitted.beside
+    policy = "default-src 'none'; style-src 'unsafe-inline'"
+    title = escape(f"{found.vehicle}: model against measurement")
+    parts = [
+        f"<h1>{title}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in beside.runs))}</p>',
+        _tiles(found), *(f"<p>{escape(line)}</p>" for line in headline(found)),
+        f"<section><h2>After the refit</h2><ul>{''.join(f'<li>{escape(one)}</li>' for one in evidence(found))}</ul>"
+        f"<p>{escape(conclusion(found))}</p></section>",
+        _worst_place(found.refitted), _spectra(beside), _tables(found), _places(found.refitted),
+        _forces(found), _alignment(found), _marks(found.marks.marks), _numbers(found),
+    ]
+    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+            f'<meta name="viewport" content="width=device-width,initial-scale=1">'
+            f'<meta name="color-scheme" content="light dark"><title>{title}</title>'
+            f"<style>{STYLE}{PICTURE_STYLE}</style></head>\n<body><main>{''.join(parts)}</main></body></html>\n")
+
+
+def _tiles(found: Comparison) -> str:
+    beside = found.plain.beside
+    tiles = [("Error as the model stands", f"{found.plain.error:.3f}", ""),
+             ("Error after the refit", f"{found.refitted.error:.3f}", ""),
+             ("Marks found", f"{len(found.marks.found)}", f"of {len(found.marks.marks)}"),
+             ("Runs", f"{len(beside.runs)}", f"{sum(map(len, beside.left)) / beside.rate_hz:.0f} s")]
+    return '<dl class="tiles">' + "".join(
+        f"<div><dt>{name}</dt><dd>{value} <small>{unit}</small></dd></div>" for name, value, unit in tiles) + "</dl>"
+
+
+# --- pictures ---
+
+
+def _worst_place(standing: Standing) -> str:
+    beside, worst = standing.beside, worst_places(standing.where, 1)[0]
+    index = next(i for i, run in enumerate(beside.runs) if run.name == worst.name)
+    run, left = beside.runs[index], beside.left[index]
+    at_m = run.distance_m[run.first:]
+    inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
+    middle = int(inside[np.abs(left[inside]).argmax()])
+    reach = round(_AROUND_S * beside.rate_hz)
+    part = slice(max(0, middle - reach), middle + reach)
+    time_s = (run.first + np.arange(len(left)))[part] / beside.rate_hz
+    lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
+        ("measured", beside.measured), ("what is left", beside.left), ("model", beside.model)))
+    title = f"{short_names(beside.runs)[run.name]}, around {at_m[middle]:.0f} m"
+    drawn = picture(Curves(title, "time in the run [s]", "acceleration [m/s2]", lines))
+    return f"<section><h2>The worst place</h2>{drawn}</section>"
+
+
+def _spectra(beside: Beside) -> str:
+    f_hz = frequencies(beside)
+    density = [np.mean(np.abs(segments(beside, one)) ** 2, axis=0) / f_hz[1]
+               for one in (beside.measured, beside.left, beside.model)]
+
+    def drawn(title: str, low_hz: float, high_hz: float) -> str:
+        inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
+        return picture(Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
+            Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
+            for name, one in zip(("measured", "what is left", "model"), density, strict=True))))
+
+    return (f"<section><h2>By frequency</h2>{drawn('The body', 0.0, _BODY_HZ)}"
+            f"{drawn('Wheels and above', _BODY_HZ, f_hz[-1])}</section>")
+
+
+def _places(standing: Standing) -> str:
+    lines, names = [], short_names(standing.beside.runs)
+    for run in standing.beside.runs[:_MOST_RUNS]:
+        parts = [part for part in standing.where.place if part.name == run.name]
+        if len(parts) > 1:
+            lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
+                              np.array([part.left_mps2 for part in parts])))
+    along = Curves("What is left along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
+    drawn = picture(along) if lines else ""
+    rows = "".join(f"<tr><td>{escape(names[part.name])}</td><td class=n>{part.low:g} to {part.high:g}</td>"
+                   f"<td class=n>{part.share:.1%}</td><td class=n>{part.left_mps2:.3g}</td>"
+                   f"<td class=n>{part.error:.2f}</td></tr>" for part in worst_places(standing.where, _WORST))
+    return (f'<section><h2>By place</h2>{drawn}<div class="scroll"><table><tr><th>Run</th><th class=n>From, to [m]</th>'
+            "<th class=n>Share of what is left</th><th class=n>Left [m/s2]</th><th class=n>Error</th></tr>"
+            f"{rows}</table></div></section>")
+
+
+def _forces(found: Comparison) -> str:
+    forces = found.marks.forces
+    drawn = "".join(
+        picture(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
+                                                         errors=curve.error_n),), (0.0, "nothing missing")))
+        for title, x_name, curve, factor in (
+            (_titled("By speed of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
+            (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
+    return (f'<section><h2>The missing force</h2>{drawn}<p class="hint">The force in each suspension that would leave '
+            "what is left, with its standard error, beside what a straight spring or damper does. Above 0 it pulls "
+            "body and wheel together; compression is left, extension right. A shape that explains little is not one to "
+            "believe.</p></section>")
+
+
+def _alignment(found: Comparison) -> str:
+    windows, runs = found.marks.alignment, found.plain.beside.runs
+    names = short_names(runs)
+    lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
+             for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
+    if not lines:
+        return ""
+    drawn = picture(Curves("How far the model runs ahead of the measurement", "way into the run [m]", "time [ms]",
+                           tuple(lines), (0.0, "together")))
+    return (f'<section><h2>Alignment</h2>{drawn}<p class="hint">The same everywhere: a clock or a place that is off. '
+            "Growing along the way: a wrong speed. As the model stands, before the refit.</p></section>")
+
+
+# --- tables ---
+
+
+def _tables(found: Comparison) -> str:
+    plain, refitted = found.plain.where, found.refitted.where
+    return (_table("By band", "Hz", plain.frequency, refitted.frequency)
+            + _table("By speed", "m/s", plain.speed, refitted.speed)
+            + _table("By how strongly the road moves the car", "m/s2", plain.amplitude, refitted.amplitude))
+
+
+def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> str:
+    """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
+    same = [part.low for part in plain] == [part.low for part in refitted]
+    stands: list[Part | None] = list(plain) if same else [None] * len(refitted)
+    rows = "".join(
+        f"<tr>{f'<td>{escape(part.name)}</td>' if part.name else ''}<td>{part.low:.3g} to {part.high:.3g}</td>"
+        f'<td class="bar"><span class="f0" style="width:{part.share:.1%}"></span></td><td class=n>{part.share:.1%}</td>'
+        f"<td class=n>{part.error:.3f}</td><td class=n>{f'{one.error:.3f}' if one else ''}</td></tr>"
+        for one, part in zip(stands, refitted, strict=True))
+    first = "<th>Band</th>" if refitted[0].name else ""
+    return (f'<section><h2>{title}</h2><div class="scroll"><table><tr>{first}<th>From, to [{unit}]</th>'
+            "<th>Share of what is left</th><th></th><th class=n>Error</th><th class=n>Before the refit</th></tr>"
+            f"{rows}</table></div></section>")
+
+
+def _marks(marks: Sequence[Mark]) -> str:
+    rows = "".join(
+        f"<tr><td>{escape(mark.name)}</td><td class=n>{mark.value:.3g} {escape(mark.unit if mark.unit != '1' else '')}"
+        f"</td><td class=n>{'' if mark.standard_error is None else f'{mark.standard_error:.2g}'}</td>"
+        f"<td class=n>{_chance(mark.p_value)}</td><td>{'found' if mark.found else ''}</td></tr>" for mark in marks)
+    return ('<section><h2>All marks</h2><div class="scroll"><table><tr><th>Mark</th><th class=n>Value</th>'
+            "<th class=n>Standard error</th><th class=n>Chance in noise</th><th></th></tr>"
+            f'{rows}</table></div><p class="hint">A mark is found when it is improbable in noise and large enough to '
+            "matter.</p></section>")
+
+
+def _numbers(found: Comparison) -> str:
+    rows = "".join(f"<tr><td>{escape(name)}</td><td class=n>{move:+.1%}</td>"
+                   f"<td>{'farther than usual' if name in found.far else ''}</td></tr>"
+                   for name, move in found.moves.items())
+    return ('<section><h2>What the refit moved</h2><div class="scroll"><table><tr><th>Number</th><th class=n>By</th>'
+            f"<th></th></tr>{rows}</table></div></section>")
+
+
+def _titled(title: str, curve: Curve) -> str:
+    return f"{title}: would explain {curve.share:.0%} of what is left"
+
+
+def _chance(p_value: float) -> str:
+    if not np.isfinite(p_value):
+        return "cannot tell"
+    return "below 1e-9" if p_value < 1e-9 else f"{p_value:.2g}"

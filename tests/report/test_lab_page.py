@@ -1,0 +1,65 @@
+"""The page of a comparison: self-contained, escaped, with its pictures whole."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from compared import CAR, beside_with, recorded_by, runs_of
+
+from logger.lab.compare import Comparison, compare, evidence, headline
+from logger.report.lab_page import page
+
+
+@pytest.fixture(scope="module")
+def found() -> Comparison:
+    beside = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": 1.6})], 0.02), lasts_s=14.0)
+    return compare(runs_of(beside), replace(CAR, name="<b>mine</b> & yours"))
+
+
+class _Seen(HTMLParser):
+    """Tags that were opened and closed, attributes, and text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.opened: list[str] = []
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str | None]] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.opened.append(tag)
+        self.attributes += attrs
+        if tag not in ("meta", "path", "rect", "circle"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in ("meta", "path", "rect", "circle"):
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_page_is_whole_and_alone(found: Comparison) -> None:
+    seen = _Seen()
+    seen.feed(page(found))
+    assert not seen.open
+    assert not {"script", "img", "link", "iframe", "b"} & set(seen.opened)
+    assert not [value for name, value in seen.attributes if name in ("src", "href") or "http" in (value or "")]
+    assert "<b>mine</b> & yours" in seen.text
+    for sentence in (*headline(found), *evidence(found)):
+        assert sentence in seen.text
+
+
+def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -> None:
+    html = page(found)
+    assert not re.search(r"\b(nan|inf)\b", html)
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", html)
+    assert len(captions) == 7  # place in time, two spectra, the road, force by rate and by travel, alignment
+    assert any("By speed of the suspensions: would explain" in one for one in captions)
+    assert html.count("<svg") == 7
+    drawn = re.findall(r'<path class="thick[^"]*" d="M([^"]*)"', html)
+    assert drawn and all(len(one.split()) >= 2 for one in drawn)
