@@ -38,7 +38,7 @@ _LEAST_LOG_FACTOR = 0.25
 _GROWN = 1.3
 _MEMORY = 50
 _LEAST_SHIFT_S = 0.003
-_USUAL_DRIFT = 0.003
+_LEAST_DRIFT_M, _MUCH_DRIFT_M = 0.05, 0.3
 _UNKNOWN = float("nan")
 
 
@@ -213,10 +213,12 @@ def _shift(alignment: Alignment, drifting: Mark) -> Mark:
 
 def _drift(alignment: Alignment) -> Mark:
     trend = drift(alignment)
+    in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
     words = "ahead" if trend.value > 0 else "behind"
-    return Mark("drift", trend.value, "m/m", trend.error, trend.p_value, abs(trend.value) > _USUAL_DRIFT, True,
-                f"The model runs {words} by {abs(trend.value) * 100:.1f} m in each 100 m of the way, more than a speed "
-                f"signal is usually off. Whatever else is found may come from that alone.")
+    more = " Whatever else is found may come from that alone." if in_all_m > _MUCH_DRIFT_M else ""
+    return Mark("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > _LEAST_DRIFT_M, True,
+                f"The model runs {words} by {abs(trend.value) * 100:.2g} m in each 100 m of the way, {in_all_m:.2g} m "
+                f"in the longest run: the recorded speed is off by a factor.{more}")
 
 
 def _proportion(beside: Beside) -> Mark:
