@@ -13,13 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import Move, Problem, Slopes, State, Weighed, coordinates_of, improved, moved, moves_of
+from logger.lab.fitting import (
+    Move,
+    Problem,
+    Slopes,
+    State,
+    Weighed,
+    coordinates_of,
+    improved,
+    moved,
+    moves_of,
+    settled,
+)
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 
 Array = npt.NDArray[np.float64]
 
 _STRONGEST, _WEAKEST = 3.0, 0.03
-_FIRST_STEPS, _LAST_STEPS = 5, 5
+_FIRST_STEPS, _LAST_STEPS = 5, 4
 _STARTS = 2
 # A second start is followed too when its trial explains at least this share of what the best one does.
 _SECOND_SHARE = 0.6
@@ -44,7 +55,8 @@ class Base:
 
     @staticmethod
     def of(problem: Problem, state: State, slopes: Slopes) -> Base:
-        """From a state that was fitted."""
+        """From a state that was laid out, and slopes taken near it."""
+        slopes = Slopes(slopes.columns, state.wander)  # so that the state is predicted as it was laid out
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
         return Base(state, slopes, weighed, weighed.residual(state), uncertainty, problem.deviance(state),
@@ -106,19 +118,24 @@ def fitted(problem: Problem, base: Base, promise: Screened, thoroughly: bool) ->
     return max(tries, key=lambda one: one.gain)
 
 
+def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
+    """The same with slopes of its own."""
+    return _tried(problem, base, settled(problem, one.state, rounds)[0])
+
+
 def _fitted(problem: Problem, base: Base, effects: tuple[Chosen, ...], thoroughly: bool) -> Tried:
-    last = len(effects) - 1
-    moves = moves_of(effects, None if thoroughly else [last])
+    moves = moves_of(effects, None if thoroughly else [len(effects) - 1])
     state = problem.predicted(effects, base.state.logs, base.state.wander, base.slopes)
     state = improved(base.weighed, state, moves, _FIRST_STEPS if thoroughly else 1)
     if thoroughly:
-        slopes = base.slopes
-        if not problem.car(effects, state.logs).bends_laws:  # a quick car: it gets slopes of its own
-            state = problem.laid_out(state.effects, state.logs, state.wander)
-            slopes = problem.slopes(state)
-        state = improved(Weighed(problem, slopes, problem.whiteners(state)), state, moves, _LAST_STEPS)
-    numbers = sum(not parameter.choices for parameter in effects[last].effect.parameters)
-    return Tried(effects[last].effect, state, base.fitted - problem.deviance(state),
+        state = improved(Weighed(problem, base.slopes, problem.whiteners(state)), state, moves, _LAST_STEPS)
+    return _tried(problem, base, state)
+
+
+def _tried(problem: Problem, base: Base, state: State) -> Tried:
+    effect = state.effects[-1].effect
+    numbers = sum(not parameter.choices for parameter in effect.parameters)
+    return Tried(effect, state, base.fitted - problem.deviance(state),
                  base.judged - problem.deviance(state, fitted=False), numbers)
 
 

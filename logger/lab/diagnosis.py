@@ -18,7 +18,7 @@ from os import cpu_count
 
 import numpy as np
 
-from logger.lab.candidates import Base, Screened, Tried, fitted, misalignment, screened
+from logger.lab.candidates import Base, Screened, Tried, fitted, misalignment, screened, settled_further
 from logger.lab.fitting import Problem, State, settled
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 
@@ -29,12 +29,14 @@ MOST_EFFECTS = 4
 CHANCE = 0.001
 """How often, at most, noise alone may look like an effect, all candidates together."""
 WORTH = 0.006
-"""The least that an effect has to lower the mean logarithm of the power that is left, on stretches that no fit saw."""
+"""The least that an effect has to lower the mean logarithm of the power that is left."""
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
+HARM = 0.002
+"""What an effect may raise that mean by, on stretches that no fit saw."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE = 6.0
-_MOST_FITTED = 7
+_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 7, 4, 0.1, 4
 _MOST_THREADS = 4
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
@@ -172,7 +174,17 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         for done, found in enumerate(jobs, 1):
             progress(f"fitted {done} of {len(promises)} effects")
             tried.append(found)
-    return sorted(tried, key=lambda one: -(one.whole_gain - 2 * one.numbers))
+        tried.sort(key=_merit)
+        finalists = [one for one in tried[:_MOST_FINALISTS] if one.effect.name in deep
+                     and one.whole_gain > _FINALIST_SHARE * tried[0].whole_gain]
+        progress(f"settling {len(finalists)} of {len(promises)} effects")
+        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
+    return sorted([*further, *(one for one in tried if one not in finalists)], key=_merit)
+
+
+def _merit(one: Tried) -> float:
+    """For sorting, best first: the gain, each number that was fitted counted off."""
+    return 2 * one.numbers - one.whole_gain
 
 
 def _p_value(gain: float, numbers: int, count: int) -> float:
@@ -183,8 +195,12 @@ def _p_value(gain: float, numbers: int, count: int) -> float:
 
 
 def _accepted(problem: Problem, one: Tried, count: int) -> bool:
-    freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, fitted=False))
-    return _p_value(one.gain, one.numbers, count) < CHANCE and one.judged_gain > WORTH * freedom
+    """Whether an effect is there: not by chance, worth naming, and no harm to what no fit saw (which may hold nothing
+    that would show it: a stop that is hit once)."""
+    whole, unseen = (sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, part))
+                     for part in (None, False))
+    return (_p_value(one.gain, one.numbers, count) < CHANCE and one.whole_gain > WORTH * whole
+            and one.judged_gain > -HARM * unseen)
 
 
 def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
@@ -209,7 +225,7 @@ def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
             name = now.state.effects[place].effect.name
             progress(f"is {name} still needed?")
             rest = now.state.effects[:place] + now.state.effects[place + 1:]
-            other = Base.of(problem, *settled(problem, problem.laid_out(rest, now.state.logs, now.state.wander), 2))
+            other = Base.of(problem, *settled(problem, problem.laid_out(rest, now.state.logs, now.state.wander)))
             worth[name] = other.fitted + other.judged - now.fitted - now.judged
             without[name] = other
         least = min(worth, key=lambda name: worth[name])

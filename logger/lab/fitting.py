@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -32,7 +33,7 @@ _LEAST_SHARE = 0.1
 _FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e6
 # A step that gains less than this share of a degree of freedom ends a fit.
 _SMALL_GAIN = 0.05
-_SETTLING_STEPS, _SETTLED = 6, 1.0
+_SETTLING_STEPS, _SETTLED = 5, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +85,14 @@ class Problem:
         """By how much the car was farther than its distance signal said (n,), per run."""
         return [one.basis @ k for one, k in zip(self.wander, wander, strict=True)]
 
-    def laid_out(self, effects: Sequence[Chosen], logs: Array, wander: Sequence[Array]) -> State:
+    def laid_out(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array]) -> State:
         """A state whose predictions are made anew, over the road as the wander has it."""
         predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander))
-        return State(tuple(effects), logs, list(wander), predictions)
+        return State(effects, logs, wander, predictions)
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
         """The nominal car."""
-        return self.laid_out(effects, np.zeros(len(self.nuisance.names)),
+        return self.laid_out(tuple(effects), np.zeros(len(self.nuisance.names)),
                              [np.zeros(one.basis.shape[1]) for one in self.wander])
 
     def residuals(self, state: State) -> list[Array]:
@@ -264,10 +265,14 @@ def effect_slopes(problem: Problem, slopes: Slopes, state: State, moves: Sequenc
     return result
 
 
-def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int) -> State:
-    """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander."""
+def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False) -> State:
+    """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander.
+
+    laid_out    lay the road out anew for every trial, instead of counting the wander to first order
+    """
     problem, damping = weighed.problem, _FIRST_DAMPING
-    state = problem.predicted(state.effects, state.logs, state.wander, weighed.slopes)
+    make = problem.laid_out if laid_out else partial(problem.predicted, slopes=weighed.slopes)
+    state = make(state.effects, state.logs, state.wander)
     now = weighed.objective(state)
     for _ in range(most):
         own = [whitener(columns) for whitener, columns in zip(
@@ -276,7 +281,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int) -
         gained = 0.0
         while damping < _LARGEST_DAMPING:
             damped = information + damping * np.diag(np.diag(information))
-            trial = _stepped(weighed, state, moves, np.asarray(np.linalg.solve(damped, gradient), float))
+            trial = make(*_stepped(weighed, state, moves, np.asarray(np.linalg.solve(damped, gradient), float)))
             there = weighed.objective(trial)
             if there < now:
                 gained, now, state = now - there, there, trial
@@ -301,24 +306,24 @@ def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tupl
     return information + 1e-12 * np.eye(len(information)), np.concatenate([gradient, pulled])
 
 
-def _stepped(weighed: Weighed, state: State, moves: Sequence[Move], step: Array) -> State:
+def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
+             step: Array) -> tuple[tuple[Chosen, ...], Array, list[Array]]:
     logs, wander = weighed.parted(weighed.joined(state) + step[: weighed.count])
     effects = moved(state.effects, moves, coordinates_of(state.effects, moves) + step[weighed.count:])
-    return weighed.problem.predicted(effects, logs, wander, weighed.slopes)
+    return effects, logs, wander
 
 
-def settled(problem: Problem, state: State, rounds: int = 3) -> tuple[State, Slopes]:
+def settled(problem: Problem, state: State, rounds: int = 6) -> tuple[State, Slopes]:
     """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
 
     Returns the state, laid out, and slopes taken near it.
     """
     moves = moves_of(state.effects)
     state = problem.laid_out(state.effects, state.logs, state.wander)
-    last = problem.deviance(state)
-    slopes = problem.slopes(state)
+    last, slopes = problem.deviance(state), problem.slopes(state)
     for done in range(1, rounds + 1):
-        state = improved(Weighed(problem, slopes, problem.whiteners(state)), state, moves, _SETTLING_STEPS)
-        state = problem.laid_out(state.effects, state.logs, state.wander)
+        weighed = Weighed(problem, slopes, problem.whiteners(state))
+        state = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)
         now = problem.deviance(state)
         if now > last - _SETTLED or done == rounds:
             break
