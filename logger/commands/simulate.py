@@ -1,12 +1,17 @@
 """What a vehicle's accelerometer would record on a road: a drive, simulated.
 
   ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
+  ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --effect tire_damping:tire_damping_n_s_per_m=200 \\
+      --effect wheel_lift --out drive.csv
   ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
       --out run/drive.csv --profile-out run/profile.csv
 
 The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires at
 the start of the profile, after a flat road, and is sampled as a recorder does it, behind a filter that is flat up to
 0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run.
+
+Physical effects are those of the vehicle's file, then those of --effect; --list-effects tells what there is. The speed
+asked for is the true one: with speed_scale the drive's own columns say something else.
 """
 
 from __future__ import annotations
@@ -22,6 +27,8 @@ from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.roads.track import Array, Track
+    from logger.vehicle.compose import Car
+    from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
 
@@ -37,13 +44,16 @@ _LARGEST_M = 10_000.0  # of an obstacle
 _NEARLY = 1e-6  # of a step: what rounding may do
 _FEWEST_STEPS = 2  # of the road, that an obstacle spans
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
+_STEPS_MATTER = 0.05  # of a simulation's r.m.s., when its steps are halved
+_NO_MOTION_MPS2 = 1e-6
+_SHORT_M = 0.5  # of a way on which a distorted distance is as good as straight
 OUTPUTS = ("wheels", "travel", "tires", "body")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
+    parser.add_argument("--vehicle", metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
-    road = parser.add_mutually_exclusive_group(required=True)
+    road = parser.add_mutually_exclusive_group()
     road.add_argument("--profile", type=Path, metavar="FILE",
                       help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
                            "both, other cars the left one")
@@ -52,11 +62,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="add one to the road; may repeat. bump (Eq 4.41): start_m, height_m, width_m; step: "
                              "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; "
                              "pothole: start_m, depth_m, length_m[, edge_m]")
-    speed = parser.add_mutually_exclusive_group(required=True)
+    speed = parser.add_mutually_exclusive_group()
     speed.add_argument("--speed", type=float, metavar="MPS", help="the same all the way [m/s]")
     speed.add_argument("--speed-file", type=Path, metavar="FILE",
                        help="CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE",
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME[:PARAM=VALUE,...]",
+                        help="a physical effect, or the path of a Python file with one of your own; may repeat. What "
+                             "is not said is at its usual value; takes the place of the vehicle's own effect of that "
+                             "name")
+    parser.add_argument("--list-effects", action="store_true",
+                        help="print the effects there are, with their parameters, and do nothing else")
+    parser.add_argument("--out", type=Path, metavar="FILE",
                         help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run")
     parser.add_argument("--profile-out", type=Path, metavar="FILE",
                         help="write the road that was driven as well, with its obstacles")
@@ -74,17 +90,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog simulate``."""
+    if args.list_effects:
+        _list_effects(args.json)
+    else:
+        _simulate(args)
+    return EXIT_DONE
+
+
+def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
     from logger.store.drive_file import write_drive, write_profile
 
+    _check_given(args)
     _check_numbers(args)
-    vehicle, structure = _vehicle(args.vehicle)
-    outputs = _outputs(args.output, vehicle, structure)
+    vehicle, effects = _model(args.vehicle, args.effect)
     track = _with_obstacles(_road(args), args.obstacle)
-    motion = _motion(args, track, float(structure.behind_m.max()))
-    responses = _respond(structure, list(outputs.values()), track, motion, args.rate)
-    columns = dict(zip(outputs, responses.T, strict=True))
+    car = _car(vehicle, effects, track)
+    outputs = _outputs(args.output, car.vehicle, car.structure)
+    motion = _motion(args, track, float(car.structure.behind_m.max()))
+    if effects:
+        columns, motion = _respond_with_effects(car, outputs, track, motion, args.rate)
+    else:
+        responses = _respond(car.structure, list(outputs.values()), track, motion, args.rate)
+        columns = dict(zip(outputs, responses.T, strict=True))
     accel = _as_sensed(columns.pop("accel_z_mps2"), args.noise, args.step, args.seed)
     write_drive(args.out, {"t_s": motion.time_s, "accel_z_mps2": accel, "speed_mps": motion.speed_mps,
                            "distance_m": motion.distance_m, **columns})
@@ -97,13 +126,16 @@ def run(args: argparse.Namespace) -> int:
         "speed_mean_mps": float(motion.speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
         "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed, "more_columns": list(columns),
+        "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
     print(json.dumps(made) if args.json else _in_words(made))
-    return EXIT_DONE
 
 
 def _in_words(made: dict[str, Any]) -> str:
     more = f"; also {', '.join(made['more_columns'])}" if made["more_columns"] else ""
+    for one in made["effects"]:
+        more += f"\n  with {one['effect']}"
+        more += "".join(f", {name} {value:g}" for name, value in one["parameters"].items())
     return (f"{made['file']}: {made['vehicle']} ({made['model'].replace('_', ' ')}), {made['duration_s']:.2f} s in "
             f"{made['samples']} samples, {made['distance_start_m']:.2f} to {made['distance_end_m']:.2f} m at "
             f"{made['speed_mean_mps']:.2f} m/s on average, acceleration {made['accel_rms_mps2']:.3f} m/s2 r.m.s., "
@@ -111,6 +143,15 @@ def _in_words(made: dict[str, Any]) -> str:
 
 
 # --- what was asked for ---
+
+
+def _check_given(args: argparse.Namespace) -> None:
+    """What is needed for a drive, though not for a list of effects."""
+    needed = {"--vehicle": args.vehicle, "--profile or --flat": args.profile or args.flat is not None,
+              "--speed or --speed-file": args.speed is not None or args.speed_file, "--out": args.out}
+    missing = [name for name, given in needed.items() if not given]
+    if missing:
+        raise BadInput(f"simulate: expected {', '.join(missing)} as well (try 'ridelog simulate --help')")
 
 
 def _check_numbers(args: argparse.Namespace) -> None:
@@ -136,13 +177,41 @@ def _check_range(name: str, value: float, lowest: float, highest: float, unit: s
         raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}")
 
 
-def _vehicle(name: str) -> tuple[Vehicle, Structure]:
+def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...]]:
+    """The vehicle and its effects, those of its file and those asked for."""
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
-    from logger.vehicle.models import structure_of
+    from logger.store.effect_file import effect_named
+    from logger.store.vehicle_file import read_model
+    from logger.vehicle.compose import with_effect
+    from logger.vehicle.effect import chosen
 
-    vehicle = read_vehicle(vehicle_path(name))
-    return vehicle, structure_of(vehicle)
+    model = read_model(vehicle_path(name))
+    effects, asked = model.effects, set()
+    for text in wanted:
+        effect_name, values = _parameters(text, "--effect")
+        effect, file = effect_named(effect_name)
+        if effect.name in asked:
+            raise BadInput(f"--effect {text}: expected each effect once")
+        asked.add(effect.name)
+        usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
+        try:
+            effects = with_effect(effects, chosen(effect, usual | values, file=file))
+        except ValueError as error:
+            raise BadInput(f"--effect {text}: {error}") from None
+    return model.vehicle, effects
+
+
+def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], track: Track) -> Car:
+    """The vehicle with its effects, which are possible on this road."""
+    from logger.store.effect_file import check_on
+    from logger.vehicle.compose import compose
+
+    for one in effects:
+        check_on(vehicle, one, track.elevation_m.ndim == 2)
+    try:
+        return compose(vehicle, effects)
+    except ValueError as error:
+        raise BadInput(f"{vehicle.name}: {error}") from None
 
 
 def _parameters(text: str, option: str) -> tuple[str, dict[str, float]]:
@@ -166,10 +235,7 @@ def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[
     """Outputs by the names of their columns, the sensor's first."""
     from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 
-    try:
-        found = {"accel_z_mps2": body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)}
-    except ValueError as error:
-        raise BadInput(f"{vehicle.name}: the sensor's place: {error}") from None
+    found = {"accel_z_mps2": body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)}
     each = {"wheels": ("wheel_{}_mps2", wheel), "travel": ("travel_{}_m", suspension_travel),
             "tires": ("tire_{}_m", tire_deflection)}
     for text in wanted:
@@ -305,6 +371,38 @@ def _respond(structure: Structure, outputs: list[Output], track: Track, motion: 
     return drive(structure, outputs, track, time_s, distance_m)[lead:]
 
 
+def _respond_with_effects(
+    car: Car, outputs: dict[str, Output], track: Track, motion: Motion, rate_hz: float
+) -> tuple[dict[str, Array], Motion]:
+    """The columns of a car with effects, and the motion as it is recorded."""
+    import numpy as np
+
+    from logger.vehicle.compose import recorded
+    from logger.vehicle.observe import observed, recorded_distance
+    from logger.vehicle.passage import Passage
+    from logger.vehicle.simulate import FINE_RATE_HZ
+
+    passage = Passage(track, rate_hz, motion.distance_m)
+    more = {name: output for name, output in outputs.items() if name != "accel_z_mps2"}
+    with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is refused below
+        accel = recorded(car, passage)
+        if car.bends_laws:
+            finer = recorded(car, Passage(track, rate_hz, motion.distance_m, 2 * FINE_RATE_HZ))
+            allowed = max(_NO_MOTION_MPS2, _STEPS_MATTER * float(np.sqrt(np.mean(finer**2))))
+            if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
+                raise BadInput(f"{car.vehicle.name}: its effects are too strong for its masses: they would need steps "
+                               f"shorter than {1000 / FINE_RATE_HZ:g} ms")
+    columns = {"accel_z_mps2": accel}
+    if more:
+        columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
+    try:
+        distance_m = recorded_distance(car, motion.distance_m)
+    except ValueError as error:
+        raise BadInput(f"{car.vehicle.name}: {error}") from None
+    stretch = (car.driven(distance_m + _SHORT_M) - car.driven(distance_m - _SHORT_M)) / (2 * _SHORT_M)
+    return columns, Motion(motion.time_s, motion.speed_mps / stretch, distance_m)
+
+
 def _as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int) -> Array:
     """With the sensor's noise, then rounded to its steps."""
     import numpy as np
@@ -312,3 +410,37 @@ def _as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int
     if noise_mps2:
         accel_mps2 = accel_mps2 + noise_mps2 * np.random.default_rng(seed).standard_normal(len(accel_mps2))
     return step_mps2 * np.round(accel_mps2 / step_mps2) if step_mps2 else accel_mps2
+
+
+# --- the effects there are ---
+
+
+def _list_effects(as_json: bool) -> None:
+    from logger.store.effect_file import shipped_effects
+
+    if as_json:
+        print(json.dumps({"effects": [_told(effect) for effect in shipped_effects().values()]}))
+    else:
+        print("\n\n".join(map(_effect_in_words, shipped_effects().values())))
+
+
+def _told(effect: Effect) -> dict[str, Any]:
+    return {"name": effect.name, "title": effect.title, "parameters": list(map(_parameter_told, effect.parameters)),
+            "source": effect.source, "signature": effect.signature, "shown_by": effect.shown_by}
+
+
+def _parameter_told(one: Parameter) -> dict[str, Any]:
+    from math import isinf
+
+    vanishes = "infinity" if one.null is not None and isinf(one.null) else one.null
+    return {"name": one.name, "meaning": one.meaning, "start": one.start, "low": one.low, "high": one.high,
+            "choices": list(one.choices), "default": one.default, "vanishes_at": vanishes}
+
+
+def _effect_in_words(effect: Effect) -> str:
+    lines = [f"{effect.name}: {effect.title}"]
+    for one in effect.parameters:
+        allowed = " or ".join(f"{choice:g}" for choice in one.choices) or f"{one.low:g} to {one.high:g}"
+        lines.append(f"  {one.name}={one.start:g}  ({allowed})  {one.meaning}")
+    return "\n".join([*lines, f"  leaves: {effect.signature}", f"  to see it: {effect.shown_by}",
+                      f"  source: {effect.source}"])

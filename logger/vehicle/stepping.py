@@ -110,8 +110,12 @@ def _mount(laws: CornerLaws, rate: Array, step_s: float) -> tuple[Array, float, 
     What law(v) + k h / 2 v has to be gives v: the trapezoidal rule solved for v.
     """
     known = laws.damper(rate) + 0.5 * laws.mount_n_per_m * step_s * rate
-    low, step = float(known[0]), float((known[-1] - known[0]) / (len(known) - 1))
-    return np.interp(low + step * np.arange(len(known)), known, rate), low, step
+    reach = max(-known[0], known[-1])
+    # The table is even about 0, where most dampers have a corner that must not be cut, and goes on straight.
+    before, after = np.diff(rate)[0] / np.diff(known)[[0, -1]] * [-reach - known[0], reach - known[-1]]
+    at = np.linspace(-reach, reach, _POINTS)
+    own = np.interp(at, [-reach, *known, reach], [rate[0] + before, *rate, rate[-1] + after])
+    return own, float(at[0]), float(2 * reach / (_POINTS - 1))
 
 
 def _pairs(laws: Sequence[Law2]) -> Array:

@@ -16,8 +16,12 @@ from logger.roads.bumps import speed_bump
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import Run, read_run, write_profile
+from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.compose import compose, recorded, respond
+from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
+from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
 
@@ -202,3 +206,146 @@ def test_files_that_will_not_do(folder: Path) -> None:
         folder, "--speed", "20", "--vehicle", "./mine.yaml", "--profile-out", "mine.yaml")
     (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
     assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")
+
+
+# --- effects ---
+
+
+def car_with(**effects: dict[str, float]):
+    some = [chosen(shipped_effects()[name], values) for name, values in effects.items()]
+    return compose(read_vehicle(vehicle_file("rav4-2009")), some)
+
+
+def test_a_drive_of_a_car_with_effects(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(folder, "--speed", "20", "--effect", "dry_friction:friction_force_n=90", "--effect", "wheel_lift",
+                    "--effect", "body_bending:participation=-0.3", "--json")
+    made = json.loads(capsys.readouterr().out)
+    assert made["effects"] == [
+        {"effect": "dry_friction", "parameters": {"friction_force_n": 90.0}},
+        {"effect": "wheel_lift", "parameters": {}},
+        {"effect": "body_bending",
+         "parameters": {"frequency_hz": 22.0, "damping_ratio": 0.04, "participation": -0.3}},
+    ]
+    car = car_with(**{one["effect"]: one["parameters"] for one in made["effects"]})
+    assert run.accel_z_mps2 == pytest.approx(recorded(car, Passage(run.track, 100.0, run.distance_m)), abs=1e-6)
+    simulated(folder, "--speed", "20", "--effect", "wheel_lift")
+    assert capsys.readouterr().out.endswith("\n  with wheel_lift\n")
+
+
+def test_effects_of_the_vehicles_file_and_those_asked_for(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    yaml = vehicle_file("rav4-2009").read_text().replace(
+        "effects: []", "effects: [{name: payload, mass_kg: 50}, {name: tire_damping, tire_damping_n_s_per_m: 99}]")
+    (folder / "car.yaml").write_text(yaml)
+    run = simulated(folder, "--speed", "20", "--json", "--effect", "payload:mass_kg=70",
+                    vehicle=str(folder / "car.yaml"))
+    made = json.loads(capsys.readouterr().out)
+    assert {one["effect"]: one["parameters"] for one in made["effects"]} == {
+        "payload": {"mass_kg": 70.0}, "tire_damping": {"tire_damping_n_s_per_m": 99.0}}
+    car = car_with(payload={"mass_kg": 70.0}, tire_damping={"tire_damping_n_s_per_m": 99.0})
+    assert run.accel_z_mps2 == pytest.approx(recorded(car, Passage(run.track, 100.0, run.distance_m)), abs=1e-6)
+
+
+def test_a_wrong_speed_signal_is_written_and_the_true_speed_driven(folder: Path) -> None:
+    true = simulated(folder, "--speed", "20", "--effect", "sensor_gain:gain=1")
+    wrong = simulated(folder, "--speed", "20", "--effect", "speed_scale:scale=1.03")
+    assert wrong.accel_z_mps2 == pytest.approx(true.accel_z_mps2, abs=1e-9)
+    assert wrong.speed_mps == pytest.approx(20.6)
+    assert wrong.distance_m == pytest.approx(1.03 * true.distance_m)
+    assert true.speed_mps == pytest.approx(20)
+
+
+def test_an_effect_that_does_nothing_leaves_the_drive_as_it_was(folder: Path) -> None:
+    plain = simulated(folder, "--speed", "20")
+    same = simulated(folder, "--speed", "20", "--effect", "dry_friction:friction_force_n=0")
+    assert same.accel_z_mps2 == pytest.approx(plain.accel_z_mps2, abs=2e-3 * np.std(plain.accel_z_mps2))
+    assert np.array_equal(same.distance_m, plain.distance_m)
+
+
+def columns(folder: Path) -> dict[str, np.ndarray]:
+    names = (folder / "drive.csv").read_text().split("\n", 1)[0].split(",")
+    return dict(zip(names, np.loadtxt(folder / "drive.csv", delimiter=",", skiprows=1).T, strict=True))
+
+
+def test_further_columns_of_a_car_with_effects(folder: Path) -> None:
+    outputs = ("--output", "wheels", "--output", "travel", "--output", "tires", "--output", "body:ahead_m=1.47")
+    simulated(folder, "--speed", "20", *outputs)
+    plain = columns(folder)
+    simulated(folder, "--speed", "20", *outputs, "--effect", "bump_stop:clearance_m=0.3")
+    for name, column in columns(folder).items():
+        assert column == pytest.approx(plain[name], abs=3e-3 * np.abs(plain[name]).max()), name
+    run = simulated(folder, "--speed", "20", *outputs, "--effect", "progressive_spring:cubic_stiffness_n_per_m3=3e7",
+                    "--effect", "sensor_gain:gain=1.1")
+    found = columns(folder)
+    did = respond(car_with(progressive_spring={"cubic_stiffness_n_per_m3": 3e7}),
+                  Passage(run.track, 100.0, run.distance_m))
+    assert found["accel_z_mps2"] == pytest.approx(1.1 * did.accel_z_mps2, abs=1e-6)
+    assert found["travel_rear_m"] == pytest.approx(did.travel_m[:, 1], abs=0.01 * np.abs(did.travel_m).max())
+    assert np.corrcoef(found["tire_front_m"], did.deflection_m[:, 0])[0, 1] > 0.98
+
+
+def test_a_half_car_that_rolls_has_four_wheels(folder: Path) -> None:
+    left, right = (iso8608.generate(256, 60, 0.05, seed) for seed in (3, 4))
+    write_profile(folder / "profile.csv", Track(0.05, np.stack([left, right], axis=1)))
+    simulated(folder, "--speed", "20", "--effect", "roll", "--output", "tires")
+    found = columns(folder)
+    assert np.std(found["tire_front_left_m"] - found["tire_front_right_m"]) > 1e-4
+
+
+def test_an_effect_of_ones_own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As docs/own-effect.md has it, on the command line and in the vehicle's file."""
+    page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
+    (folder / "quadratic_damping.py").write_text(page.split("```python\n")[1].split("```")[0])
+    monkeypatch.chdir(folder)
+    command = page.split("    ridelog simulate ")[1].split("drive.csv")[0].replace("\\\n", " ").split()
+    assert main(["simulate", *command, "asked.csv"]) == 0
+    yaml = vehicle_file("rav4-2009").read_text().replace("effects: []", page.split("```yaml\n")[1].split("```")[0])
+    (folder / "car.yaml").write_text(yaml)
+    own = command.index("--effect")
+    in_file = ["--vehicle", "./car.yaml", *command[2:own], *command[own + 2 :]]
+    assert main(["simulate", *in_file, "of_file.csv"]) == 0
+    assert (folder / "asked.csv").read_bytes() == (folder / "of_file.csv").read_bytes()
+    without = [*command[:own], *command[own + 2 :]]
+    assert main(["simulate", *without, "without.csv"]) == 0
+    assert (folder / "asked.csv").read_bytes() != (folder / "without.csv").read_bytes()
+
+
+@pytest.mark.parametrize(("effect", "complaint"), [
+    ("friction", "no effect 'friction': expected one of body_bending, bump_stop"),
+    ("dry_friction:force=3", "--effect dry_friction:force=3: dry_friction has no parameter 'force'; expected friction"),
+    ("dry_friction:friction_force_n=-3", "--effect dry_friction:friction_force_n=-3: dry_friction: expected friction_"),
+    ("dry_friction:friction_force_n", "--effect dry_friction:friction_force_n: expected PARAM=NUMBER, found 'friction"),
+    ("roll", "roll: the profile has one track; it needs elevation_right_m"),
+    ("mine.py:x=3", "mine.py: expected a readable file (No such file or directory)"),
+])
+def test_effects_that_will_not_do(folder: Path, effect: str, complaint: str) -> None:
+    assert refusal(folder, "--speed", "20", "--effect", effect).startswith(complaint)
+
+
+def test_an_effect_twice_is_refused(folder: Path) -> None:
+    assert refusal(folder, "--speed", "20", "--effect", "wheel_lift", "--effect", "wheel_lift") == (
+        "--effect wheel_lift: expected each effect once")
+
+
+def test_what_a_step_of_a_thousandth_cannot_follow_is_refused(folder: Path) -> None:
+    (folder / "car.yaml").write_text(
+        "name: feather\nmodel: quarter_car\nsprung_mass_kg: 5\ncontact_patch_m: 0.25\nfront: {unsprung_mass_kg: 0.02, "
+        "suspension_stiffness_n_per_m: 300, suspension_damping_n_s_per_m: 30, tire_stiffness_n_per_m: 3000}\n")
+    with pytest.raises(BadInput, match="feather: its effects are too strong for its masses"):
+        simulated(folder, "--speed", "20", "--effect", "tire_damping:tire_damping_n_s_per_m=3000",
+                  vehicle=str(folder / "car.yaml"))
+
+
+def test_the_effects_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--list-effects", "--json"]) == 0
+    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["effects"]}
+    assert list(told) == sorted(shipped_effects())
+    assert told["top_mount_compliance"]["parameters"][0]["vanishes_at"] == "infinity"
+    assert told["sensor_bandwidth"]["parameters"][1]["choices"] == [1.0, 2.0]
+    assert main(["simulate", "--list-effects"]) == 0
+    words = capsys.readouterr().out
+    assert "dry_friction: Coulomb friction in each suspension\n  friction_force_n=60  (0 to 2000)  of each" in words
+
+
+def test_what_a_drive_needs_is_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"expected --profile or --flat, --out as well"):
+        main(["simulate", "--vehicle", "rav4-2009", "--speed", "3"])

@@ -1,0 +1,266 @@
+"""Laws that every file in ``effects/`` keeps: a newcomer is tried by them at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from logger.roads import iso8608
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.effect_file import shipped_effects
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.compose import compose, recorded
+from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Scale, chosen
+from logger.vehicle.laws import CornerLaws, linear
+from logger.vehicle.own_effect import look_through, try_out
+from logger.vehicle.passage import Passage
+from logger.vehicle.vehicle import Vehicle
+
+EFFECTS = shipped_effects()
+UNITS = ("_m", "_kg", "_hz", "_s", "_n", "_n_per_m", "_n_per_m3", "_n_s_per_m", "_m_per_s", "_kg_m2")
+BARE = ("ratio", "gain", "scale", "order", "participation")  # without a unit
+HALF = read_vehicle(vehicle_file("rav4-2009"))
+QUARTER = Vehicle("one", "quarter_car", 430.0, None, replace(HALF.front, cg_distance_m=0.0), None, 0.25)
+CARS = {"quarter": QUARTER, "half": HALF, "full": read_vehicle(vehicle_file("rav4-2009-full"))}
+LEFT, RIGHT = (iso8608.generate(256, 60, 0.05, seed) for seed in (3, 4))
+ROAD = Track(0.05, np.stack([LEFT, RIGHT], axis=1))
+DISTANCE_M = 2.0 + 15.0 * np.arange(250) / 100
+HUGE = 1e13
+
+
+def usual(effect: Effect, **values: float) -> Chosen:
+    """With what is not given at its start, or at its default."""
+    start = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
+    return Chosen(effect, start | values)
+
+
+def record(car: Vehicle, *effects: Chosen) -> np.ndarray:
+    made = compose(car, effects)
+    return recorded(made, Passage(ROAD, 100.0, made.driven(DISTANCE_M)))
+
+
+def can(effect: Effect, car: Vehicle) -> bool:
+    return effect.obstacle(car, two_tracks=True) is None
+
+
+WHERE = [(name, model) for name, model in product(EFFECTS, CARS) if can(EFFECTS[name], CARS[model])]
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_it_says_what_it_is(name: str) -> None:
+    effect = look_through(EFFECTS[name])
+    assert len(effect.signature.split()) >= 6
+    assert len(effect.shown_by.split()) >= 5
+    assert len(effect.source.split()) >= 4
+    for one in effect.parameters:
+        assert one.name.endswith(UNITS) or one.name.split("_")[-1] in BARE
+        assert one.null is None or one.low <= one.null <= one.high or one.null == np.inf
+        assert one.null != np.inf or one.scale is Scale.RECIPROCAL
+        assert one.start != one.null
+        assert one.null not in one.trials
+    for values in effect.trials():
+        assert effect.checked(values) == values
+    assert not effect.parameters or any(one.null is not None for one in effect.parameters) or name in (
+        "roll", "tire_enveloping")  # which are never gone: a switch, and a number that the car itself has
+
+
+def test_those_of_the_format_are_there() -> None:
+    assert len(EFFECTS) == 20
+    parameters = {name: [one.name for one in effect.parameters] for name, effect in EFFECTS.items()}
+    assert parameters["wheel_lift"] == []
+    assert parameters["dry_friction"] == ["friction_force_n"]
+    assert parameters["body_bending"] == ["frequency_hz", "damping_ratio", "participation"]
+    assert parameters["sensor_bandwidth"] == ["cutoff_hz", "order"]
+
+
+@pytest.mark.parametrize(("name", "model"), WHERE)
+def test_at_its_null_it_is_absent(name: str, model: str) -> None:
+    effect, plain = EFFECTS[name], record(CARS[model])
+    for one in effect.parameters:
+        if one.null is not None:
+            null = HUGE if one.null == np.inf else one.null
+            assert record(CARS[model], usual(effect, **{one.name: null})) == pytest.approx(plain, abs=1e-6)
+
+
+def test_a_contact_patch_as_it_was_changes_nothing() -> None:
+    same = usual(EFFECTS["tire_enveloping"], contact_patch_m=HALF.contact_patch_m)
+    assert np.array_equal(record(HALF, same), record(HALF))
+
+
+@pytest.mark.parametrize(("name", "model"), WHERE)
+def test_it_is_finite_over_its_bounds_and_there(name: str, model: str) -> None:
+    effect, plain = EFFECTS[name], record(CARS[model])
+    corners = product(*({one.low, one.start, one.high} if not one.choices else one.choices
+                        for one in effect.parameters))
+    for values in corners:
+        found = record(CARS[model], chosen(effect, dict(zip([one.name for one in effect.parameters], values,
+                                                            strict=True))))
+        assert np.isfinite(found).all()
+        assert np.abs(found).max() < 1e4
+    strong = {"wheel_lift": None, "bump_stop": {"clearance_m": 0.001}, "tire_enveloping": {"contact_patch_m": 0.5}}.get(
+        name, {})
+    if strong is not None and not (name == "roll" and model != "half"):
+        assert np.abs(record(CARS[model], usual(effect, **strong)) - plain).max() > 1e-4
+
+
+def test_it_says_where_it_cannot_be() -> None:
+    refused = {(name, model) for name, model in product(EFFECTS, CARS) if not can(EFFECTS[name], CARS[model])}
+    assert refused == {("cg_shift", "quarter"), ("sensor_offset", "quarter"), ("roll", "quarter"), ("roll", "full")}
+    assert "elevation_right_m" in str(EFFECTS["roll"].obstacle(HALF, two_tracks=False))
+
+
+FORCES = [name for name, effect in EFFECTS.items() if isinstance(effect, ForceEffect)]
+
+
+def work_n_m(laws: CornerLaws, amplitude_m: float, omega: float) -> tuple[float, float]:
+    """What suspension and tire take in over one closed round of each, beyond their linear springs [N m]."""
+    phase = np.linspace(0, 2 * np.pi, 20_001)
+    x, v = amplitude_m * np.sin(phase), amplitude_m * omega * np.cos(phase)
+    force = laws.damper(v) + laws.dry_friction_n * np.sign(v)
+    force = force + sum(law(x) for law in laws.springs) + sum(law(x, v) for law in laws.others)
+    tire = laws.tire_damping_n_s_per_m * v + sum((law(x) for law in laws.tires), np.zeros_like(x))
+    return float(np.trapezoid(force, x)), float(np.trapezoid(tire, x))
+
+
+@pytest.mark.parametrize("name", FORCES)
+@given(st.floats(1e-3, 0.1), st.floats(1.0, 100.0), st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=25)
+def test_no_force_gives_energy_over_a_closed_round(name: str, amplitude_m: float, omega: float, random) -> None:
+    effect = EFFECTS[name]
+    values = {one.name: one.value(random.uniform(*sorted(map(one.coordinate, (one.low, one.high)))))
+              for one in effect.parameters}
+    laws = effect.laws(chosen(effect, values).p, linear(1500.0))
+    suspension, tire = work_n_m(laws, amplitude_m, omega)
+    scale = amplitude_m * (1500.0 * amplitude_m * omega + sum(np.abs(law(np.array([amplitude_m, -amplitude_m]))).max()
+                                                              for law in laws.springs))
+    assert suspension >= -1e-6 * scale
+    assert tire >= -1e-6 * scale
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_a_car_that_is_let_be_never_shakes_more(name: str) -> None:
+    """After the last wave the motion dies away, or, where friction locks a suspension, goes on upon the tires."""
+    bump = Track(0.05, np.concatenate([0.05 * np.sin(np.linspace(0, np.pi, 40)), np.zeros(2000)]))
+    for model, car in CARS.items():
+        for value in {one.high for one in EFFECTS[name].parameters[:1]} or {0.0}:
+            values = {EFFECTS[name].parameters[0].name: value} if EFFECTS[name].parameters else {}
+            made = compose(car, [usual(EFFECTS[name], **values)])
+            found = recorded(made, Passage(bump, 100.0, 10.0 * np.arange(1000) / 100))
+            share = np.abs(found[-100:]).max() / np.abs(found[150:350]).max()
+            assert share < (1.001 if name == "dry_friction" else 0.1), (model, value)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_it_answers_in_the_shape_it_is_asked(name: str) -> None:
+    for car in CARS.values():
+        if can(EFFECTS[name], car):
+            try_out(EFFECTS[name], usual(EFFECTS[name]).p, car)
+
+
+def test_the_order_in_which_effects_are_named_does_not_matter() -> None:
+    everything = [usual(effect) for effect in EFFECTS.values()]
+    expected = record(HALF, *everything)
+    for seed in range(3):
+        shuffled = np.random.default_rng(seed).permutation(len(everything))
+        assert np.array_equal(record(HALF, *(everything[i] for i in shuffled)), expected)
+    dampers = [usual(EFFECTS[name]) for name in ("damper_asymmetry", "damper_blow_off", "top_mount_compliance")]
+    first, *others = [record(HALF, *some) for some in permutations(dampers)]
+    assert all(np.array_equal(other, first) for other in others)
+
+
+def test_nothing_is_changed_in_place() -> None:
+    before = record(HALF)
+    for effect in EFFECTS.values():
+        record(HALF, usual(effect))
+        structure = compose(HALF).structure
+        if isinstance(effect, BodyEffect):
+            copy = structure.stiffness.copy()
+            effect.structure(usual(effect).p, structure)
+            assert np.array_equal(structure.stiffness, copy)
+    assert np.array_equal(record(HALF), before)
+
+
+# --- what single effects do, from the words of the format ---
+
+
+def test_an_asymmetric_damper_keeps_its_mean_and_a_digressive_one_its_slope_before_the_knee() -> None:
+    asymmetry = EFFECTS["damper_asymmetry"].laws(usual(EFFECTS["damper_asymmetry"], rebound_to_bump_ratio=3.0).p,
+                                                 linear(1000.0))
+    up, down = asymmetry.damper(np.array([0.2, -0.2]))
+    assert (up, down) == pytest.approx((300.0, -100.0))
+    values = {"knee_velocity_m_per_s": 0.1, "slope_ratio": 0.25}
+    digressive = EFFECTS["damper_blow_off"].laws(usual(EFFECTS["damper_blow_off"], **values).p, linear(1000.0))
+    assert digressive.damper(np.array([0.05, -0.1, 0.3, -0.3])) == pytest.approx([50, -100, 150, -150])
+
+
+def test_a_shift_of_the_centre_of_gravity_leaves_axles_and_sensor_where_they_are() -> None:
+    away = replace(HALF, sensor=replace(HALF.sensor, ahead_m=0.2))
+    made = compose(away, [usual(EFFECTS["cg_shift"], shift_m=0.1)]).vehicle
+    assert made.rear is not None
+    assert (made.front.cg_distance_m, made.rear.cg_distance_m) == pytest.approx((1.37, 1.57))
+    assert made.sensor.ahead_m == pytest.approx(0.1)
+    both = compose(away, [usual(EFFECTS["cg_shift"], shift_m=0.1), usual(EFFECTS["sensor_offset"], offset_m=0.4)])
+    assert both.vehicle.sensor.ahead_m == 0.4
+
+
+def test_an_occupant_takes_the_frequency_it_is_given() -> None:
+    made = compose(QUARTER, [usual(EFFECTS["occupant"], mass_kg=70, frequency_hz=5.0, damping_ratio=0.2)]).structure
+    k, c = made.stiffness[-1, -1], made.damping[-1, -1]
+    assert np.sqrt(k / 70) / (2 * np.pi) == pytest.approx(5.0)
+    assert c / (2 * np.sqrt(k * 70)) == pytest.approx(0.2)
+    assert made.mass.diagonal() == pytest.approx([430, 55, 70])
+
+
+def test_a_body_that_bends_does_as_its_equation_says() -> None:
+    """e'' + 2 z w e' + w^2 e = p F / m, the sensor reading the body's acceleration plus e''."""
+    p = {"frequency_hz": 20.0, "damping_ratio": 0.05, "participation": 0.6}
+    structure = compose(QUARTER, [usual(EFFECTS["body_bending"], **p)]).structure
+    s = 2j * np.pi * 15.0
+    z, u, e = np.linalg.solve(structure.mass * s * s + structure.damping * s + structure.stiffness,
+                              structure.road[:, 0])
+    axle = QUARTER.front
+    force = -(axle.suspension_stiffness_n_per_m + axle.suspension_damping_n_s_per_m * s) * (z + 0.6 * e - u)
+    omega = 2 * np.pi * 20.0
+    assert 430 * s * s * z == pytest.approx(force)
+    assert (s * s + 2 * 0.05 * omega * s + omega**2) * e == pytest.approx(0.6 * force / 430)
+    assert structure.body[:, 0] == pytest.approx([1, 0, 1])
+
+
+def test_a_late_clock_and_a_gain_shift_and_stretch_the_record() -> None:
+    plain = record(HALF)
+    late = record(HALF, usual(EFFECTS["time_offset"], delay_s=0.03))
+    assert late[20:] == pytest.approx(plain[17:-3], abs=1e-9)
+    assert record(HALF, usual(EFFECTS["sensor_gain"], gain=1.07)) == pytest.approx(1.07 * plain, abs=1e-12)
+
+
+def test_a_recorded_distance_is_longer_than_the_way_by_the_scale() -> None:
+    car = compose(HALF, [usual(EFFECTS["speed_scale"], scale=1.02)])
+    assert car.driven(np.array([102.0])) == pytest.approx([100.0])
+
+
+def test_a_half_car_that_rolls_is_two_halves_with_equal_tracks() -> None:
+    made = usual(EFFECTS["roll"])
+    level = Track(0.05, np.stack([LEFT, LEFT], axis=1))
+    full, half = compose(HALF, [made]), compose(HALF)
+    passage = Passage(level, 100.0, DISTANCE_M)
+    assert recorded(full, passage) == pytest.approx(recorded(half, passage), abs=1e-9)
+
+
+# --- the table for people ---
+
+
+def table() -> str:
+    rows = [f"| `{effect.name}` | {effect.title} | "
+            f"{', '.join(f'`{one.name}`' for one in effect.parameters) or 'none'} |" for effect in EFFECTS.values()]
+    return "\n".join(["| effect | what it is | parameters |", "| --- | --- | --- |", *rows])
+
+
+def test_the_table_in_the_readme_is_that_of_the_catalogue() -> None:
+    assert table() in (Path(__file__).parents[2] / "README.md").read_text("utf-8")
