@@ -188,7 +188,7 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...]]:
     model = read_model(vehicle_path(name))
     effects, asked = model.effects, set()
     for text in wanted:
-        effect_name, values = _parameters(text, "--effect")
+        effect_name, values = named_numbers(text, "--effect")
         effect, file = effect_named(effect_name)
         if effect.name in asked:
             raise BadInput(f"--effect {text}: expected each effect once")
@@ -214,7 +214,7 @@ def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], track: Track) -> Car:
         raise BadInput(f"{vehicle.name}: {error}") from None
 
 
-def _parameters(text: str, option: str) -> tuple[str, dict[str, float]]:
+def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
     """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
     from math import isfinite
 
@@ -239,7 +239,7 @@ def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[
     each = {"wheels": ("wheel_{}_mps2", wheel), "travel": ("travel_{}_m", suspension_travel),
             "tires": ("tire_{}_m", tire_deflection)}
     for text in wanted:
-        name, place = _parameters(text, "--output")
+        name, place = named_numbers(text, "--output")
         if name in each and not place:
             column, output = each[name]
             found |= {column.format(side): output(structure, index)
@@ -286,7 +286,7 @@ def _with_obstacles(track: Track, wanted: list[str]) -> Track:
     dense = np.stack([np.interp(number, np.arange(len(column)), column) for column in columns], axis=1)
     distance = track.start_m + track.spacing_m * number
     for text in wanted:
-        name, parameters = _parameters(text, "--obstacle")
+        name, parameters = named_numbers(text, "--obstacle")
         if name not in OBSTACLES:
             raise BadInput(f"--obstacle {text}: expected one of {', '.join(OBSTACLES)}")
         known = list(inspect.signature(OBSTACLES[name]).parameters.values())[1:]
