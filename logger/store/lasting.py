@@ -114,9 +114,13 @@ class LastingLog:
         self._held = why
 
     def tend(self) -> None:
-        """To be called now and then: tries again when it is time."""
-        if self.trouble and not self._held and self._now_us() >= self._retry_us:
+        """To be called now and then: tries again when it is time. What an outage has left is finished bit by bit."""
+        if self._held or self._now_us() < self._retry_us:
+            return
+        if self.trouble:
             self._go_on()
+        elif self._log is not None and self._log.is_behind:
+            self._catch_up(self._log)
 
     def close(self) -> None:
         """Finish the file, after one more try where the disk had refused."""
@@ -155,6 +159,13 @@ class LastingLog:
             self.trouble = ""
             self._wait_us = FIRST_WAIT_US
         self._let_go_of_what_is_safe()
+
+    def _catch_up(self, segment_log: SegmentLog) -> None:
+        try:
+            segment_log.finish_left()
+        except OSError as error:
+            log.warning("a file that was left open cannot be finished yet: %s", disk_words(error))
+            self._retry_us = self._now_us() + LONGEST_WAIT_US
 
     def _fail(self, why: str) -> None:
         now_us = self._now_us()

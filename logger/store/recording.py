@@ -45,7 +45,8 @@ class Recording:
         self._files = files
         self._writer: DumpWriter | None = None
         self._path = directory
-        self._number = 0
+        self._number = 1
+        self._holds_events = False
         self._held = ""
         self._retry_us = 0
         self.trouble = ""
@@ -58,6 +59,7 @@ class Recording:
     def flush(self) -> None:
         """Wait until everything so far is on the disk."""
         self._try(lambda writer: writer.flush(sync=True))
+        self._holds_events = self._writer is not None
 
     def hold(self, why: str) -> None:
         """Record nothing more until told an empty ``why``: there is no room that may be used."""
@@ -73,20 +75,22 @@ class Recording:
         session = self._session()
         if self._writer is not None or self._held or session is None or self._now_us() < self._retry_us:
             return
-        self._number += 1
         suffix = "" if self._number == 1 else f"-{self._number:03d}"
         self._path = self._directory / f"{session:05d}{suffix}{ENDING}.part"
+        self._holds_events = False
         try:
             self._writer = DumpWriter(self._path, self._header, self._files)
             self.trouble = ""
         except OSError as error:
             self._fail(error)
+            self._leave()
 
     def close(self) -> None:
         """End the file."""
         self._try(DumpWriter.close)
         if self._writer is not None:
             self._writer = None
+            self._number += 1
             try:
                 _finish(self._files, self._path)
             except OSError as error:
@@ -101,6 +105,19 @@ class Recording:
             self._writer.abandon()
             self._writer = None
             self._fail(error)
+            self._leave()
+
+    def _leave(self) -> None:
+        """The next file gets another name. One without events goes: a disk that refuses for a day would leave a file
+        for each minute of it."""
+        if not self._holds_events:
+            try:
+                self._files.remove(self._path)
+            except OSError:
+                pass
+            else:
+                return
+        self._number += 1
 
     def _fail(self, error: OSError) -> None:
         why = disk_words(error)

@@ -30,7 +30,8 @@ from __future__ import annotations
 import json
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -118,7 +119,7 @@ class SegmentLog:
     ``path`` is the open part; ``rows_on_disk`` counts the rows that were synced, in all parts. Raises ``OSError`` for
     what the disk refuses, ``FileExistsError`` also when files of this session are there already. After an ``OSError``
     the open part is not to be trusted beyond its synced rows: ``go_on`` begins another, in which the rows that were
-    not synced have to be written again.
+    not synced have to be written again, and ``finish_left`` finishes the one that was left.
     """
 
     path: Path
@@ -136,6 +137,7 @@ class SegmentLog:
         self._stored_clock: ClockMap | None = None
         self._without_utc: list[tuple[Path, Tally]] = []
         self._left: list[Path] = []
+        self._is_retry = False  # the part was opened by ``go_on``, and nothing in it has been synced yet
         self._part = 0
         self._descriptor: int | None = None
         self._dirty = False
@@ -158,7 +160,7 @@ class SegmentLog:
         """Wait until all rows are on the disk."""
         if self._dirty:
             self._do(self._files.sync)
-            self._dirty = False
+            self._dirty = self._is_retry = False
             self.rows_on_disk += self._tally.rows - self._rows_synced
             self._rows_synced = self._tally.rows
 
@@ -177,25 +179,45 @@ class SegmentLog:
         self._fill_earlier()
 
     def go_on(self, unsynced: Iterable[WindowRecord]) -> None:
-        """After an ``OSError``: leave the part as it stands, open the next, put the rows there that were not synced,
-        and finish what was left as far as the disk lets us (else ``repair`` does it). Raises ``OSError``: not yet."""
+        """After an ``OSError``: leave the part as it stands, open the next, and put the rows there that were not
+        synced. A part that was opened here and has taken no row is begun anew: a disk that refuses for a day leaves
+        no more files than one that refuses once. Raises ``OSError``: not yet."""
         self._let_go()
+        if self._is_retry:
+            self._part -= 1
+        self._is_retry = True
         self._open_next()
         for record in unsynced:
             self.append(record)
         self.sync()
-        with suppress(OSError):
-            while self._left:
-                part = self._left[0]
-                finished = _repair_part(self._files, part).finished if part.exists() else _finished_path(part)
-                if finished is not None and finished.exists():
-                    self._without_utc.append((finished, take_tally(finished)))
-                self._left.pop(0)
+
+    @property
+    def is_behind(self) -> bool:
+        """True while there is something for ``finish_left`` to do."""
+        return bool(self._left or (self._without_utc and self._clock is not None))
+
+    def finish_left(self) -> None:
+        """Finish one of the parts that were left. Raises ``OSError``: not yet; else ``repair`` does it one day."""
+        if self._left:
+            part = self._left[0]
+            finished: Path | None = _finished_path(part)
+            if part.exists():
+                limit = _limits(path for path in part.parent.glob(f"{self.session:05d}-*.csv*")
+                                if LogName.of(path))[part]
+                finished = _repair_part(self._files, part, limit, self._clock).finished
+            if finished is not None and finished.exists():
+                self._without_utc.append((finished, take_tally(finished)))
+            self._left.pop(0)
+        self._fill_earlier()
 
     def close(self) -> None:
-        """Finish the last part, or remove it when it has no rows. Closing twice does nothing."""
+        """Finish the last part, or remove it when it has no rows, and what was left as far as the disk lets us.
+        Closing twice does nothing."""
         if self._descriptor is None:
             return
+        with suppress(OSError):
+            while self.is_behind:
+                self.finish_left()
         if self._tally.rows:
             self._finish()
         else:
@@ -206,7 +228,7 @@ class SegmentLog:
         self._part += 1
         self.path = self._directory / f"{self.session:05d}-{self._part:03d}.csv.part"
         for taken in (self.path, _finished_path(self.path)):
-            if taken.exists():
+            if taken.exists() and not self._is_retry:
                 raise FileExistsError(f"{taken}: this session has been logged before")
         self._tally = Tally()
         self._bytes = 0
@@ -229,7 +251,7 @@ class SegmentLog:
             self._without_utc.pop(0)
 
     def _let_go(self) -> None:
-        if self.path not in self._left:
+        if not self._is_retry and self.path not in self._left:
             self._left.append(self.path)
         with suppress(OSError):
             self._close_file()
@@ -279,12 +301,11 @@ def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
     for path in list(directory.iterdir()):
         if _OWN_TEMPORARY.fullmatch(path.name):
             files.remove(path)
-    done = []
-    for part in sorted(path for path in directory.glob("*.csv.part") if LogName.of(path)):
-        try:
-            done.append(_repair_part(files, part))
-        except OSError as error:
-            done.append(Repaired(part, None, Tally(), str(error)))
+    sessions: dict[int, list[Path]] = defaultdict(list)
+    for path in directory.iterdir():
+        if name := LogName.of(path):
+            sessions[name.session].append(path)
+    done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs)]
     for sidecar in directory.glob("*.json"):
         log = sidecar.with_suffix(".csv")
         if LogName.of(log) and not log.exists() and not _open_path(log).exists() and _is_of_open_part(sidecar):
@@ -313,38 +334,67 @@ def read_sidecar(log: Path) -> dict[str, Any] | None:
     return found
 
 
-def _repair_part(files: FileSystem, part: Path) -> Repaired:
-    limit = _first_segment_after(part)
+def _repair_session(files: FileSystem, logs: Sequence[Path]) -> list[Repaired]:
+    """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
+    which knows one; finished files get it first, for it is lost with the last part."""
+    parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
+    clocks = [clock for part in parts if (clock := _clock_of(_sidecar_or_nothing(part))) is not None]
+    clock = clocks[-1] if clocks else None
+    try:
+        for finished in sorted(set(logs).difference(parts)):
+            if clock is not None and _may_lack_utc(finished):
+                _fill_finished(files, finished, take_tally(finished), clock)
+    except OSError as error:
+        return [Repaired(part, None, Tally(), str(error)) for part in parts]
+    limits = _limits(logs) if parts else {}
+    done = []
+    for part in parts:
+        try:
+            done.append(_repair_part(files, part, limits[part], clock))
+        except OSError as error:
+            done.append(Repaired(part, None, Tally(), str(error)))
+    return done
+
+
+def _repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None) -> Repaired:
+    """Finish one part, but for its rows of segments from ``limit`` on."""
     tally = take_tally(part, limit)
     finished = _finished_path(part)
-    given = _sidecar_or_nothing(part)
-    clock = _clock_of(given)
-    if clock is not None:
-        for earlier in sorted(part.parent.glob(f"{part.name.split('-')[0]}-*.csv")):
-            _fill_finished(files, earlier, take_tally(earlier), clock)
     if finished.exists() and take_tally(finished).rows >= tally.rows:
         files.remove(part)  # the cut came between the rename and this
         files.sync_directory(part.parent)
     elif tally.rows:
-        _finish_copy(files, part, given, tally, clock, limit)
+        _finish_copy(files, part, _sidecar_or_nothing(part), tally, clock, limit)
     else:
         _remove_part(files, part)
         return Repaired(part, None, tally)
     return Repaired(part, finished, tally)
 
 
-def _first_segment_after(part: Path) -> int | None:
-    """The first segment that later parts of the session hold. Rows from there on were written again: the disk had
-    failed, and what it kept of them in this part is not to be trusted."""
-    own = LogName.of(part)
-    others = [(name.part, path) for path in part.parent.glob("*.csv*")
-              if own and (name := LogName.of(path)) and name.session == own.session and name.part > own.part]
-    for _, later in sorted(others):
-        with later.open("rb") as file:
-            for row in scan(file):
-                if row.record is not None:
-                    return row.record.segment
-    return None
+def _limits(logs: Iterable[Path]) -> dict[Path, int | None]:
+    """For each file of a session the first segment that later parts hold. Rows from there on were written again: the
+    disk had failed, and what it kept of them in this part is not to be trusted. Each file is opened once."""
+    limits: dict[Path, int | None] = {}
+    part = limit = upcoming = None
+    for log in sorted(logs, key=_place, reverse=True):
+        if _place(log)[0] != part:
+            part, limit = _place(log)[0], upcoming
+        limits[log] = limit
+        with suppress(OSError), log.open("rb") as file:  # what nobody can read is not there twice either
+            upcoming = next((row.record.segment for row in scan(file) if row.record is not None), upcoming)
+    return limits
+
+
+def _place(log: Path) -> tuple[int, Path]:
+    """Number of the part, then a finished file before an open one; by this the files of a session are in order."""
+    name = LogName.of(log)
+    return (name.part if name else 0), log
+
+
+def _may_lack_utc(finished: Path) -> bool:
+    """False where the sidecar says that no row does."""
+    said = _sidecar_or_nothing(finished).get("log")
+    return not isinstance(said, dict) or said.get("rows_without_utc") != 0
 
 
 def take_tally(log: Path, limit: int | None = None) -> Tally:
@@ -390,9 +440,9 @@ def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Ta
     return finished
 
 
-def _fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap) -> None:
+def _fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None) -> None:
     """Give UTC to the rows of a finished file that have none."""
-    if not tally.unset:
+    if clock is None or not tally.unset:
         return
     given = _sidecar_or_nothing(finished)
     _replace_file(files, finished, _kept_lines(finished, clock))

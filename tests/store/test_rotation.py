@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from logger.records import WindowRecord
+from logger.store import rotation, segment_log
 from logger.store.rotation import (
     COUNTER_NAME,
     SIDECAR_BYTES,
@@ -469,3 +470,24 @@ def test_a_clock_that_cannot_be_is_none(tmp_path: Path, offset_us: object) -> No
 def test_a_sidecar_of_the_largest_size_is_read(tmp_path: Path) -> None:
     (tmp_path / "00001-001.json").write_bytes(b"{}" + b" " * (SIDECAR_BYTES - 2))
     assert read_sidecar(tmp_path / "00001-001.csv") == {}
+
+
+def test_a_repair_reads_each_of_many_parts_a_few_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 120
+    for part in range(1, count + 1):
+        (tmp_path / f"00001-{part:03d}.csv.part").write_text(f"{HEADER}\n")
+    (tmp_path / f"00001-{count + 1:03d}.csv.part").write_text(f"{HEADER}\n{format_row(row(1))}\n")
+    read = []
+    monkeypatch.setattr(rotation, "scan", lambda file: read.append(file.name) or segment_log.scan(file))
+    repair(tmp_path, CutFiles())
+    assert sorted(texts(tmp_path)) == [f"00001-{count + 1:03d}.csv", f"00001-{count + 1:03d}.json"]
+    assert len(read) <= 3 * (count + 1)
+
+
+def test_parts_beyond_999_are_in_order(tmp_path: Path) -> None:
+    """Names of four digits sort before those of three: the row that stands twice is kept where it was written last."""
+    (tmp_path / "00001-999.csv.part").write_text(f"{HEADER}\n{format_row(row(1))}\n{format_row(row(2))}\n")
+    (tmp_path / "00001-1000.csv.part").write_text(f"{HEADER}\n{format_row(row(2))}\n{format_row(row(3))}\n")
+    repair(tmp_path, CutFiles())
+    kept = [read_log(tmp_path / f"00001-{part}.csv").records for part in (999, 1000)]
+    assert [[record.segment for record in records] for records in kept] == [[1], [2, 3]]

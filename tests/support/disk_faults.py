@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -103,6 +104,71 @@ def outage_longer_than_memory(folder: Path, places: int) -> Found:
     assert segments(service.folder) == [1, 2, 3, *range(34 - places, 34)]
     assert problems(service.folder) == [f"after 00001-001.csv: gap: expected segment 4, found {34 - places}"]
     return found()
+
+
+ROUND_US = 30_500_000
+"""A little longer than the storage waits between two tries."""
+
+
+def outage_of_a_day(folder: Path, case: tuple[str, int]) -> Found:
+    """Each try of the service to go on is refused, for so many of them. What is left to be finished does not grow."""
+    kind, tries = case
+    files = RefusingFiles()
+    service = Service(folder / "log", files, max_file_bytes=600)
+    for _ in range(3):
+        service.step()
+    files.refuses = lambda asked: asked == kind or kind == "all"
+    most = 0
+    for number in range(tries):
+        service.now_us += ROUND_US
+        if number % 20:
+            service.storage.sync()
+            service.storage.tend()
+        else:
+            service.step()
+        most = max(most, len(list(service.folder.iterdir())))
+    status = service.storage.status()
+    assert status.trouble
+    assert most <= 8, f"{most} files"
+    files.refuses = lambda asked: False
+    began_s = time.process_time()
+    service.wait()
+    took_s = time.process_time() - began_s
+    assert took_s < 3, f"{took_s:.1f} s of the processor to go on"
+    assert service.storage.status().trouble == ""
+    assert len(list(service.folder.glob("*.csv.part"))) == 1
+    service.storage.close()
+    assert segments(service.folder) == list(range(1, service.rows + 1))
+    assert problems(service.folder) == []
+    return found(files=most, seconds=took_s)
+
+
+def each_outage_is_finished_in_its_turn(folder: Path, count: int) -> Found:
+    """Parts that were left are finished one in each round of the main loop, however many there are."""
+    files = RefusingFiles()
+    service = Service(folder / "log", files, max_file_bytes=100_000)
+    renamed = 0
+    for number in range(4 * count):
+        # Nothing that is left can be finished, and every fourth time nothing can be synced either.
+        files.refuses = lambda kind, bad=number % 4 == 3: kind == "remove" or (bad and kind == "sync")
+        service.now_us += ROUND_US
+        service.step()
+        service.step()
+    files.refuses = lambda kind: False
+    service.wait()
+    left = len(list(service.folder.glob("*.csv.part")))
+    for _ in range(4 * count):
+        service.now_us += 500_000
+        service.storage.tend()
+        now_left = len(list(service.folder.glob("*.csv.part")))
+        assert left - now_left <= 1
+        renamed += left - now_left
+        left = now_left
+    assert renamed > count / 2
+    assert left == 1
+    service.storage.close()
+    assert segments(service.folder) == list(range(1, service.rows + 1))
+    return found(trials=count)
 
 
 def bad_from_the_start(folder: Path, error: int) -> Found:
@@ -293,6 +359,13 @@ HAZARDS = (
     Hazard("outage longer than memory lasts", "all is refused for 30 rows, with room for 5 to 25 in memory",
            "memory is bounded, the newest rows are kept, those lost are counted and show as a gap", "as promised",
            outage_longer_than_memory, range(5, 26, 5), 2),
+    Hazard("outage of a day", "each try to go on is refused, 2880 of them (or 200): writes, syncs, renames or all",
+           "no more than 8 files in the folder; it goes on within 3 s of the processor's time, no row lost",
+           "{files.most:.0f} files or fewer, went on in {seconds.most:.2f} s", outage_of_a_day,
+           tuple(product(("sync", "write", "rename", "all"), (200, 2880))), 4),
+    Hazard("many outages, one after the other", "each leaves a file, none of which can be finished for now",
+           "one is finished in each round of the main loop; no row lost", "as promised",
+           each_outage_is_finished_in_its_turn, (10, 20, 30), 1),
     Hazard("disk that is bad from the start", "all is refused before the first file is made",
            "the service starts, says it, and writes everything once it can", "as promised", bad_from_the_start, ERRORS),
     Hazard("really full device", "the kernel's `/dev/full` in place of a write", _GOES_ON, "as promised",
