@@ -1,0 +1,69 @@
+"""How the service is put together: what feeds systemd's watchdog, and that the limits of the settings arrive."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from logger.service import start
+from logger.service.config import Config, LogConfig
+from logger.service.live import HANG_US, Listener, monotonic_us
+from logger.service.storage import Storage
+from logger.store.space import Limits
+
+
+class Told:
+    """Systemd's side: what it was told."""
+
+    def __init__(self) -> None:
+        self.words: list[str] = []
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_: self.words.append(name)
+
+
+@pytest.fixture
+def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """The parts of a service that was put together with settings of its own and has ended at once."""
+    parts: dict[str, Any] = {"told": Told()}
+
+    class Loop:
+        def __init__(self, core: object, storage: Storage, listeners: list[Listener], *rest: Any) -> None:
+            parts.update(storage=storage, listeners=listeners, beat=rest[-1])
+
+        def run(self, stop: threading.Event) -> None:
+            parts["storage"].close()
+
+    def storage(*arguments: Any) -> Storage:
+        parts["limits"] = next(argument for argument in arguments if isinstance(argument, Limits))
+        return Storage(*arguments)
+
+    monkeypatch.setattr(start, "LiveService", Loop)
+    monkeypatch.setattr(start, "Storage", storage)
+    monkeypatch.setattr(start, "Notifier", lambda: parts["told"])
+    monkeypatch.setattr(start, "go_first", lambda: None)
+    log = replace(LogConfig(tmp_path / "log"), quota_bytes=123_456_789, keep_free_bytes=987_654)
+    start.serve(Config(log=log, status_file=tmp_path / "status.json"), threading.Event())
+    parts["told"].words.clear()
+    return parts
+
+
+def test_quota_and_floor_are_those_of_the_settings(built: dict[str, Any]) -> None:
+    assert built["limits"] == Limits(123_456_789, 987_654)
+
+
+def test_the_watchdog_is_fed_while_every_device_returns(built: dict[str, Any]) -> None:
+    built["beat"](monotonic_us())
+    assert built["told"].words == ["watchdog", "status"]
+
+
+@pytest.mark.parametrize("hanging", [0, 1])
+def test_one_device_that_hangs_stops_the_watchdog(built: dict[str, Any], hanging: int) -> None:
+    built["listeners"][hanging].looked_us -= HANG_US + 1_000_000
+    built["beat"](monotonic_us())
+    assert built["told"].words == ["status"]
