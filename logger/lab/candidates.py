@@ -21,6 +21,7 @@ from logger.lab.fitting import (
     Weighed,
     coordinates_of,
     improved,
+    located,
     moved,
     moves_of,
     settled,
@@ -41,6 +42,7 @@ class Base:
     """A model that effects are tried on: its state, its slopes, and what it leaves in minus twice log-likelihoods of
     the stretches that were fitted (with what is off) and of those that judge.
 
+    judged_error   of the stretches that no fit saw
     left           its weighed residuals
     uncertainty    (count, count) covariance of the car's numbers and the wander
     """
@@ -52,6 +54,7 @@ class Base:
     uncertainty: Array
     fitted: float
     judged: float
+    judged_error: float
 
     @staticmethod
     def of(problem: Problem, state: State, slopes: Slopes) -> Base:
@@ -59,8 +62,9 @@ class Base:
         slopes = Slopes(slopes.columns, state.wander)  # so that the state is predicted as it was laid out
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
+        seen = located(problem, state, slopes)
         return Base(state, slopes, weighed, weighed.residual(state), uncertainty, problem.deviance(state),
-                    problem.deviance(state, fitted=False))
+                    problem.deviance(seen, fitted=False), problem.judged_error(seen))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +72,7 @@ class Tried:
     """A model with one more effect, fitted.
 
     gain, judged_gain    how much smaller minus twice the log-likelihood is, of the fitted stretches and of the others
+    judged_error         of the stretches that no fit saw
     numbers              how many numbers of the effect were fitted
     """
 
@@ -75,6 +80,7 @@ class Tried:
     state: State
     gain: float
     judged_gain: float
+    judged_error: float
     numbers: int
 
     @property
@@ -135,8 +141,9 @@ def _fitted(problem: Problem, base: Base, effects: tuple[Chosen, ...], thoroughl
 def _tried(problem: Problem, base: Base, state: State) -> Tried:
     effect = state.effects[-1].effect
     numbers = sum(not parameter.choices for parameter in effect.parameters)
+    seen = located(problem, state, base.slopes)
     return Tried(effect, state, base.fitted - problem.deviance(state),
-                 base.judged - problem.deviance(state, fitted=False), numbers)
+                 base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers)
 
 
 def _promised(problem: Problem, base: Base, one: Chosen) -> tuple[float, Chosen]:

@@ -119,7 +119,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     seen = misalignment(problem, nominal)
     before = now = Base.of(problem, *settled(problem, nominal))
     steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
-             Step("its numbers refitted within what is granted", problem.judged_error(now.state))]
+             Step("its numbers refitted within what is granted", now.judged_error)]
     first: list[Tried] = []
     taken: list[_Taken] = []
     for number in range(1, MOST_EFFECTS + 1):
@@ -132,17 +132,20 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         taken.append(_Taken(best, _rivals(best, tried, problem), len(left)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         now = Base.of(problem, *settled(problem, best.state))
-        steps.append(Step(f"with {best.effect.name}", problem.judged_error(now.state)))
+        steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
     now, needed = _needed(problem, now, taken, len(present), progress)
-    noise = _noise(problem, now.state)
-    excess = _excess(problem, now.state, noise)
+    progress("fitting all stretches")
+    whole = Problem(problem.runs, problem.vehicle, problem.tolerance, whole=True)
+    after, _ = settled(whole, now.state)
+    noise = _noise(whole, after)
+    excess = _excess(whole, after, noise)
     verdict = tuple(needed)
     return Diagnosis(
-        baseline_error=problem.judged_error(nominal), noise=noise, noise_floor_error=_floor(problem, noise),
-        candidates=_listed(problem, before, now, first, taken, verdict), obstacles=obstacles, verdict=verdict,
-        unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=now.state,
-        problem=problem,
+        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=_floor(problem, noise),
+        candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
+        unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=after,
+        problem=whole,
     )
 
 
@@ -258,23 +261,23 @@ def _excess(problem: Problem, state: State, noise: Noise) -> float:
     return float(np.sqrt(max(ratios)) - 1)
 
 
-def _listed(problem: Problem, before: Base, now: Base, first: Sequence[Tried], taken: Sequence[_Taken],
+def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Sequence[_Taken],
             verdict: Sequence[str]) -> tuple[Candidate, ...]:
     """The candidates, those of the verdict before the others."""
-    values = {one.effect.name: one.values for one in now.state.effects}
+    values = {one.effect.name: one.values for one in after.effects}
     own = {one.tried.effect.name: one for one in taken}
     found = []
     for name in verdict:
         one = own[name]
-        found.append(_candidate(problem, one.tried, one.count, one.rivals, values[name]))
-    found += [_candidate(problem, tried, len(first), _rivals(tried, first, problem), None)
+        found.append(_candidate(one.tried, one.count, one.rivals, values[name]))
+    found += [_candidate(tried, len(first), _rivals(tried, first, problem), None)
               for tried in first if tried.effect.name not in verdict]
     return tuple(found)
 
 
-def _candidate(problem: Problem, tried: Tried, count: int, rivals: tuple[str, ...],
+def _candidate(tried: Tried, count: int, rivals: tuple[str, ...],
                values: Mapping[str, float] | None) -> Candidate:
     return Candidate(
-        tried.effect, tried.state.effects[-1].values if values is None else values, problem.judged_error(tried.state),
+        tried.effect, tried.state.effects[-1].values if values is None else values, tried.judged_error,
         _p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain, rivals,
     )

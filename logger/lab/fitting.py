@@ -161,6 +161,23 @@ class Problem:
         return State(effects, logs, wander, predictions)
 
 
+def located(problem: Problem, state: State, slopes: Slopes) -> State:
+    """The state with the wander of all stretches, also of those that judge: where the car was is no part of what is
+    judged. One step, to first order."""
+    count, wander, predictions = len(state.logs), [], []
+    for stretches, prior, k, prediction, columns, measured in zip(
+            problem.stretches, problem.wander, state.wander, state.predictions, slopes.columns, problem.measured,
+            strict=True):
+        left = measured - prediction
+        whitener = Whitener(stretches, stretches.cells(left, None), whole=True)
+        white = whitener(columns[count:])
+        pull = white @ whitener(left) - prior.precision @ k
+        step = np.linalg.solve(white @ white.T + prior.precision, pull)
+        wander.append(k + step)
+        predictions.append(prediction + step @ columns[count:])
+    return State(state.effects, state.logs, wander, predictions)
+
+
 class Weighed:
     """Slopes, weighed; and the normal equations of what they hold."""
 

@@ -40,8 +40,8 @@ class Tolerance:
 
 KNOT_S = 2.0
 """The wander of a distance signal is straight between knots so far apart."""
-_LENGTHS = ("cg_distance_m",)
-_LEFT_ALONE = ("contact_patch_m", "track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
+_LENGTHS = ("cg_distance_m", "contact_patch_m")
+_LEFT_ALONE = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
 _SLOWEST_MPS = 0.5
 
 

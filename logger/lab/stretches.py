@@ -99,10 +99,11 @@ class Stretches:
 
 
 class Whitener:
-    """Weighs each band of one run's residual by what is left there, and keeps the fitted stretches."""
+    """Weighs each band of one run's residual by what is left there, and keeps the fitted stretches, or all."""
 
-    def __init__(self, stretches: Stretches, cells: Cells) -> None:
-        self._first, self._fit = stretches.first, stretches.fit
+    def __init__(self, stretches: Stretches, cells: Cells, whole: bool = False) -> None:
+        self._first = stretches.first
+        self._fit = np.ones_like(stretches.fit) if whole else stretches.fit
         count = stretches.count - stretches.first
         f_hz = np.fft.rfftfreq(count, 1 / stretches.rate_hz)
         edges = stretches.edges_hz
@@ -112,7 +113,7 @@ class Whitener:
         self._count = count
 
     def __call__(self, samples: Array) -> Array:
-        """(n,) or (columns, n), whole, to the fitted samples (..., kept), in units of the noise."""
+        """(n,) or (columns, n), whole, to the samples that are kept (..., kept), in units of the noise."""
         part = samples[..., self._first:]
         white = np.fft.irfft(np.fft.rfft(part, axis=-1) * self._gain, self._count, axis=-1)
         return np.asarray(white[..., self._fit])

@@ -1,0 +1,56 @@
+"""How certain the numbers of a fitted model are: standard errors from the information matrix.
+
+The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
+to a diagonal of ones before it is inverted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.fitting import Move, Problem, State, Weighed, coordinates_of, effect_slopes, moves_of
+from logger.vehicle.effect import Chosen
+
+Array = npt.NDArray[np.float64]
+
+_TINY_STEP = 1e-4
+_SINGULAR = 1e-10
+
+
+def with_spread(problem: Problem, state: State) -> tuple[tuple[Chosen, ...], Array]:
+    """The effects of a fitted state with standard errors, and those of the logarithms of the car's numbers (p,).
+
+    Both hold what was granted beforehand: a number that the runs say nothing of is as uncertain as it was.
+    """
+    moves = moves_of(state.effects)
+    slopes = problem.slopes(state)
+    weighed = Weighed(problem, slopes, problem.whiteners(state))
+    information = weighed.information
+    if moves:
+        own = [whitener(columns) for whitener, columns in zip(
+            weighed.whiteners, effect_slopes(problem, slopes, state, moves), strict=True)]
+        mixed = weighed.against(own)
+        alone = np.sum([one @ one.T for one in own], axis=0)
+        information = np.block([[information, mixed], [mixed.T, alone]])
+    size = np.sqrt(np.diag(information))
+    seen = size > 0
+    scale = np.where(seen, size, 1.0)
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=_SINGULAR, hermitian=True)
+    deviations = np.where(seen, np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale, np.inf)
+    return (_with_errors(state.effects, moves, deviations[weighed.count:]),
+            deviations[: len(problem.nuisance.names)])
+
+
+def _with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array) -> tuple[Chosen, ...]:
+    """Standard errors on the scales of the parameters (m,) as those of their values."""
+    errors: list[Mapping[str, float]] = [{} for _ in effects]
+    for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        step = _TINY_STEP * max(abs(here), _TINY_STEP)
+        rise = abs(parameter.value(here + step) - parameter.value(here - step)) / (2 * step)
+        errors[move.effect] = {**errors[move.effect], parameter.name: float(rise * deviation)}
+    return tuple(replace(one, standard_errors=found) for one, found in zip(effects, errors, strict=True))
