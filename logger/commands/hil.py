@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     sent = _play(args, config) if args.nmea_port is not None else None
     if sent is not None and expected is not None:
         time.sleep(WRITTEN_S)
-    agreement = compare(expected, read_sessions(args.log)) if expected is not None else None
+    agreement = compare(expected, read_sessions(args.log), config.gps.bridge_s) if expected is not None else None
     result = Result(_is_bridged(args), sent, agreement)
     print(json.dumps(result.as_json()) if args.json else result.text())
     return EXIT_DONE if result.ok else EXIT_CHECK_FAILED

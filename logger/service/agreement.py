@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.records import WindowRecord
+from logger.service.pipeline import longest_wait_us
 from logger.store.rotation import LogName
 from logger.store.segment_log import read_log
 from logger.units import US_PER_S
@@ -32,8 +33,6 @@ SAME_UTC_US = 500_000
 SAME_START_M = 1.0
 SAME_START_US = 1_000_000
 OUTSIDE_SHARE = 0.02
-PENDING_US = 15 * US_PER_S
-"""A row may wait this long for what the road behind it tells; while nothing more comes, it is not written."""
 
 _EARTH_RADIUS_M = 6_371_008.8
 _LATE_FLAGS = frozenset({"time_unset"})  # goes from the rows when their file is finished
@@ -139,8 +138,9 @@ def read_sessions(directory: Path) -> list[Session]:
     return sessions
 
 
-def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session]) -> Agreement:
-    """Hold the expected rows against those of the session that holds most of them, the latest of several."""
+def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridge_s: float) -> Agreement:
+    """Hold the expected rows against those of the session that holds most of them, the latest of several. In an open
+    log the last may still be waited for, by a service that bridges losses of fix of ``bridge_s`` [s]."""
     anchors = [(_anchors(expected, rows), session, rows) for session in sessions for rows in [_last_pass(session.rows)]]
     pairs, session, rows = max(anchors, key=lambda found: (len(found[0]), found[1].number), default=([], None, ()))
     if session is None or not pairs:
@@ -153,7 +153,7 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session]) -> Ag
                         for tolerance in TOLERANCES)
     held = {wanted.segment for wanted, _ in matched}
     absent = [row for row in expected if row.segment not in held]
-    pending = _pending(expected, absent) if session.is_open else 0
+    pending = _pending(expected, absent, longest_wait_us(bridge_s)) if session.is_open else 0
     return Agreement(
         session=session.number,
         expected=len(expected),
@@ -228,13 +228,17 @@ def _nearest(values: Sequence[float], wanted: float) -> int | None:
                key=lambda index: abs(values[index] - wanted))
 
 
-def _pending(expected: Sequence[WindowRecord], absent: Sequence[WindowRecord]) -> int:
-    """How many of the absent rows are the last ones, and began so late that they may still be waited for."""
+def _pending(expected: Sequence[WindowRecord], absent: Sequence[WindowRecord], wait_us: int) -> int:
+    """How many of the absent rows are the last ones, and ended so late that they may still be waited for."""
     count = 0
-    since_us = expected[-1].t_us - PENDING_US
-    while count < len(absent) and absent[-1 - count] is expected[-1 - count] and expected[-1 - count].t_us >= since_us:
+    since_us = _end_us(expected[-1]) - wait_us
+    while count < len(absent) and absent[-1 - count] is expected[-1 - count] and _end_us(absent[-1 - count]) >= since_us:
         count += 1
     return count
+
+
+def _end_us(row: WindowRecord) -> int:
+    return row.t_us + round(row.duration_s * US_PER_S)
 
 
 def _surplus(rows: Sequence[WindowRecord], held: set[int]) -> tuple[int, ...]:

@@ -27,6 +27,9 @@ from logger.service.timebase import Timebase
 from logger.units import US_PER_S
 
 FIX_DELAY_US = 3_000_000
+LONGEST_LAG_US = 9_000_000
+"""A row is made at most so long after its window, once the motion in it is settled: the road behind still tells of it."""
+
 SHORT_WINDOW_SHARE = 0.5
 # Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.
 BRIDGED_ERROR = 0.2
@@ -52,6 +55,12 @@ class PipelineSettings:
     drive_end_s: float
     latency_s: float
     front_axle_ahead_m: float
+
+
+def longest_wait_us(bridge_s: float) -> int:
+    """The most that can lie between the end of a window and its row [us]. The samples wait for a fix as long as a loss
+    may last that is bridged, and rows that were held back so come one estimator's lag after that at the latest."""
+    return round(bridge_s * US_PER_S) + FIX_DELAY_US + LONGEST_LAG_US
 
 
 class Pipeline:

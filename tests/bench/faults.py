@@ -58,9 +58,11 @@ when it was tried. It is made by `python tests/bench/faults.py`; the counts are 
 
 ## What is promised
 
-- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written, as
-  a rule, four to eight seconds after its window was driven, because the road behind still tells of it. So a power cut
-  costs the last five to nine seconds of a drive.
+- **Power cut.** A row is on the card within a second of being written to the log (`sync_s: 1`). It is written four to
+  nine seconds after its window was driven, because the road behind still tells of it: so a power cut costs the last
+  five to ten seconds. When the fix has been lost, or was late at the start, rows wait up to `bridge_s` + 3 s more for
+  the motion in them: a power cut in or just after such a loss can cost the last `bridge_s` + 13 s (23 s as shipped).
+  Beyond that it costs the window that is being filled: 7.62 m of road, and the time that the car has stood in it.
 - **Kill.** A process that is killed loses no row that was written to the log.
 - **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32. After the next start every file is
   finished, beside its sidecar, and `ridelog verify` has nothing against it. No session number is given twice.

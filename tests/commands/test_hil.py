@@ -24,15 +24,17 @@ from logger.commands import hil as command
 from logger.commands import main
 from logger.errors import BadInput
 from logger.records import WindowRecord
-from logger.service.agreement import PENDING_US, Session, compare, read_sessions
+from logger.service.agreement import Session, compare, read_sessions
 from logger.service.config import AccelerometerConfig, Config
 from logger.service.hil import Sent, expected_rows, send, wired
+from logger.service.pipeline import longest_wait_us
 from logger.units import STANDARD_GRAVITY_MPS2
 
 from replaying import rows_of
 
 PATIENCE_S = 120.0
 PIECE_S = 25
+BRIDGE_S = Config().gps.bridge_s
 BMA220 = DumpHeader(None, {"driver": "bma220", "range_g": 4, "vertical_axis": "-z"}, {"baud": 9600}, "rav4-2009")
 
 
@@ -140,6 +142,10 @@ def test_what_is_expected_is_what_a_replay_of_the_lines_gives(short_dump: Path, 
     assert all(row.utc_us is not None for row in rows)
 
 
+def ended_us(row: WindowRecord) -> int:
+    return row.t_us + round(row.duration_s * 1e6)
+
+
 def logged(rows: list[WindowRecord], change: Callable[[int, WindowRecord], WindowRecord | None] = lambda _, row: row,
            shift_us: int = 9_876_543, is_open: bool = False) -> Session:
     """The rows as a service on a clock of its own would have them, changed (None: left out)."""
@@ -148,7 +154,7 @@ def logged(rows: list[WindowRecord], change: Callable[[int, WindowRecord], Windo
 
 
 def test_the_same_rows_agree_on_any_clock(rows: list[WindowRecord]) -> None:
-    found = compare(rows, [Session(3, (), False), logged(rows)])
+    found = compare(rows, [Session(3, (), False), logged(rows)], BRIDGE_S)
     assert found.ok
     assert (found.session, found.matched, found.expected) == (4, len(rows), len(rows))
     assert found.clock_shift_s == 9.876543
@@ -157,20 +163,21 @@ def test_the_same_rows_agree_on_any_clock(rows: list[WindowRecord]) -> None:
 
 
 def test_a_missing_row_and_one_too_many(rows: list[WindowRecord]) -> None:
-    found = compare(rows, [logged(rows, lambda n, row: None if n == 30 else row)])
+    found = compare(rows, [logged(rows, lambda n, row: None if n == 30 else row)], BRIDGE_S)
     assert found.missing == (rows[30].segment,)
     assert not found.ok
-    found = compare(rows[:30] + rows[31:], [logged(rows)])
+    found = compare(rows[:30] + rows[31:], [logged(rows)], BRIDGE_S)
     assert found.surplus == (rows[30].segment,)
     assert not found.ok
 
 
 def test_the_last_rows_are_waited_for_only_while_the_log_is_open(rows: list[WindowRecord]) -> None:
-    late = [row for row in rows if row.t_us >= rows[-1].t_us - PENDING_US]
+    late = [row for row in rows if ended_us(row) >= ended_us(rows[-1]) - longest_wait_us(BRIDGE_S)]
     assert 5 < len(late) < len(rows) - 10
     for count, is_open, pending in [(len(late), True, len(late)), (len(late), False, 0), (len(late) + 1, True, None)]:
         held = len(rows) - count
-        found = compare(rows, [logged(rows, lambda n, row, held=held: row if n < held else None, is_open=is_open)])
+        log = logged(rows, lambda n, row, held=held: row if n < held else None, is_open=is_open)
+        found = compare(rows, [log], BRIDGE_S)
         assert found.ok == bool(pending)
         assert found.pending == (len(late) if pending is None else pending)
 
@@ -187,7 +194,7 @@ def test_one_row_may_lie_outside_and_two_of_these_not(rows: list[WindowRecord], 
         return logged(rows, lambda n, row: row if n not in known[5:5 + count] else replace(
             row, **{attribute: None if by is None else getattr(row, attribute) + by}))
 
-    one, two = compare(rows, [wrong(1)]), compare(rows, [wrong(2)])
+    one, two = compare(rows, [wrong(1)], BRIDGE_S), compare(rows, [wrong(2)], BRIDGE_S)
     assert one.ok
     assert not two.ok
     assert {each.tolerance.quantity: each.outside for each in two.differences if each.outside} == {quantity: 2}
@@ -195,10 +202,10 @@ def test_one_row_may_lie_outside_and_two_of_these_not(rows: list[WindowRecord], 
 
 def test_other_flags_count_but_not_that_utc_was_still_unknown(rows: list[WindowRecord]) -> None:
     unset = logged(rows, lambda n, row: replace(row, flags=(*row.flags, "time_unset")) if n < 5 else row)
-    assert compare(rows, [unset]).flags_differ == 0
+    assert compare(rows, [unset], BRIDGE_S).flags_differ == 0
     gaps = logged(rows, lambda n, row: replace(row, flags=(*row.flags, "gap")) if n in (20, 21) else row)
-    assert compare(rows, [gaps]).flags_differ == 2
-    assert not compare(rows, [gaps]).ok
+    assert compare(rows, [gaps], BRIDGE_S).flags_differ == 2
+    assert not compare(rows, [gaps], BRIDGE_S).ok
 
 
 def test_of_a_drive_sent_twice_the_second_time_counts(rows: list[WindowRecord]) -> None:
@@ -207,7 +214,7 @@ def test_of_a_drive_sent_twice_the_second_time_counts(rows: list[WindowRecord]) 
     second = [replace(row, segment=row.segment + len(rows), t_us=row.t_us + 90_000_000,
                       distance_start_m=row.distance_start_m + travelled_m if row.distance_start_m is not None else None)
               for row in rows]
-    found = compare(rows, [Session(1, (*first, *second), True)])
+    found = compare(rows, [Session(1, (*first, *second), True)], BRIDGE_S)
     assert not found.ok
     assert found.clock_shift_s == 90.0
     assert found.moved_before_m == pytest.approx(travelled_m)
@@ -216,7 +223,7 @@ def test_of_a_drive_sent_twice_the_second_time_counts(rows: list[WindowRecord]) 
 def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None:
     other = logged(rows, lambda _, row: replace(row, utc_us=(row.utc_us or 0) + 86_400_000_000))
     for sessions in ([], [other]):
-        found = compare(rows, sessions)
+        found = compare(rows, sessions, BRIDGE_S)
         assert not found.ok
         assert found.session is None
         assert "TX on RX" in command.Result(False, None, found).text()
