@@ -2,6 +2,9 @@
 
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
 sent. It goes through recorded buses into the real drivers and the real service.
+
+  ridelog demo
+  ridelog demo --lab
 """
 
 from __future__ import annotations
@@ -12,29 +15,46 @@ from importlib import resources
 from pathlib import Path
 
 from logger.commands.replay import replay
+from logger.errors import EXIT_DONE, BadInput
 
 REPORT_NAME = "report.html"
+DRIVE_DIR, LAB_DIR = "ridelog-demo", "ridelog-lab"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog demo``."""
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, default=Path("ridelog-demo"), help="folder for logs and report"
-    )
+    parser.add_argument("--out", metavar="DIR", type=Path,
+                        help=f"folder for what is written (default: {DRIVE_DIR}, with --lab {LAB_DIR})")
+    parser.add_argument("--lab", action="store_true",
+                        help="show the lab instead: two drives of a car that has something its model lacks, found")
+    parser.add_argument("--unpack", action="store_true",
+                        help="with --lab: only write the two drives, to find it yourself")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog demo``."""
+    if args.unpack and not args.lab:
+        raise BadInput("demo: expected --lab with --unpack")
+    if args.lab:
+        from logger.commands.demo_lab import lab
+
+        lab(args.out or Path(LAB_DIR), args.unpack, args.json)
+    else:
+        _drive(args.out or Path(DRIVE_DIR), args.json)
+    return EXIT_DONE
+
+
+def _drive(out: Path, as_json: bool) -> None:
+    """The drive through the service."""
     from logger.commands.report import write_report
 
     with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump:
-        outcome = replay(dump, args.out, None, rate=0.0, vehicle=None, quiet=args.json)
-    report = args.out / REPORT_NAME
+        outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
+    report = out / REPORT_NAME
     write_report(outcome.files, report)
-    if args.json:
+    if as_json:
         print(json.dumps(outcome.as_json() | {"report": str(report)}))
-        return 0
-    print(outcome.text())
-    print(f"Report: {report} (open it in a browser; it needs no network)")
-    return 0
+    else:
+        print(outcome.text())
+        print(f"Report: {report} (open it in a browser; it needs no network)")

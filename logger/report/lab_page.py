@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from logger.lab.beside import Beside, Part, frequencies, segments, short_names
 from logger.lab.compare import Comparison, Standing, conclusion, evidence, headline
-from logger.lab.force_map import Curve
+from logger.lab.force_map import Curve, ForceMap
 from logger.lab.marks import Mark, worst_places
-from logger.report.style import STYLE
-from logger.studies.pictures import STYLE as PICTURE_STYLE
+from logger.report.document import document, tiles
 from logger.studies.pictures import picture
 from logger.studies.study import Curves, Line
 
@@ -32,31 +31,23 @@ _WORST = 8
 def page(found: Comparison) -> str:
     """The comparison as one HTML document."""
     beside = found.refitted.beside
-    policy = "default-src 'none'; style-src 'unsafe-inline'"
-    title = escape(f"{found.vehicle}: model against measurement")
-    parts = [
-        f"<h1>{title}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in beside.runs))}</p>',
+    title = f"{found.vehicle}: model against measurement"
+    return document(title, [
+        f"<h1>{escape(title)}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in beside.runs))}</p>',
         _tiles(found), *(f"<p>{escape(line)}</p>" for line in headline(found)),
         f"<section><h2>After the refit</h2><ul>{''.join(f'<li>{escape(one)}</li>' for one in evidence(found))}</ul>"
         f"<p>{escape(conclusion(found))}</p></section>",
-        _worst_place(found.refitted), _spectra(beside), _tables(found), _places(found.refitted),
-        _forces(found), _alignment(found), _marks(found.marks.marks), _numbers(found),
-    ]
-    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
-            f'<meta name="viewport" content="width=device-width,initial-scale=1">'
-            f'<meta name="color-scheme" content="light dark"><title>{title}</title>'
-            f"<style>{STYLE}{PICTURE_STYLE}</style></head>\n<body><main>{''.join(parts)}</main></body></html>\n")
+        _worst_place(found.refitted), spectra_section(beside), _tables(found), _places(found.refitted),
+        forces_section(found.marks.forces), _alignment(found), _marks(found.marks.marks), _numbers(found),
+    ])
 
 
 def _tiles(found: Comparison) -> str:
     beside = found.plain.beside
-    tiles = [("Error as the model stands", f"{found.plain.error:.3f}", ""),
-             ("Error after the refit", f"{found.refitted.error:.3f}", ""),
-             ("Marks found", f"{len(found.marks.found)}", f"of {len(found.marks.marks)}"),
-             ("Runs", f"{len(beside.runs)}", f"{sum(map(len, beside.left)) / beside.rate_hz:.0f} s")]
-    return '<dl class="tiles">' + "".join(
-        f"<div><dt>{name}</dt><dd>{value} <small>{unit}</small></dd></div>" for name, value, unit in tiles) + "</dl>"
+    return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
+                  ("Error after the refit", f"{found.refitted.error:.3f}", ""),
+                  ("Marks found", f"{len(found.marks.found)}", f"of {len(found.marks.marks)}"),
+                  ("Runs", f"{len(beside.runs)}", f"{sum(map(len, beside.left)) / beside.rate_hz:.0f} s")])
 
 
 # --- pictures ---
@@ -79,7 +70,8 @@ def _worst_place(standing: Standing) -> str:
     return f"<section><h2>The worst place</h2>{drawn}</section>"
 
 
-def _spectra(beside: Beside) -> str:
+def spectra_section(beside: Beside) -> str:
+    """What was measured, what the model says and what is left, by frequency."""
     f_hz = frequencies(beside)
     density = [np.mean(np.abs(segments(beside, one)) ** 2, axis=0) / f_hz[1]
                for one in (beside.measured, beside.left, beside.model)]
@@ -111,8 +103,8 @@ def _places(standing: Standing) -> str:
             f"{rows}</table></div></section>")
 
 
-def _forces(found: Comparison) -> str:
-    forces = found.marks.forces
+def forces_section(forces: ForceMap) -> str:
+    """The force that is missing in the suspensions, by speed and by travel."""
     drawn = "".join(
         picture(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
                                                          errors=curve.error_n),), (0.0, "nothing missing")))

@@ -1,0 +1,107 @@
+"""Which physical effect a vehicle's model lacks: every one that is known is tried, and judged on what no fit saw.
+
+Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
+
+  ridelog diagnose --vehicle mycar.yaml run1 run2
+  ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html
+
+Errors are rms(measured - model) / rms(measured). A third of each run is kept from all fits, and errors are told of it.
+The car's numbers may be off by a few per cent (--tolerance) and the distances by a few centimetres: both are refitted
+first, so that no small mistake passes for an effect.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.commands.lab_model import Bench, add_bench_arguments, bench, columns, on_screen, paragraphs, wipe
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.lab.verdict import Verdict
+
+_SHOWN = 8
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog diagnose``."""
+    add_bench_arguments(parser)
+    parser.add_argument("--all", action="store_true", help=f"list all candidates, not the first {_SHOWN}")
+    parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog diagnose``."""
+    from logger.lab.verdict import as_json
+
+    given = bench(args)
+    found = diagnosed(given)
+    if args.out is not None:
+        from logger.report.diagnosis_page import page
+
+        args.out.write_text(page(found, given.model.vehicle.name), "utf-8")
+    if args.json:
+        print(json.dumps(as_json(found), allow_nan=False))
+        return EXIT_DONE
+    print(paragraphs([_compared(given)]), "", *lines(found, None if args.all else _SHOWN), "",
+          paragraphs([_next(args, given, found)]), sep="\n")
+    if args.out is not None:
+        print(f"\nPage: {args.out}")
+    return EXIT_DONE
+
+
+def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
+    """The diagnosis of a model, without some effects, with its progress on the screen. BadInput where the vehicle lacks
+    what it needs."""
+    from logger.lab.diagnosis import diagnose
+    from logger.lab.verdict import told
+
+    tell = on_screen()
+    effects = {name: effect for name, effect in given.effects.items() if name not in left_out}
+    try:
+        return told(diagnose(given.problem(whole=False), effects, given.model.effects, tell), effects, tell)
+    except ValueError as error:
+        raise BadInput(f"{given.word}: {error}") from None
+    finally:
+        wipe()
+
+
+def lines(found: Verdict, most: int | None) -> list[str]:
+    """What a person reads of a diagnosis."""
+    from logger.lab.verdict import looks_like, summary, table, untested
+
+    shown = [paragraphs(summary(found))]
+    if described := looks_like(found):
+        shown += ["", "What it looks like:", paragraphs(described, "- ")]
+    rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
+    more = len(found.diagnosis.candidates) - len(rows) + 1
+    shown += ["", "Each tried by itself, those of the verdict first:", *columns(rows)]
+    if more > 0:
+        shown.append(f"and {more} more (ridelog diagnose --all)")
+    if hidden := untested(found):
+        shown += ["", "What these runs cannot tell:", paragraphs(hidden, "- ")]
+    return shown
+
+
+def _compared(given: Bench) -> str:
+    runs, model = given.runs.runs, given.model
+    seconds = sum((run.count - run.first) / run.rate_hz for run in runs)
+    has = f", with {', '.join(one.effect.name for one in model.effects)}," if model.effects else ""
+    return (f"{model.vehicle.name}{has} on {len(runs)} run{'s' * (len(runs) != 1)}, {seconds:.0f} s. "
+            f"{len(given.effects)} effects are known.")
+
+
+def _next(args: argparse.Namespace, given: Bench, found: Verdict) -> str:
+    """What to do now."""
+    if found.missing:
+        one = found.missing[0]
+        name = given.files.get(one.effect.name, one.effect.name)
+        return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
+                f"{' '.join(map(str, args.runs))}")
+    if found.diagnosis.unexplained:
+        return ("Next: look at the shape above. An effect of your own is one Python file (--effect-file); ridelog "
+                "compare shows where what is left sits.")
+    return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."

@@ -1,0 +1,191 @@
+"""The lab's whole loop at the terminal: compare, diagnose, add what is missing, compare again.
+
+  ridelog lab --vehicle mycar.yaml run1 run2
+  ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
+
+Before an effect is added it asks: yes, no, or the name of another one. DIR gets a vehicle file for each step and
+story.html, the page that tells all of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.commands.add_effect import added, asked_for, model_of, searched
+from logger.commands.add_effect import lines as added_lines
+from logger.commands.diagnose import diagnosed
+from logger.commands.diagnose import lines as diagnosis_lines
+from logger.commands.lab_model import Bench, add_bench_arguments, bench, on_screen, paragraphs, wipe
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.lab.compare import Comparison
+    from logger.lab.story import Round, Story
+    from logger.lab.verdict import Verdict
+    from logger.vehicle.effect import Chosen
+
+STORY = "story.html"
+_MOST_ROUNDS = 6
+_SHOWN = 5
+
+Say = Callable[[Iterable[str]], None]
+Ask = Callable[["Bench", str], str | None]
+"""Which effect to add where one was found missing: its name or another's, or None for none."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog lab``."""
+    add_bench_arguments(parser)
+    parser.add_argument("--out", type=Path, default=Path("ridelog-lab"), metavar="DIR",
+                        help="folder for the vehicle files and the page (default: ridelog-lab)")
+    parser.add_argument("--yes", action="store_true", help="add what is found missing without asking")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog lab``."""
+    from logger.lab.story import as_json
+
+    given = bench(args)
+    asks = not (args.yes or args.json) and sys.stdin.isatty()
+    if not (asks or args.yes or args.json):
+        print("Nobody is at a terminal to be asked: what is found missing is added (as with --yes).", file=sys.stderr)
+    story = walk(given, args.out, _asked if asks else take, silent if args.json else say)
+    if args.json:
+        print(json.dumps(as_json(story) | {"story": str(args.out / STORY)}, allow_nan=False))
+    return EXIT_DONE
+
+
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, str] | None = None) -> Story:
+    """Go through the loop; write the vehicle files and the page into ``out``.
+
+    explained    what to tell of compare, diagnose, add and again, beside what they find
+    """
+    from logger.lab.story import Story, ending
+    from logger.report.story_page import page
+
+    why = explained or {}
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise BadInput(f"--out {out}: expected a folder") from None
+    tell(_chapter("Compare", why.get("compare")))
+    first = _compared(given)
+    tell(_comparison_lines(first))
+    verdicts: list[Verdict] = []
+    rounds: list[Round] = []
+    refused: list[str] = []
+    going = True
+    while going and len(rounds) < _MOST_ROUNDS:
+        going = False
+        tell(_chapter("Diagnose", why.get("diagnose")))
+        verdicts.append(diagnosed(given, frozenset(refused)))
+        tell(diagnosis_lines(verdicts[-1], _SHOWN))
+        for one in verdicts[-1].missing:
+            wanted = ask(given, one.effect.name)
+            if wanted is None:
+                refused.append(one.effect.name)
+                continue
+            tell(_chapter(f"Add {wanted}", why.get("add")))
+            same = wanted == one.effect.name
+            rounds.append(_round(given, one if same else _searched(given, wanted), out, len(rounds) + 1))
+            tell([*added_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
+            tell(_chapter("Compare again", why.get("again")))
+            tell(_comparison_lines(rounds[-1].comparison))
+            given = replace(given, model=replace(given.model, effects=rounds[-1].gained.added.effects,
+                                                 history=model_of(given, rounds[-1].gained).history))
+            if not same:  # what is missing beside another effect is to be found anew
+                going = True
+                break
+    story = Story(first, tuple(verdicts), tuple(rounds), tuple(refused))
+    (out / STORY).write_text(page(story), "utf-8")
+    tell(_chapter("The end", why.get("end")))
+    tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
+    return story
+
+
+def _round(given: Bench, start: Chosen, out: Path, number: int) -> Round:
+    """Add an effect, write the vehicle and compare it."""
+    from logger.lab.story import Round
+    from logger.store.vehicle_file import write_model
+
+    try:
+        gained = added(given, start)
+    finally:
+        wipe()
+    model = model_of(given, gained)
+    file = out / f"vehicle-{number}.yaml"
+    write_model(file, model)
+    return Round(gained, _compared(replace(given, model=model)), str(file))
+
+
+def _searched(given: Bench, name: str) -> Chosen:
+    try:
+        return searched(given, given.effects[name], {})
+    finally:
+        wipe()
+
+
+def _compared(given: Bench) -> Comparison:
+    from logger.lab.compare import compare
+
+    on_screen()("comparing")
+    try:
+        return compare(given.runs, given.model.vehicle, given.model.effects)
+    except ValueError as error:
+        raise BadInput(f"{given.word}: {error}") from None
+    finally:
+        wipe()
+
+
+# --- at the terminal ---
+
+
+def take(_given: Bench, name: str) -> str:
+    """Whatever the verdict is."""
+    return name
+
+
+def _asked(given: Bench, name: str) -> str | None:
+    """What the user says."""
+    while True:
+        try:
+            answer = input(f"\nAdd {name}? yes, no, or the name of another effect: ").strip()
+        except EOFError:
+            return None
+        if answer.lower() in ("", "y", "yes"):
+            return name
+        if answer.lower() in ("n", "no"):
+            return None
+        if answer not in given.effects:
+            print(f"Expected yes, no, or one of {', '.join(given.effects)}.")
+            continue
+        try:
+            return asked_for(answer, given)[0].name
+        except BadInput as error:
+            print(error)
+
+
+def say(lines: Iterable[str]) -> None:
+    """Print lines."""
+    print("\n".join(lines))
+
+
+def silent(_lines: Iterable[str]) -> None:
+    """Print nothing."""
+
+
+def _chapter(title: str, explained: str | None) -> list[str]:
+    return ["", f"=== {title} ===", *([paragraphs([explained])] if explained else []), ""]
+
+
+def _comparison_lines(found: Comparison) -> list[str]:
+    from logger.lab.compare import conclusion, evidence, headline
+
+    return [paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
+            paragraphs([conclusion(found).partition(" Next: ")[0]])]

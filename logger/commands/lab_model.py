@@ -1,0 +1,150 @@
+"""What the lab's commands share: the model that they are given, the effects that there are, and progress on the screen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from logger.commands.lab_runs import lab_runs
+from logger.errors import BadInput
+
+if TYPE_CHECKING:
+    from logger.lab.fitting import Problem
+    from logger.lab.prediction import Runs
+    from logger.store.vehicle_file import Model
+    from logger.vehicle.effect import Chosen, Effect
+
+WIDTH = 100
+TOLERANCE = 0.04
+_TOLERANCES = (0.001, 0.5)
+_BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
+_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A model and runs on it, ready to be worked on.
+
+    word        by which the vehicle was named on the command line
+    effects     those that there are, by name
+    files       of the user's own among them
+    numbers     deviation of what the car's numbers are usually off by, as a share
+    """
+
+    word: str
+    model: Model
+    runs: Runs
+    effects: Mapping[str, Effect]
+    files: Mapping[str, str]
+    numbers: float
+
+    def problem(self, whole: bool) -> Problem:
+        """To search on (a third of the runs is kept to judge), or on the whole of the runs, finely simulated.
+
+        Raises BadInput when the vehicle lacks what it needs.
+        """
+        from logger.lab.fitting import Problem
+        from logger.lab.nuisance import Tolerance
+        from logger.lab.prediction import Runs
+
+        runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
+        return Problem(runs, self.model.vehicle, Tolerance(numbers=self.numbers), whole=whole)
+
+    def filed(self, one: Chosen) -> Chosen:
+        """An effect that knows which file it is from, where it is the user's own."""
+        return replace(one, file=self.files.get(one.effect.name))
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road of every run is known under the right wheels too."""
+        return all(run.two_tracks for run in self.runs.runs)
+
+
+def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
+    """RUN..., --vehicle, --tolerance, --effect-file and --json."""
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
+    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
+                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="SHARE",
+                        help="how far off the vehicle's masses, springs and dampers may well be (default: "
+                             f"{TOLERANCE:g}, 4 %%)")
+    parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
+                        help="an effect of your own to be tried as well; may repeat")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def bench(args: argparse.Namespace) -> Bench:
+    """The model, runs and effects of a command line. Raises BadInput for whatever is wrong with them."""
+    return bench_of(args.vehicle, args.runs, args.effect_file, args.tolerance)
+
+
+def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str], tolerance: float) -> Bench:
+    """The model, runs and effects. Raises BadInput for whatever is wrong with them."""
+    from logger.shipped import vehicle_path
+    from logger.store.effect_file import own_effect, shipped_effects
+    from logger.store.vehicle_file import read_model
+
+    low, high = _TOLERANCES
+    if not low <= tolerance <= high:
+        raise BadInput(f"--tolerance {tolerance:g}: expected {low:g} to {high:g}")
+    model = read_model(vehicle_path(vehicle))
+    effects, files = dict(shipped_effects()), {}
+    for one in model.effects:
+        if one.file is not None:
+            effects[one.effect.name], files[one.effect.name] = one.effect, one.file
+    for file in effect_files:
+        effect = own_effect(Path(file))
+        if effect.name in effects:
+            raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
+        effects[effect.name], files[effect.name] = effect, file
+    found = Bench(vehicle, model, lab_runs(folders), effects, files, tolerance / _BAND_DEVIATIONS)
+    _try_own(found, effect_files)
+    return found
+
+
+def _try_own(found: Bench, files: Sequence[str]) -> None:
+    """Try the effects of these files on the car, at the values that a search begins at."""
+    from logger.store.effect_file import check_on
+    from logger.vehicle.effect import chosen
+
+    for name, effect in found.effects.items():
+        if found.files.get(name) in files and effect.obstacle(found.model.vehicle, found.two_tracks) is None:
+            for values in effect.trials():
+                check_on(found.model.vehicle, chosen(effect, values, file=found.files[name]), found.two_tracks)
+
+
+def on_screen() -> Callable[[str], None]:
+    """Progress on one line of the terminal, on stderr; said to nobody where that is no terminal."""
+    return _tell if sys.stderr.isatty() else _say_nothing
+
+
+def wipe() -> None:
+    """End the line of progress."""
+    if sys.stderr.isatty():
+        print("\r" + " " * (WIDTH - 1) + "\r", end="", file=sys.stderr, flush=True)
+
+
+def _tell(words: str) -> None:
+    print(f"\r{words[:WIDTH - 1]:{WIDTH - 1}}", end="", file=sys.stderr, flush=True)
+
+
+def _say_nothing(_words: str) -> None:
+    pass
+
+
+def paragraphs(lines: Sequence[str], mark: str = "") -> str:
+    """Lines of text as wide as a screen, each after a mark."""
+    return "\n".join(fill(line, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark),
+                          break_long_words=False, break_on_hyphens=False) for line in lines)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of words as columns, the last one as wide as it is."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

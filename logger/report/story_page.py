@@ -1,0 +1,105 @@
+"""The page of the whole loop: how a model came to what it lacked, from the first comparison to the last effect."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from logger.lab.beside import Beside, frequencies, segments, short_names
+from logger.lab.compare import evidence, headline
+from logger.lab.gained import MOVED_HEADS, MOVED_HINT, judgement, moved_rows
+from logger.lab.marks import worst_places
+from logger.lab.story import Round, Story, ending
+from logger.lab.verdict import summary, untested
+from logger.report.diagnosis_page import falling, shape_sections
+from logger.report.document import bullets, document, grid, paragraphs, section, tiles
+from logger.studies.pictures import picture
+from logger.studies.study import Curves, Line
+
+_AROUND_S = 1.5
+_HIGHEST_OF_RATE = 0.4
+_QUIET_DB = -80.0
+
+
+def page(story: Story) -> str:
+    """The story as one HTML document."""
+    title = f"{story.first.vehicle}: from the first comparison to the last effect"
+    runs = story.first.plain.beside.runs
+    last = story.verdicts[-1]
+    return document(title, [
+        f"<h1>{escape(title)}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in runs))}</p>',
+        _tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
+        section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
+        section("What was missing", "".join(paragraphs(summary(one)) for one in story.verdicts)),
+        *map(_added, story.rounds),
+        section("Before and after", _spectra(story) + _place(story)) if story.rounds else "",
+        section("What the car's numbers had been taken for", _moved(story)),
+        section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))) if story.rounds else "",
+        shape_sections(last),
+        section("What these runs cannot tell, and which drive would", bullets(untested(last))),
+        section("Where the effects are from", bullets(
+            f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects)),
+    ])
+
+
+def _tiles(story: Story) -> str:
+    return tiles([
+        ("Error as the file says", f"{story.steps[0][1]:.3f}", ""),
+        ("Error at last", f"{story.steps[-1][1]:.3f}", "numbers refitted"),
+        ("The sensor's noise alone", "not known" if story.floor is None else f"{story.floor:.3f}", ""),
+        ("Effects added", f"{len(story.added)}", ""),
+    ])
+
+
+def _steps(story: Story) -> str:
+    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(story.steps)]
+    return (falling("Error of each model, on all samples", story.steps, story.floor)
+            + grid(("Step", "Model", "Error"), rows, words=(0, 1)))
+
+
+def _added(one: Round) -> str:
+    effects = [f"It leaves: {new.effect.signature}." for new in one.gained.new]
+    return section(f"Added: {' and '.join(one.gained.names)}", paragraphs(
+        [*judgement(one.gained), *effects, f"Written to {one.file}."]))
+
+
+def _moved(story: Story) -> str:
+    if not story.moved:
+        return ""
+    return (grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5))
+            + f'<p class="hint">{escape(MOVED_HINT)}</p>')
+
+
+def _spectra(story: Story) -> str:
+    """What was left before and after, by frequency."""
+    before, after = story.first.refitted.beside, story.last.refitted.beside
+    f_hz = frequencies(before)
+    kept = (f_hz > 0) & (f_hz <= _HIGHEST_OF_RATE * before.rate_hz)
+
+    def line(name: str, beside: Beside, measured: bool) -> Line:
+        power = np.mean(np.abs(segments(beside, beside.measured if measured else beside.left)) ** 2, axis=0) / f_hz[1]
+        return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
+
+    return picture(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", (
+        line("measured", before, True), line("left at first", before, False), line("left at last", after, False))))
+
+
+def _place(story: Story) -> str:
+    """The place that was worst at first, then and now."""
+    before, after = story.first.refitted, story.last.refitted
+    worst = worst_places(before.where, 1)[0]
+    beside = before.beside
+    index = next(i for i, run in enumerate(beside.runs) if run.name == worst.name)
+    run, left = beside.runs[index], beside.left[index]
+    at_m = run.distance_m[run.first:]
+    inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
+    middle = int(inside[np.abs(left[inside]).argmax()])
+    reach = round(_AROUND_S * beside.rate_hz)
+    part = slice(max(0, middle - reach), middle + reach)
+    time_s = (run.first + np.arange(len(left)))[part] / beside.rate_hz
+    name = short_names(beside.runs)[run.name]
+    lines = (Line("measured", time_s, beside.measured[index][part]),
+             Line("left at first", time_s, left[part]), Line("left at last", time_s, after.beside.left[index][part]))
+    return picture(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
+                          "acceleration [m/s2]", lines))
