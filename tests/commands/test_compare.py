@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compared import RATE_HZ, beside_with, recorded_by
 
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.store.drive_file import write_drive, write_profile
+
+from compared import RATE_HZ, beside_with, recorded_by
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,10 @@ import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+
 from cars import STEP_S, Axle, Car
 from effects import EFFECTS, NEVER_TOGETHER, Effect
-from numpy.typing import NDArray
 from outsiders import OUTSIDERS
 from recorder import HUNDREDTH_G_MPS2, RATE_HZ, Noise
 from roads import Road, random_road

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from cars import Car
 from effects import Effect, Parameters, Path, between, one
 from scene import Scene

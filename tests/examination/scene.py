@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from cars import STEP_S, Car, Physics, assemble, finer, ride
 from numpy.typing import NDArray
+
+from cars import STEP_S, Car, Physics, assemble, finer, ride
 from recorder import RATE_HZ, REACH_S, Sensor, record
 from roads import Road, wheel_path
 

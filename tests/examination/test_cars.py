@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from cars import GRAVITY_MPS2, Axle, Car, Physics, _damper, _damper_rate, assemble, integrate, ride
 
 CAR = Car("half_car", 650.0, 1000.0, Axle(1.2, 45.0, 24_000.0, 1500.0, 210_000.0),

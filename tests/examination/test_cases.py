@@ -6,10 +6,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import cases
 import numpy as np
 import pytest
 import yaml
+
+import cases
 from cases import Hidden, case, draw_car, mistaken, with_effects, without
 from effects import EFFECTS
 from outsiders import OUTSIDERS

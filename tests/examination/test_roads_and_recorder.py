@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, csd, freqs, welch
+
 from recorder import HUNDREDTH_G_MPS2, Noise, Sensor, band_limited, record
 from roads import CLASS_GD_M3, random_road, wheel_path
-from scipy.signal import butter, csd, freqs, welch
 
 STEP_S = 1 / 4000
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+
 from cars import Axle, Car
 from cases import Case, Recording
 from outsiders import Outsider

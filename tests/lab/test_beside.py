@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from compared import CAR, RATE_HZ, a_run, beside_with
 
 from logger.lab.beside import located, short_names
 from logger.lab.prediction import Run
+
+from compared import CAR, RATE_HZ, a_run, beside_with
 
 Array = npt.NDArray[np.float64]
 

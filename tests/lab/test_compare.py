@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compared import CAR, beside_with, recorded_by, runs_of
 
 from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
 from logger.lab.prediction import Runs
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Vehicle
+
+from compared import CAR, beside_with, recorded_by, runs_of
 
 NOISE_MPS2 = 0.015
 FRICTION = ("dry_friction", {"friction_force_n": 80.0})

@@ -7,7 +7,6 @@ from collections import Counter
 import numpy as np
 import numpy.typing as npt
 import pytest
-from compared import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 
 from logger.lab.alignment import aligned, drift
 from logger.lab.beside import Beside, located
@@ -15,6 +14,8 @@ from logger.lab.coherence import with_road
 from logger.lab.force_map import force_map
 from logger.lab.marks import Mark, Marks, read_marks, worst_places
 from logger.lab.prediction import Run, Runs
+
+from compared import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 
 Array = npt.NDArray[np.float64]
 NOISE_MPS2 = 0.05

@@ -7,10 +7,11 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
-from compared import CAR, beside_with, recorded_by, runs_of
 
 from logger.lab.compare import Comparison, compare, evidence, headline
 from logger.report.lab_page import page
+
+from compared import CAR, beside_with, recorded_by, runs_of
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,90 @@
+"""``ridelog add-effect``: the effect with its errors, what it changed, a vehicle file that reads back, and one line else.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_model
+
+from lacking import RUBBING, friction, write_runs
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    return write_runs(tmp_path_factory.mktemp("friction"), friction(70.0))
+
+
+def add(effect: str, vehicle: Path | str, out: Path, *arguments: str) -> int:
+    return main(["add-effect", effect, "--vehicle", str(vehicle), "--out", str(out), *arguments])
+
+
+def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = tmp_path / "with-friction.yaml", tmp_path / "with-both.yaml"
+    assert add("dry_friction", "rav4-2009", first, *runs, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["effect"] == "dry_friction"
+    error = told["standard_errors"]["friction_force_n"]
+    assert 0.01 < error < 7.0
+    assert told["parameters"]["friction_force_n"] == pytest.approx(70.0, abs=max(7.0, 3 * error))
+    assert told["noise_floor_error"] == pytest.approx(told["error_after"], rel=0.1)
+    assert told["error_after"] < told["error_refitted"] <= told["error_before"]
+    assert told["helps"] is True
+    assert {one["name"] for one in told["numbers"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
+
+    model = read_model(first)
+    assert [one.effect.name for one in model.effects] == ["dry_friction"]
+    assert model.effects[0].values == told["parameters"]
+    assert model.effects[0].standard_errors == told["standard_errors"]
+    assert [step.step for step in model.history] == ["as it was given", "numbers refitted", "added dry_friction"]
+    assert model.history[-1].error == told["error_after"]
+    mass = next(one for one in told["numbers"] if one["name"] == "sprung_mass_kg")
+    assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["with"]
+
+    # Rebound and bump are alike in this car: one more number gains nothing.
+    assert add("damper_asymmetry:rebound_to_bump_ratio=1.1", first, second, *runs) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "WARNING: it does not help" in words
+    assert [one.effect.name for one in read_model(second).effects] == ["dry_friction", "damper_asymmetry"]
+    assert [step.step for step in read_model(second).history][3:] == ["added damper_asymmetry"]
+    assert len(read_model(first).effects) == 1  # what was read stays as it is
+
+
+def test_for_a_person_with_an_effect_of_their_own(runs: list[str], tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    own, out = tmp_path / "rubbing.py", tmp_path / "mine.yaml"
+    own.write_text(RUBBING, "utf-8")
+    out.write_text(vehicle_file("rav4-2009").read_text("utf-8"), "utf-8")
+    assert add(str(own), out, out, *runs) == 0  # over the old file, as it was asked for
+    told = capsys.readouterr().out
+    assert told.startswith("rubbing: rubbing_n ")
+    for words in ("It helps", "Error before: ", "Error after: ", "sprung_mass_kg", "Shift", f"Vehicle: {out}"):
+        assert words in told
+    model = read_model(out)
+    assert model.effects[0].file == str(own)
+    assert 60.0 < model.effects[0].values["rubbing_n"] < 80.0
+
+
+def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:
+    has = tmp_path / "has.yaml"
+    has.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace(
+        "effects: []", "effects: [{name: wheel_lift}]"), "utf-8")
+    out = tmp_path / "out.yaml"
+    for effect, vehicle, to, words in (
+        ("wheel_lift", has, out, "without wheel_lift"),
+        ("rust", "rav4-2009", out, "no effect 'rust'"),
+        ("roll", "rav4-2009", out, "elevation_right_m"),
+        ("sensor_gain:gain=9000", "rav4-2009", out, "sensor_gain: expected gain of"),
+        ("sensor_gain:gain=much", "rav4-2009", out, "PARAM=NUMBER"),
+        ("sensor_gain", "rav4-2009", Path(runs[0]) / "drive.csv", "none of a run's"),
+        ("sensor_gain", "rav4-2009", tmp_path / "none" / "out.yaml", "a folder that there is"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            add(effect, vehicle, to, *runs)
+    assert not out.exists()

@@ -1,0 +1,138 @@
+"""``ridelog lab`` and ``ridelog demo --lab``: the loop with and without somebody to ask, its files and its page."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.store.effect_file import shipped_effects
+from logger.store.vehicle_file import read_model
+
+from lacking import FEW, friction, write_runs
+
+
+@pytest.fixture(autouse=True)
+def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = {name: shipped_effects()[name] for name in FEW}
+    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    return write_runs(tmp_path_factory.mktemp("friction"), friction(70.0))
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+    """Somebody at a terminal who gives these answers in turn; what they are asked is kept."""
+    def these(*answers: str) -> list[str]:
+        asked: list[str] = []
+        left = iter(answers)
+
+        def answer(question: str) -> str:
+            asked.append(question)
+            return next(left)
+
+        terminal = StringIO()
+        monkeypatch.setattr(terminal, "isatty", lambda: True, raising=False)
+        monkeypatch.setattr("sys.stdin", terminal)
+        monkeypatch.setattr("builtins.input", answer)
+        return asked
+
+    return these
+
+
+def lab(runs: list[str], out: Path, *arguments: str) -> int:
+    return main(["lab", "--vehicle", "rav4-2009", *runs, "--out", str(out), *arguments])
+
+
+class _Whole(HTMLParser):
+    """Tags that are open, and all that were."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.add(tag)
+        if tag not in ("meta", "path", "rect", "circle"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in ("meta", "path", "rect", "circle"):
+            assert self.open.pop() == tag
+
+
+def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                       monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", StringIO())
+    assert lab(runs, tmp_path / "out") == 0
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1 and "as with --yes" in told.err
+    order = [told.out.index(f"=== {title} ===") for title in
+             ("Compare", "Diagnose", "Add dry_friction", "Compare again", "The end")]
+    assert order == sorted(order)
+    assert "Nothing more is missing" in told.out
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["story.html", "vehicle-1.yaml"]
+    assert [one.effect.name for one in read_model(tmp_path / "out" / "vehicle-1.yaml").effects] == ["dry_friction"]
+    html = (tmp_path / "out" / "story.html").read_text("utf-8")
+    whole = _Whole()
+    whole.feed(html)
+    assert not whole.open and not {"script", "img", "link"} & whole.seen
+    assert not re.search(r"\b(nan|inf)\b", html)
+    for words in ("How the error fell", "with dry_friction", "Before and after", "What the car&#x27;s numbers",
+                  "Canudas" if "Canudas" in shipped_effects()["dry_friction"].source else "dry_friction (Coulomb"):
+        assert words in html
+
+
+def test_for_a_program_without_what_is_not_wanted(runs: list[str], tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    assert lab(runs, tmp_path / "out", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["added"] == ["dry_friction"] and told["refused"] == [] and told["unexplained"] is False
+    errors = [step["error"] for step in told["steps"]]
+    assert len(errors) == 3 and errors[0] == told["error_before"] and errors[2] == told["error_after"] < errors[1]
+    assert told["vehicles"] == [str(tmp_path / "out" / "vehicle-1.yaml")]
+
+
+def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                              answering: Callable[..., list[str]]) -> None:
+    asked = answering("rust", "no")
+    assert lab(runs, tmp_path) == 0
+    assert len(asked) == 2 and "Add dry_friction?" in asked[0]
+    told = capsys.readouterr().out
+    assert "Expected yes, no, or one of " in told
+    assert "left out as you wished: dry_friction" in told
+    assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
+
+
+def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                              answering: Callable[..., list[str]]) -> None:
+    answering("roll", "tire_damping", "y")
+    assert lab(runs, tmp_path) == 0
+    told = capsys.readouterr().out
+    assert "elevation_right_m" in told  # why it cannot be roll
+    assert told.index("=== Add tire_damping ===") < told.index("=== Add dry_friction ===")
+    assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["tire_damping",
+                                                                                            "dry_friction"]
+    assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
+
+
+def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--lab", "--unpack", "--out", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["runs"] == [str(tmp_path / "slow"), str(tmp_path / "brisk")]
+    with pytest.raises(BadInput, match="expected --lab"):
+        main(["demo", "--unpack"])
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInput, match="expected a folder"):
+        lab(told["runs"], tmp_path / "file")
