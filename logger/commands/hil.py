@@ -189,20 +189,20 @@ def _agreement_text(agreement: Agreement) -> list[str]:
                 "  Is the service up, are its ports the other ends of the wires, and is TX on RX?"]
     lines = [f"Session {agreement.session:05d}: {agreement.matched} of {agreement.expected} expected rows found, "
              f"{len(agreement.missing)} missing, {agreement.pending} not written yet, {len(agreement.surplus)} not "
-             f"expected, {agreement.flags_differ} with other flags."]
+             f"expected, {agreement.repeated} twice, {agreement.flags_differ} with other flags."]
     if abs(agreement.moved_before_m) > _MOVED_M:
         lines.append(f"  The service had counted {agreement.moved_before_m:.0f} m before, so its windows begin "
                      "elsewhere: start it anew for each play.")
     for words, segments in (("missing", agreement.missing), ("not expected", agreement.surplus)):
         if segments:
             lines.append(f"  {words}: segments {', '.join(map(str, segments[:10]))}{' ...' if segments[10:] else ''}")
-    lines.append(f"  {'':9} {'95 of 100':>9} {'largest':>8}        {'outside':>7}   may be")
+    lines.append(f"  {'':9} {'95 of 100':>9} {'largest':>8}         {'outside':>7}   may be")
     return lines + [_difference_text(difference) for difference in agreement.differences]
 
 
 def _difference_text(difference: Difference) -> str:
     tolerance = difference.tolerance
     share = f" or {tolerance.share:.0%} of {tolerance.of}" if tolerance.of else ""
-    return (f"  {tolerance.quantity:9} {difference.p95:9.3f} {difference.largest:8.3f} {tolerance.unit:6} "
+    return (f"  {tolerance.quantity:9} {difference.p95:9.3f} {difference.largest:8.3f} {tolerance.unit:7} "
             f"{difference.outside:7d}   {tolerance.least:g}{share}: {tolerance.why}"
             f"{'' if difference.ok else '  TOO MANY OUTSIDE'}")

@@ -9,7 +9,9 @@ Solution. The session and the shift between the two monotonic clocks are found b
 receiver's own sentences. Then each expected row is paired with the row that begins at the same travelled distance (one
 without a distance: at the same time), and each pair may differ by the ``TOLERANCES``, which are what a wobble of a few
 times 10 ms, the step of the sample grid, can do. One row in fifty, or one, may lie outside, for neither computer is a
-real-time one. No row may be missing, and none may be there that was not expected.
+real-time one. No row may be missing or stand twice, and none may be there that was not expected. Every column of the
+log is compared: the words with the figure of their own row, numbers that count on from the start less what they differ
+by in the middle.
 """
 
 from __future__ import annotations
@@ -17,13 +19,15 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, inf, nan, radians
 from pathlib import Path
 
 import numpy as np
 
+from logger.comfort.iso2631 import comfort_word
 from logger.records import WindowRecord
+from logger.roads.from_acceleration import iri_class
 from logger.service.pipeline import longest_wait_us
 from logger.store.rotation import LogName
 from logger.store.segment_log import read_log
@@ -40,11 +44,13 @@ _LATE_FLAGS = frozenset({"time_unset"})  # goes from the rows when their file is
 
 @dataclass(frozen=True)
 class Session:
-    """The rows of one start of the service, in order; ``is_open``: it may still be writing."""
+    """The rows of one start of the service, in order; ``is_open``: it may still be writing; ``repeated``: so many rows
+    stand twice in one file, or in two finished ones."""
 
     number: int
     rows: tuple[WindowRecord, ...]
     is_open: bool
+    repeated: int = 0
 
 
 @dataclass(frozen=True)
@@ -66,11 +72,27 @@ class Tolerance:
 
 TOLERANCES = (
     Tolerance("start", "s", 0.03, "three steps of the sample grid"),
+    Tolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by"),
+    Tolerance("duration", "s", 0.05, "a start and an end"),
     Tolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s"),
+    Tolerance("length", "m", 0.75, "as the distance"),
     Tolerance("place", "m", 1.0, "as the distance, and the digits of the log"),
     Tolerance("speed", "m/s", 0.1, "0.03 s of braking at 3 m/s2"),
     Tolerance("a_w", "m/s2", 0.03, "one sample in thirty belongs to the next window", share=0.1, of="a_w_mps2"),
+    Tolerance("accel rms", "m/s2", 0.03, "as a_w", share=0.1, of="accel_rms_mps2"),
+    Tolerance("MTVV", "m/s2", 0.03, "as a_w; its greatest second may end in the next window", share=0.15,
+              of="mtvv_mps2"),
+    Tolerance("VDV", "m/s1.75", 0.03, "as a_w", share=0.15, of="vdv_mps175"),
+    Tolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
+    Tolerance("comfort", "", 0, "the words for the row's own a_w"),
     Tolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
+    Tolerance("IRI std", "m/km", 0.1, "as the IRI", share=0.25, of="iri_std_m_per_km"),
+    Tolerance("IRI rms", "m/km", 0.1, "in proportion to the r.m.s. acceleration", share=0.1, of="iri_rms_m_per_km"),
+    Tolerance("class", "", 0, "that of the row's own IRI"),
+    Tolerance("samples", "", 4, "as the duration, at 100 Hz"),
+    Tolerance("clipped", "", 3, "a start and an end"),
+    Tolerance("segment", "", 0, "counted on"),
+    Tolerance("drive", "", 0, "counted on"),
 )
 
 
@@ -101,6 +123,7 @@ class Agreement:
     missing          segments that are expected and not there, by their number in the replay
     pending          expected rows at the end that an open log does not hold yet
     surplus          rows between the first and the last pair that were not expected, by their segment
+    repeated         rows that stand twice
     flags_differ     pairs with other flags
     """
 
@@ -112,13 +135,14 @@ class Agreement:
     missing: tuple[int, ...]
     pending: int
     surplus: tuple[int, ...]
+    repeated: int
     flags_differ: int
     differences: tuple[Difference, ...]
 
     @property
     def ok(self) -> bool:
         """Every row that must be there is, none else, and all agree."""
-        return (self.matched > 0 and not self.missing and not self.surplus
+        return (self.matched > 0 and not self.missing and not self.surplus and not self.repeated
                 and self.flags_differ <= _may_be_outside(self.matched)
                 and all(difference.ok for difference in self.differences))
 
@@ -132,9 +156,19 @@ def read_sessions(directory: Path) -> list[Session]:
     sessions = []
     for number, parts in sorted(files.items()):
         # A row that stands in two parts was written again after the disk had failed: the later one counts.
-        rows = {row.segment: row for *_, path in sorted(parts) for row in read_log(path).records}
+        rows: dict[int, WindowRecord] = {}
+        finished_segments: set[int] = set()
+        repeated = 0
+        for _, is_finished, path in sorted(parts):
+            records = read_log(path).records
+            own = {row.segment for row in records}
+            repeated += len(records) - len(own)
+            if is_finished:
+                repeated += len(own & finished_segments)
+                finished_segments |= own
+            rows |= {row.segment: row for row in records}
         is_open = not all(finished for _, finished, _ in parts)
-        sessions.append(Session(number, tuple(rows[segment] for segment in sorted(rows)), is_open))
+        sessions.append(Session(number, tuple(rows[segment] for segment in sorted(rows)), is_open, repeated))
     return sessions
 
 
@@ -144,13 +178,13 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridg
     anchors = [(_anchors(expected, rows), session, rows) for session in sessions for rows in [_last_pass(session.rows)]]
     pairs, session, rows = max(anchors, key=lambda found: (len(found[0]), found[1].number), default=([], None, ()))
     if session is None or not pairs:
-        return Agreement(None, len(expected), 0, nan, nan, tuple(row.segment for row in expected), 0, (), 0, ())
+        return Agreement(None, len(expected), 0, nan, nan, tuple(row.segment for row in expected), 0, (), 0, 0, ())
     shift_us = round(float(np.median([found.t_us - wanted.t_us for wanted, found in pairs])))
     moved_m = _median([found.distance_start_m - wanted.distance_start_m for wanted, found in pairs
                        if found.distance_start_m is not None and wanted.distance_start_m is not None])
     matched = _pairs(expected, rows, shift_us)
-    differences = tuple(_difference(tolerance, _MEASURES[tolerance.quantity], matched, shift_us)
-                        for tolerance in TOLERANCES)
+    aligned = _aligned(matched, shift_us)
+    differences = tuple(_difference(tolerance, _MEASURES[tolerance.quantity], aligned) for tolerance in TOLERANCES)
     held = {wanted.segment for wanted, _ in matched}
     absent = [row for row in expected if row.segment not in held]
     pending = _pending(expected, absent, longest_wait_us(bridge_s)) if session.is_open else 0
@@ -163,13 +197,14 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridg
         missing=tuple(row.segment for row in absent[:len(absent) - pending]),
         pending=pending,
         surplus=_surplus(rows, {found.segment for _, found in matched}),
+        repeated=session.repeated,
         flags_differ=sum(not set(wanted.flags) ^ set(found.flags) <= _LATE_FLAGS for wanted, found in matched),
         differences=differences,
     )
 
 
 Pair = tuple[WindowRecord, WindowRecord]
-Measure = Callable[[WindowRecord, WindowRecord, int], float | None]
+Measure = Callable[[WindowRecord, WindowRecord], float | None]
 
 
 def _last_pass(rows: Sequence[WindowRecord]) -> Sequence[WindowRecord]:
@@ -219,6 +254,15 @@ def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift
     return pairs
 
 
+def _aligned(pairs: Sequence[Pair], shift_us: int) -> list[Pair]:
+    """The pairs with the service's clock, segments and drives counted as in the replay. Where no rows were written
+    before, no drive had been either."""
+    segments = round(_median([found.segment - wanted.segment for wanted, found in pairs]))
+    drives = round(_median([found.drive - wanted.drive for wanted, found in pairs])) if segments else 0
+    return [(wanted, replace(found, t_us=found.t_us - shift_us, segment=found.segment - segments,
+                             drive=found.drive - drives)) for wanted, found in pairs]
+
+
 def _nearest(values: Sequence[float], wanted: float) -> int | None:
     """Index of the value nearest to ``wanted``; the values rise."""
     if not values:
@@ -232,7 +276,9 @@ def _pending(expected: Sequence[WindowRecord], absent: Sequence[WindowRecord], w
     """How many of the absent rows are the last ones, and ended so late that they may still be waited for."""
     count = 0
     since_us = _end_us(expected[-1]) - wait_us
-    while count < len(absent) and absent[-1 - count] is expected[-1 - count] and _end_us(absent[-1 - count]) >= since_us:
+    for wanted, last in zip(reversed(expected), reversed(absent), strict=False):
+        if wanted is not last or _end_us(wanted) < since_us:
+            break
         count += 1
     return count
 
@@ -246,8 +292,8 @@ def _surplus(rows: Sequence[WindowRecord], held: set[int]) -> tuple[int, ...]:
     return tuple(row.segment for row in rows if first < row.segment < last and row.segment not in held)
 
 
-def _difference(tolerance: Tolerance, measure: Measure, pairs: Sequence[Pair], shift_us: int) -> Difference:
-    found = [(measure(wanted, row, shift_us), tolerance.limit(wanted)) for wanted, row in pairs]
+def _difference(tolerance: Tolerance, measure: Measure, pairs: Sequence[Pair]) -> Difference:
+    found = [(measure(wanted, row), tolerance.limit(wanted)) for wanted, row in pairs]
     known = [(value, limit) for value, limit in found if value is not None]
     finite = [value for value, _ in known if value != inf]
     return Difference(
@@ -260,9 +306,7 @@ def _difference(tolerance: Tolerance, measure: Measure, pairs: Sequence[Pair], s
 
 
 def _of(attribute: str) -> Measure:
-    def measure(wanted: WindowRecord, found: WindowRecord, _shift_us: int) -> float | None:
-        return _apart(getattr(wanted, attribute), getattr(found, attribute))
-    return measure
+    return lambda wanted, found: _apart(getattr(wanted, attribute), getattr(found, attribute))
 
 
 def _apart(wanted: float | None, found: float | None) -> float | None:
@@ -272,11 +316,31 @@ def _apart(wanted: float | None, found: float | None) -> float | None:
     return inf if wanted is None or found is None else abs(found - wanted)
 
 
-def _start_apart_s(wanted: WindowRecord, found: WindowRecord, shift_us: int) -> float:
-    return abs(found.t_us - wanted.t_us - shift_us) / US_PER_S
+def _time_of(attribute: str) -> Measure:
+    def measure(wanted: WindowRecord, found: WindowRecord) -> float | None:
+        apart_us = _apart(getattr(wanted, attribute), getattr(found, attribute))
+        return None if apart_us is None else apart_us / US_PER_S
+    return measure
 
 
-def _place_apart_m(wanted: WindowRecord, found: WindowRecord, _shift_us: int) -> float | None:
+def _length_m(row: WindowRecord) -> float | None:
+    return None if row.distance_end_m is None or row.distance_start_m is None \
+        else row.distance_end_m - row.distance_start_m
+
+
+def _contradicts(said: str, meant: str) -> float:
+    return 0.0 if said == meant else inf
+
+
+def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
+
+
+def _class_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    return _contradicts(found.iri_class, iri_class(found.iri_m_per_km) if found.iri_m_per_km is not None else "")
+
+
+def _place_apart_m(wanted: WindowRecord, found: WindowRecord) -> float | None:
     """On the ground, taken as flat between two places so near."""
     north_deg, east_deg = _apart(wanted.lat_deg, found.lat_deg), _apart(wanted.lon_deg, found.lon_deg)
     if north_deg is None or east_deg is None or wanted.lat_deg is None:
@@ -286,12 +350,27 @@ def _place_apart_m(wanted: WindowRecord, found: WindowRecord, _shift_us: int) ->
 
 
 _MEASURES: dict[str, Measure] = {
-    "start": _start_apart_s,
+    "start": _time_of("t_us"),
+    "UTC": _time_of("utc_us"),
+    "duration": _of("duration_s"),
     "distance": _of("distance_start_m"),
+    "length": lambda wanted, found: _apart(_length_m(wanted), _length_m(found)),
     "place": _place_apart_m,
     "speed": _of("speed_mps"),
     "a_w": _of("a_w_mps2"),
+    "accel rms": _of("accel_rms_mps2"),
+    "MTVV": _of("mtvv_mps2"),
+    "VDV": _of("vdv_mps175"),
+    "crest": _of("crest_factor"),
+    "comfort": _comfort_contradicts,
     "IRI": _of("iri_m_per_km"),
+    "IRI std": _of("iri_std_m_per_km"),
+    "IRI rms": _of("iri_rms_m_per_km"),
+    "class": _class_contradicts,
+    "samples": _of("samples"),
+    "clipped": _of("clipped_samples"),
+    "segment": _of("segment"),
+    "drive": _of("drive"),
 }
 
 
