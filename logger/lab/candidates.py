@@ -31,10 +31,7 @@ from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 Array = npt.NDArray[np.float64]
 
 _STRONGEST, _WEAKEST = 3.0, 0.03
-_FIRST_STEPS, _LAST_STEPS = 5, 4
-_STARTS = 2
-# A second start is followed too when its trial explains at least this share of what the best one does.
-_SECOND_SHARE = 0.6
+_STEPS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,52 +87,62 @@ class Tried:
 
 
 @dataclass(frozen=True, eq=False)
-class Screened:
-    """What trials of an effect promise.
+class Trial:
+    """An effect at one set of values, and what it would do.
 
-    starts    where fits begin, the most promising first
-    gain      how much of the weighed squares the best would explain
+    gain    how much of the weighed squares it would explain, with the car's numbers and the wander moved by ``step``
+    step    (count,)
     """
 
-    effect: Effect
-    starts: tuple[Chosen, ...]
+    one: Chosen
     gain: float
+    step: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves."""
+
+    effect: Effect
+    trials: tuple[Trial, ...]
+
+    @property
+    def gain(self) -> float:
+        """Of the most promising one."""
+        return self.trials[0].gain
 
 
 def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -> Screened:
     """Trials of an effect on a model."""
-    ranked: dict[tuple[float, ...], list[tuple[float, Chosen]]] = {}
+    best: dict[tuple[float, ...], Trial] = {}
     for values in effect.trials(seen):
-        one = chosen(effect, values)
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
-        ranked.setdefault(choice, []).append(_promised(problem, base, one))
-    starts, best = [], -np.inf
-    for group in ranked.values():
-        group.sort(key=lambda pair: -pair[0])
-        best = max(best, group[0][0])
-        starts += [one for gain, one in group[:_STARTS] if gain >= _SECOND_SHARE * group[0][0]] or [group[0][1]]
-    return Screened(effect, tuple(starts), best)
+        trial = _trial(problem, base, chosen(effect, values))
+        if choice not in best or trial.gain > best[choice].gain:
+            best[choice] = trial
+    return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)))
 
 
-def fitted(problem: Problem, base: Base, promise: Screened, thoroughly: bool) -> Tried:
-    """The model of ``base`` with an effect, fitted with all the others; else one step from its best start."""
-    starts = promise.starts if thoroughly else promise.starts[:1]
-    tries = [_fitted(problem, base, (*base.state.effects, start), thoroughly) for start in starts]
+def as_screened(problem: Problem, base: Base, promise: Screened) -> Tried:
+    """The model of ``base`` with an effect at its most promising trial, not fitted further."""
+    trial = promise.trials[0]
+    logs, wander = base.weighed.parted(base.weighed.joined(base.state) + trial.step)
+    return _tried(problem, base, problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes))
+
+
+def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
+    """The model of ``base`` with an effect, fitted with all the others, on the slopes of ``base``."""
+    tries = []
+    for trial in promise.trials:
+        effects = (*base.state.effects, trial.one)
+        state = problem.predicted(effects, base.state.logs, base.state.wander, base.slopes)
+        tries.append(_tried(problem, base, improved(base.weighed, state, moves_of(effects), _STEPS)))
     return max(tries, key=lambda one: one.gain)
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
     """The same with slopes of its own."""
     return _tried(problem, base, settled(problem, one.state, rounds)[0])
-
-
-def _fitted(problem: Problem, base: Base, effects: tuple[Chosen, ...], thoroughly: bool) -> Tried:
-    moves = moves_of(effects, None if thoroughly else [len(effects) - 1])
-    state = problem.predicted(effects, base.state.logs, base.state.wander, base.slopes)
-    state = improved(base.weighed, state, moves, _FIRST_STEPS if thoroughly else 1)
-    if thoroughly:
-        state = improved(Weighed(problem, base.slopes, problem.whiteners(state)), state, moves, _LAST_STEPS)
-    return _tried(problem, base, state)
 
 
 def _tried(problem: Problem, base: Base, state: State) -> Tried:
@@ -146,22 +153,22 @@ def _tried(problem: Problem, base: Base, state: State) -> Tried:
                  base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers)
 
 
-def _promised(problem: Problem, base: Base, one: Chosen) -> tuple[float, Chosen]:
-    """How much of the weighed squares a trial would explain, and the trial at the strength at which it does."""
+def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
+    """A trial at the strength at which it explains most."""
     weighed, state = base.weighed, base.state
     there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes)
     change = [whitener((new - old)[None]) for whitener, new, old in zip(
         weighed.whiteners, there.predictions, state.predictions, strict=True)]
-    mixed = weighed.against(change)[:, 0]
+    absorbed = base.uncertainty @ weighed.against(change)[:, 0]
     along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True))
-    own = sum(float(c[0] @ c[0]) for c in change) - float(mixed @ base.uncertainty @ mixed)
+    own = sum(float(c[0] @ c[0]) for c in change) - float(weighed.against(change)[:, 0] @ absorbed)
     if not own > 0:
-        return 0.0, one
+        return Trial(one, 0.0, np.zeros_like(absorbed))
     strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))
     scaled = _scaled(one, strength)
     if scaled is None:
-        return 2 * along - own, one
-    return 2 * strength * along - strength**2 * own, scaled
+        return Trial(one, 2 * along - own, -absorbed)
+    return Trial(scaled, 2 * strength * along - strength**2 * own, -strength * absorbed)
 
 
 def _scaled(one: Chosen, strength: float) -> Chosen | None:

@@ -18,7 +18,7 @@ from os import cpu_count
 
 import numpy as np
 
-from logger.lab.candidates import Base, Screened, Tried, fitted, misalignment, screened, settled_further
+from logger.lab.candidates import Base, Screened, Tried, as_screened, fitted, misalignment, screened, settled_further
 from logger.lab.fitting import Problem, State, settled
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 
@@ -34,9 +34,11 @@ UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
 HARM = 0.002
 """What an effect may raise that mean by, on stretches that no fit saw."""
+# A band is louder than the noise from so many deviations of the difference on.
+_LOUDER = 2.5
 _WORTH_FITTING = 0.03
-_LEAST_PROMISE = 6.0
-_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 7, 4, 0.1, 4
+_LEAST_PROMISE = 12.0
+_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _MOST_THREADS = 4
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
@@ -124,7 +126,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     taken: list[_Taken] = []
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}")
-        tried = _round(problem, now, left, seen, progress)
+        tried = _round(problem, now, left, seen, progress, whatever=number == 1)
         first = first or tried
         best = next((one for one in tried if _accepted(problem, one, len(left))), None)
         if best is None:
@@ -162,25 +164,25 @@ def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequenc
 
 
 def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalignment,
-           progress: Progress) -> list[Tried]:
-    """Every effect tried on the model, best first."""
+           progress: Progress, whatever: bool) -> list[Tried]:
+    """Every effect tried on the model, best first; if none promises more than chance, nothing, unless ``whatever``."""
     with ThreadPoolExecutor(min(_MOST_THREADS, cpu_count() or 1)) as pool:
         promises: list[Screened] = []
         for done, one in enumerate(pool.map(lambda effect: screened(problem, now, effect, seen), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")
             promises.append(one)
         promises.sort(key=lambda one: -one.gain)
+        if promises[0].gain < _LEAST_PROMISE and not whatever:
+            return []
         least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
         deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
-        tried: list[Tried] = []
-        jobs = pool.map(lambda one: fitted(problem, now, one, one.effect.name in deep), promises)
-        for done, found in enumerate(jobs, 1):
-            progress(f"fitted {done} of {len(promises)} effects")
-            tried.append(found)
-        tried.sort(key=_merit)
+        progress(f"fitting {len(deep)} of them")
+        tried = sorted(pool.map(
+            lambda one: (fitted if one.effect.name in deep else as_screened)(problem, now, one), promises,
+        ), key=_merit)
         finalists = [one for one in tried[:_MOST_FINALISTS] if one.effect.name in deep
                      and one.whole_gain > _FINALIST_SHARE * tried[0].whole_gain]
-        progress(f"settling {len(finalists)} of {len(promises)} effects")
+        progress(f"settling {len(finalists)} of them")
         further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
     return sorted([*further, *(one for one in tried if one not in finalists)], key=_merit)
 
@@ -228,7 +230,8 @@ def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
             name = now.state.effects[place].effect.name
             progress(f"is {name} still needed?")
             rest = now.state.effects[:place] + now.state.effects[place + 1:]
-            other = Base.of(problem, *settled(problem, problem.laid_out(rest, now.state.logs, now.state.wander)))
+            start = problem.laid_out(rest, now.state.logs, now.state.wander)
+            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS))
             worth[name] = other.fitted + other.judged - now.fitted - now.judged
             without[name] = other
         least = min(worth, key=lambda name: worth[name])
@@ -241,10 +244,17 @@ def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
 
 
 def _noise(problem: Problem, state: State) -> Noise:
-    """The sensor's noise, from where no car moves it: the highest frequencies."""
+    """The sensor's noise, taken for white: from the highest frequencies, where no car moves it, and, from there down,
+    from every band that is no louder than what was found above it."""
     quiet = [one.quiet(left) for one, left in zip(problem.stretches, problem.residuals(state), strict=True)]
     freedom = sum(n for _, n in quiet)
     power = sum(level * n for level, n in quiet) / freedom
+    cells = problem.cells(state, None)
+    for band in reversed(range(min(len(one.power) for one in cells))):
+        n = sum(float(one.freedom[band]) for one in cells)
+        level = sum(float(one.freedom[band] * one.power[band]) for one in cells) / n
+        if level < power * (1 + _LOUDER * np.sqrt(2 / n + 2 / freedom)):
+            power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 
