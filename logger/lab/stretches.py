@@ -80,6 +80,8 @@ class Stretches:
     def cells(self, residual: Array, fitted: bool | None = True) -> Cells:
         """Of a residual (n,), whole; of the stretches that were fitted, of those that judge, or (None) of all."""
         starts = self._starts if fitted is None else self._sets[fitted]
+        if not len(starts):  # no stretch judges
+            return Cells(np.ones(len(self._members)), np.zeros(len(self._members)))
         spectrum = self._spectrum(residual, starts)
         power = np.array([spectrum[one].mean() for one in self._members])
         span_s = len(self.fit) if fitted is None else (self.fit == fitted).sum()

@@ -1,0 +1,135 @@
+"""Fits of the lab, on runs of the examination's own simulator: what was off is found, with errors that hold."""
+
+import json
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from logger.identification.parameters import read
+from logger.lab.addition import add
+from logger.lab.candidates import Base, fitted, misalignment, screened
+from logger.lab.fitting import Problem, located, settled
+from logger.lab.nuisance import Tolerance, wander_of
+from logger.lab.prediction import Run, Runs
+from logger.store.drive_file import read_run
+from logger.store.effect_file import shipped_effects
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.effect import chosen
+from logger.vehicle.vehicle import Vehicle
+
+EXAMINATION = Path(__file__).parents[1] / "examination"
+EFFECTS = shipped_effects()
+
+
+@cache
+def examined(kind: str, seed: int, effect: str | None = None, fine_hz: float = 500.0) -> tuple[Vehicle, Runs, dict]:
+    """A case of the examination: its nominal vehicle, two of its runs, and the truth."""
+    import subprocess
+    import sys
+
+    with TemporaryDirectory() as folder:
+        named = [] if effect is None else ["--effect", effect]
+        subprocess.run([sys.executable, str(EXAMINATION / "make.py"), "--kind", kind, "--first-seed", str(seed), *named,
+                        "--out", f"{folder}/cases", "--truth", f"{folder}/truth"], check=True, capture_output=True)
+        case = next(Path(folder, "cases").iterdir())
+        truth = json.loads(next(Path(folder, "truth").iterdir()).read_text())
+        runs = []
+        for one in sorted(case.glob("run*"))[:2]:
+            run = read_run(one)
+            kept = slice(0, 3200)
+            runs.append(Run(one.name, run.rate_hz, run.accel_z_mps2[kept], run.distance_m[kept], run.speed_mps[kept],
+                            run.track))
+        return read_vehicle(case / "vehicle.yaml"), Runs(runs, fine_hz), truth
+
+
+def true_number(truth: dict, name: str) -> float:
+    found = truth["vehicle"]
+    for part in name.split("."):
+        found = found[part]
+    return float(found)
+
+
+def test_a_car_that_lacks_nothing_settles_at_the_noise_and_at_its_true_numbers() -> None:
+    vehicle, runs, truth = examined("none", 3)
+    problem = Problem(runs, vehicle, Tolerance(), whole=True)
+    nominal = problem.start()
+    state, _ = settled(problem, nominal)
+    measured = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
+    noise = truth["noise"]["rms_mps2"] / np.sqrt((measured**2).mean())
+    assert problem.error(state) < problem.error(nominal)
+    assert problem.error(state) == pytest.approx(noise, rel=0.05)
+    added = add(problem, [], [])
+    off = [(one.found - true_number(truth, one.name)) / one.found_standard_error for one in added.numbers]
+    assert np.sqrt(np.mean(np.square(off))) < 1.6
+
+
+def test_an_effect_is_found_with_its_number_and_its_error() -> None:
+    vehicle, runs, truth = examined("one", 3, "damper_asymmetry")
+    problem = Problem(runs, vehicle, Tolerance(), whole=True)
+    base = Base.of(problem, *settled(problem, problem.start()))
+    seen = misalignment(problem, base.state)
+    found = fitted(problem, base, screened(problem, base, EFFECTS["damper_asymmetry"], seen))
+    assert found.gain > 100
+    added = add(problem, [], found.state.effects)
+    ratio, true = added.effects[0].values["rebound_to_bump_ratio"], truth["effects"][0]["parameters"]
+    error = added.effects[0].standard_errors["rebound_to_bump_ratio"]
+    assert abs(ratio - true["rebound_to_bump_ratio"]) < max(4 * error, 0.02 * ratio)
+    assert added.error_after < added.error_refitted < added.error_before
+    assert read(added.vehicle, "sprung_mass_kg") == added.numbers[0].found
+
+
+def test_a_null_effect_explains_nothing() -> None:
+    vehicle, runs, _ = examined("none", 3)
+    problem = Problem(runs, vehicle, Tolerance())
+    base = Base.of(problem, *settled(problem, problem.start()))
+    state = problem.predicted((chosen(EFFECTS["sensor_gain"], {"gain": 1.0}),), base.state.logs, base.state.wander,
+                              base.slopes)
+    assert problem.deviance(state) == pytest.approx(base.fitted, abs=1e-6)
+
+
+def test_a_distance_that_wandered_is_put_right() -> None:
+    vehicle, runs, _ = examined("none", 3)
+    time_s = np.arange(runs.runs[0].count) / runs.runs[0].rate_hz
+    off_m = 0.02 * np.sin(2 * np.pi * time_s / 30.0)
+    moved = Runs([Run(one.name, one.rate_hz, one.measured_mps2, one.distance_m - off_m[: one.count], one.speed_mps,
+                      one.track) for one in runs.runs], 500.0)
+    problem = Problem(moved, vehicle, Tolerance(), whole=True)
+    still = Problem(runs, vehicle, Tolerance(), whole=True)
+    state, _ = settled(problem, problem.start())
+    as_it_was, _ = settled(still, still.start())
+    found = problem.moved_m(state.wander)[0] - still.moved_m(as_it_was.wander)[0]
+    kept = slice(runs.runs[0].first, None)
+    assert np.std((found - off_m)[kept]) < 0.35 * np.std(off_m[kept])
+
+
+def test_where_the_car_was_is_found_from_all_stretches_also_those_that_judge() -> None:
+    vehicle, runs, _ = examined("none", 3)
+    problem = Problem(runs, vehicle, Tolerance())
+    state, slopes = settled(problem, problem.start())
+    assert problem.deviance(located(problem, state, slopes), fitted=False) < problem.deviance(state, fitted=False) + 1
+
+
+def test_the_prior_of_the_wander_has_the_spread_it_was_given() -> None:
+    run = examined("none", 3)[1].runs[0]
+    tolerance = Tolerance(scale=1e-9)
+    wander = wander_of(run, tolerance)
+    covariance = np.linalg.inv(wander.precision)
+    last = wander.basis[-1]
+    lasts_s = run.count / run.rate_hz
+    deviation_m = np.hypot(tolerance.start_m, tolerance.wander_m * lasts_s**0.5)
+    assert np.sqrt(last @ covariance @ last) == pytest.approx(deviation_m, rel=0.02)
+
+
+def test_a_late_clock_and_a_wrong_wheel_are_seen_before_any_fit() -> None:
+    vehicle, runs, _ = examined("none", 3)
+    late = Runs([Run(one.name, one.rate_hz, np.roll(one.measured_mps2, 6), one.distance_m, one.speed_mps, one.track)
+                 for one in runs.runs], 500.0)
+    problem = Problem(late, vehicle, Tolerance())
+    assert misalignment(problem, problem.start()).delay_s == pytest.approx(0.06, abs=0.006)
+    scaled = Runs([Run(one.name, one.rate_hz, one.measured_mps2, one.distance_m * 1.02, one.speed_mps * 1.02, one.track)
+                   for one in runs.runs], 500.0)
+    problem = Problem(scaled, vehicle, Tolerance())
+    assert misalignment(problem, problem.start()).scale == pytest.approx(1.02, abs=0.004)

@@ -1,0 +1,56 @@
+"""Stretches, bands and weights: white noise of known level is measured at that level, and weighed to one."""
+
+import numpy as np
+import pytest
+
+from logger.lab.prediction import Run
+from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance
+from logger.roads.track import Track
+
+
+def run_of(samples: int, rate_hz: float = 100.0) -> Run:
+    zeros = np.zeros(samples)
+    return Run("run", rate_hz, zeros, np.arange(samples) * 0.1, zeros + 10.0, Track(1.0, np.zeros(3)))
+
+
+def test_two_thirds_of_the_time_are_fitted_and_the_rest_judges() -> None:
+    stretches = Stretches(run_of(200 + 36 * 100))
+    assert stretches.judges
+    assert stretches.fit.sum() == pytest.approx(36 * 100 * FIT_S / (FIT_S + JUDGE_S))
+
+
+def test_a_run_too_short_to_judge_is_fitted_whole() -> None:
+    stretches = Stretches(run_of(200 + 1300))
+    assert not stretches.judges
+    assert stretches.fit.all()
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 80.0, 200.0])
+def test_white_noise_has_its_variance_in_every_band_and_where_it_is_quiet(rate_hz: float) -> None:
+    samples = round(400 * rate_hz)
+    noise = np.random.default_rng(1).normal(0, 0.05, samples)
+    stretches = Stretches(run_of(samples, rate_hz))
+    cells = stretches.cells(noise, None)
+    deviations = (cells.power / 0.05**2 - 1) / np.sqrt(2 / cells.freedom)
+    assert np.abs(deviations).max() < 4.0  # of some twenty bands
+    power, freedom = stretches.quiet(noise)
+    assert abs(power / 0.05**2 - 1) < 4 * np.sqrt(2 / freedom)
+
+
+def test_weighed_noise_of_any_colour_has_the_power_of_its_bands() -> None:
+    rng = np.random.default_rng(2)
+    coloured = np.convolve(rng.normal(0, 1, 12_200), [1.0, 1.6, 0.8], "same")
+    stretches = Stretches(run_of(12_200))
+    cells = stretches.cells(coloured)
+    white = Whitener(stretches, cells)(coloured)
+    assert len(white) == stretches.fit.sum()
+    in_bands = (stretches.edges_hz[-1] - stretches.edges_hz[0]) / 50.0
+    assert (white**2).mean() == pytest.approx(in_bands, rel=0.05)
+    assert (Whitener(stretches, cells, whole=True)(coloured)).shape == (12_000,)
+
+
+def test_what_is_twice_as_strong_costs_the_logarithm_of_four_for_each_degree_of_freedom() -> None:
+    noise = np.random.default_rng(3).normal(0, 0.05, 6000)
+    stretches = Stretches(run_of(6000))
+    once, twice = stretches.cells(noise, None), stretches.cells(2 * noise, None)
+    assert deviance([twice]) - deviance([once]) == pytest.approx(np.log(4) * once.freedom.sum())
