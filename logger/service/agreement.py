@@ -300,8 +300,8 @@ def _difference(tolerance: Tolerance, measure: Measure, pairs: Sequence[Pair]) -
         tolerance=tolerance,
         compared=len(known),
         p95=float(np.percentile(finite, 95)) if finite else nan,
-        largest=max(finite, default=nan),
-        outside=sum(value > limit for value, limit in known),
+        largest=float(max(finite, default=nan)),
+        outside=sum(bool(value > limit) for value, limit in known),
     )
 
 

@@ -29,7 +29,6 @@ from logger.store.exported import Mark, logger_identity, mark_exported, read_mar
 from logger.store.manifest import Manifest, format_manifest, parse_manifest
 from logger.store.open_folder import OpenFile, OpenFolder
 
-FOLDER = "ridelog"
 FILES_PER_MANIFEST = 32
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
@@ -107,12 +106,12 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
             raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
                            "service's user or with sudo") from None
         try:
-            with root.inside(FOLDER) as common, common.inside(identity) as own:
+            with root.inside(manifest.FOLDER) as common, common.inside(identity) as own:
                 if not own.lock():
                     raise OSError(errno.EBUSY, "another export is writing to this stick")
                 return _Export(card, own, identity, tell).run(names)
         except OSError as error:
-            reason = f"{FOLDER}/{identity} on the stick: {_reason(error)}"
+            reason = f"{manifest.FOLDER}/{identity} on the stick: {_reason(error)}"
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
 
 

@@ -12,12 +12,17 @@ import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+
+FOLDER = "ridelog"
+"""On a stick: a logger's files are in ``FOLDER/<identity>``."""
 
 NAME = "manifest.sha256"
 MAX_BYTES = 64_000_000
 
 _FIRST = "# ridelog-manifest 1 logger "
-_HEAD = re.compile(re.escape(_FIRST) + r"([0-9a-f]{12})")
+_IDENTITY = re.compile(r"[0-9a-f]{12}")
+_HEAD = re.compile(re.escape(_FIRST) + f"({_IDENTITY.pattern})")
 _ENTRY = re.compile(r"([0-9a-f]{64})  ([0-9][0-9A-Za-z._-]{0,63})")
 _LAST = re.compile(r"# (\d+) files, list ([0-9a-f]{64})")
 
@@ -28,6 +33,11 @@ class Manifest:
 
     logger: str
     files: Mapping[str, str]
+
+
+def is_of_export(folder: Path) -> bool:
+    """True for the folder of a logger on a stick, which has to hold a manifest."""
+    return folder.parent.name == FOLDER and _IDENTITY.fullmatch(folder.name) is not None
 
 
 def format_manifest(manifest: Manifest) -> bytes:

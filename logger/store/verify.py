@@ -6,7 +6,7 @@ corrupt, a last one without its end is torn. Rows that are missing show as a gap
 through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
 had, so that a file cut neatly between two rows shows too. A part, of a log or of a recording, that ends in a torn row
 is simply open.
-A stick that logs were exported to is compared with the manifest that lies beside them.
+A stick that logs were exported to is compared with the manifest that lies beside them, and has to have one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
-from logger.store.manifest import parse_manifest
+from logger.store.manifest import is_of_export, parse_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.rotation import LogName, read_sidecar
 from logger.store.segment_log import Row, scan
@@ -117,13 +117,15 @@ def _files_of(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
-    files = sorted(file for file in path.rglob("*")
-                   if file.is_file() and not file.is_symlink()
-                   and (LogName.of(file) or file.name == manifest.NAME
-                        or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS))))
+    inside = [file for file in (path, *path.rglob("*")) if not file.is_symlink()]
+    files = {file for file in inside if file.is_file()
+             and (LogName.of(file) or file.name == manifest.NAME
+                  or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
+    # An export without its manifest cannot be checked: one that is not there is looked for all the same.
+    files |= {folder / manifest.NAME for folder in inside if folder.is_dir() and is_of_export(folder.resolve())}
     if not files:
         raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
-    return files
+    return sorted(files)
 
 
 def _is_part(path: Path) -> bool:
@@ -194,11 +196,17 @@ def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
     except ValueError as error:
         findings.wrong(f"sidecar: {error}")
         return
-    said = sidecar.get("log") if sidecar else None
+    if sidecar is None:
+        if LogName.of(path):
+            findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
+        return
+    said = sidecar.get("log")
     rows = said.get("rows") if isinstance(said, dict) else None
-    if isinstance(rows, int) and rows > findings.good + findings.corrupt + findings.torn:
+    if not isinstance(rows, int):
+        findings.wrong("sidecar: expected the number of rows of a finished log")
+    elif not findings.good <= rows <= findings.good + findings.corrupt + findings.torn:
         findings.gaps += 1
-        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of")
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of, found {findings.good}")
 
 
 def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
@@ -263,6 +271,10 @@ def _check_manifest(path: Path) -> FileCheck:
     with OpenFolder.at(path.parent) as folder:
         try:
             listed = parse_manifest(folder.read(manifest.NAME, manifest.MAX_BYTES)).files
+        except OSError as error:
+            findings.gaps = 1
+            findings.wrong(f"expected a list of what was exported ({error.strerror}); export again")
+            return findings.check(path, "manifest", "manifest")
         except ValueError as error:
             findings.corrupt = 1
             findings.wrong(f"corrupt: {error}")

@@ -13,6 +13,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.records import WindowRecord
+from logger.store.export import export
 from logger.store.rotation import SegmentLog, repair
 from logger.store.segment_log import HEADER, format_row
 from logger.store.verify import SHOWN_PROBLEMS, FileCheck, verify
@@ -71,7 +72,7 @@ def test_sound_log(tmp_path: Path) -> None:
     assert (check.kind, check.state, counts(check), check.ok) == ("log", "finished", (3, 0, 0, 0), True)
 
 
-def test_log_without_its_sidecar_is_sound(tmp_path: Path) -> None:
+def test_a_copy_under_another_name_needs_no_sidecar(tmp_path: Path) -> None:
     assert found(store(tmp_path / "copy.csv", lines_of(row(5), row(6)))).ok
 
 
@@ -152,7 +153,8 @@ def test_rows_that_the_sidecar_tells_of_are_missed(tmp_path: Path) -> None:
     log_in(tmp_path, 1, 2, 3).close()
     store(tmp_path / "00001-001.csv", lines_of(row(1), row(2)))
     check = found(tmp_path / "00001-001.csv")
-    assert (counts(check), check.problems) == ((2, 0, 0, 1), ("gap: expected the 3 rows that the sidecar tells of",))
+    assert counts(check) == (2, 0, 0, 1)
+    assert check.problems == ("gap: expected the 3 rows that the sidecar tells of, found 2",)
 
 
 def test_damaged_sidecar_is_wrong(tmp_path: Path) -> None:
@@ -267,3 +269,52 @@ def test_command_refuses_with_status_2(tmp_path: Path) -> None:
     with pytest.raises(BadInput) as caught:
         main(["verify", str(tmp_path / "none")])
     assert caught.value.exit_status == 2
+
+
+@pytest.fixture
+def stick(tmp_path: Path) -> Path:
+    """A stick with the export of one log; gives the logger's folder on it."""
+    (tmp_path / "log").mkdir()
+    (tmp_path / "stick").mkdir()
+    log_in(tmp_path / "log", 1, 2, 3).close()
+    done = export(tmp_path / "log", tmp_path / "stick", dumps=False, tell=lambda progress: None)
+    assert done.logger is not None
+    return tmp_path / "stick" / "ridelog" / done.logger
+
+
+def test_a_stick_with_its_manifest_is_sound(stick: Path) -> None:
+    for place in (stick, stick.parent, stick.parent.parent):
+        assert all(check.ok for check in verify([place]))
+
+
+@pytest.mark.parametrize("left", ["nothing", "link", "folder"])
+def test_a_stick_that_cannot_be_checked_is_wrong(stick: Path, left: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = stick / "manifest.sha256"
+    listed.rename(stick.parent.parent / "moved")
+    if left == "link":
+        listed.symlink_to(stick.parent.parent / "moved")
+    elif left == "folder":
+        listed.mkdir()
+    monkeypatch.chdir(stick)
+    for place in (Path(), stick, stick.parent, stick.parent.parent):
+        bad, = (check for check in verify([place]) if not check.ok)
+        assert (bad.kind, bad.gaps) == ("manifest", 1)
+        assert "expected a list of what was exported" in bad.problems[0]
+        assert main(["verify", str(place)]) == 1
+
+
+def test_a_finished_log_without_its_sidecar_is_wrong(tmp_path: Path) -> None:
+    log_in(tmp_path, 1, 2, 3).close()
+    (tmp_path / "00001-001.json").unlink()
+    assert found(tmp_path / "00001-001.csv").problems == (
+        "sidecar: expected 00001-001.json beside it; it is missing",)
+    (tmp_path / "00001-001.json").write_text('{"log": {"rows": null}}')
+    assert found(tmp_path / "00001-001.csv").problems == ("sidecar: expected the number of rows of a finished log",)
+
+
+def test_more_rows_than_the_sidecar_tells_of_are_wrong(tmp_path: Path) -> None:
+    log_in(tmp_path, 1, 2, 3).close()
+    with (tmp_path / "00001-001.csv").open("a") as file:
+        file.write(f"{format_row(row(4))}\n")
+    assert found(tmp_path / "00001-001.csv").problems == (
+        "gap: expected the 3 rows that the sidecar tells of, found 4",)
