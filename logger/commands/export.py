@@ -1,19 +1,21 @@
 """Copy finished logs to a USB stick: checked, atomic, repeatable.
 
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-already is read and left alone. Exit status 0: all finished logs are there; 1: some are not, and why; 2: wrong use.
+already is read and left alone. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections import Counter
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
-from logger.service.config import find_config, load_config
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
+from logger.service.config import Config, find_config, load_config
 from logger.store.export import ExportResult, Progress, export
 from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, write_note
 
@@ -49,23 +51,39 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_CHECK_FAILED
     board.tell("copying", True, "copying")
     try:
-        logs = args.logs if args.logs is not None else load_config(find_config(args.config)).log.directory
+        logs = args.logs if args.logs is not None else _logs_of_the_service(args.config)
         result = export(logs, args.to, args.dumps, board.progress)
     except RidelogError as error:
         board.tell("unmounting", False, str(error))
         raise
-    board.tell("unmounting", result.complete, summary(result))
+    is_well = result.complete and result.unmarked is None
+    board.tell("unmounting", is_well, summary(result))
     if args.json:
         print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
     else:
         print("\n".join(screen(result)))
-    return EXIT_DONE if result.complete else EXIT_CHECK_FAILED
+    return EXIT_DONE if is_well else EXIT_CHECK_FAILED
+
+
+def _logs_of_the_service(config: Path | None) -> Path:
+    """Where its settings say. A mistake in them must not keep logs in the car: then those that lie where logs lie
+    without any setting are taken, with a warning. Raises BadInput where there are none."""
+    try:
+        return load_config(find_config(config)).log.directory
+    except BadInput as error:
+        usual = Config().log.directory
+        if not any(usual.glob("*.csv")):
+            raise
+        print(f"{error}; the logs in {usual} are copied", file=sys.stderr)
+        return usual
 
 
 def summary(result: ExportResult) -> str:
     """What happened, in one line."""
     there = f"{len(result.copied)} files copied ({result.bytes_copied / 1e6:.1f} MB), " \
             f"{len(result.already_there)} were there"
+    if result.complete and result.unmarked is not None:
+        return f"{there}, but the logger cannot remember it, and will not make room: {result.unmarked}"
     if result.complete:
         return there
     reason, _ = Counter(failure.reason for failure in result.failures).most_common(1)[0]
@@ -74,19 +92,20 @@ def summary(result: ExportResult) -> str:
 
 def screen(result: ExportResult) -> list[str]:
     """The lines a person sees."""
-    lines = [f"{'ok' if result.complete else 'WRONG'}: {summary(result)}"]
+    lines = [f"{'ok' if result.complete and result.unmarked is None else 'WRONG'}: {summary(result)}"]
     reasons = Counter(failure.reason for failure in result.failures)
     for reason, count in reasons.most_common():
         first = next(failure.name for failure in result.failures if failure.reason == reason)
         lines.append(f"    {first}{f' and {count - 1} more' if count > 1 else ''}: {reason}")
     lines += [f"    set aside on the stick: {name}" for name in result.set_aside]
-    if result.unmarked is not None:
+    if result.unmarked is not None and not result.complete:
         lines.append(f"    the logger does not remember this export: {result.unmarked}")
     return lines
 
 
 class _Board:
-    """The note of one stick, and the light; both only where they were asked for."""
+    """The note of one stick, and the light; both only where they were asked for, and as far as they can be: that
+    nobody can be told is no reason not to copy."""
 
     def __init__(self, note: Path | None, led: Path | None) -> None:
         self._note = note
@@ -95,7 +114,12 @@ class _Board:
     def tell(self, state: StickState, ok: bool, text: str) -> None:
         if self._note is not None:
             before = read_note(self._note)
-            write_note(self._note, StickNote(self._note.stem, state, ok, text))
+            try:
+                write_note(self._note, StickNote(self._note.stem, state, ok, text))
+            except OSError as error:
+                print(f"{self._note}: no note can be kept ({error.strerror})", file=sys.stderr)
+                self._note = None
+                return
             if before is None or (before.state, before.ok) != (state, ok):
                 self._show()
 
@@ -116,7 +140,8 @@ class _Board:
 
     def removed(self) -> int:
         if self._note is not None:
-            self._note.unlink(missing_ok=True)
+            with suppress(OSError):
+                self._note.unlink(missing_ok=True)
             self._show()
         return EXIT_DONE
 

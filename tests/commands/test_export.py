@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
 import pytest
 
+from logger.commands import export as export_command
 from logger.commands.main import main
 from logger.commands.status import stick_lines
+from logger.service.config import Config, LogConfig
+from logger.store import export as export_of_store
 from logger.store.exported import exported_names
 from logger.store.stick_notes import read_note
 
@@ -109,6 +113,48 @@ def test_a_copy_that_was_killed_is_not_called_complete(stick: Path, note: Path) 
     note.write_text('{"stick": "sda1", "state": "copying", "ok": true, "text": "copying, 1 of 9 files"}')
     main(["export", "--unmounted", str(stick), "--note", str(note)])
     assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+
+
+def test_an_export_that_the_logger_cannot_remember_is_no_success(
+        logs: Path, stick: Path, note: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(export_of_store, "mark_exported", refuse)
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("WRONG: 2 files copied")
+    assert "cannot remember it, and will not make room: Read-only file system" in said
+    main(["export", "--unmounted", str(stick), "--note", str(note)])
+    assert told(note).startswith("stick sda1: WRONG, 2 files copied")
+
+
+def test_a_note_that_cannot_be_written_stops_no_export(
+        logs: Path, stick: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    for note in (tmp_path / "missing" / "sda1.json", tmp_path / "file" / "sda1.json"):
+        assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 0
+        assert "no note can be kept" in capsys.readouterr().err
+        assert main(["export", "--unmounted", str(stick), "--note", str(note)]) == 0
+        assert main(["export", "--removed", "--note", str(note)]) == 0
+    assert exported_names(logs) == {"00001-001.csv", "00001-001.json"}
+
+
+@pytest.mark.parametrize("settings", ["log: 7\n", "nonsense: [\n", None])
+def test_a_mistake_in_the_settings_keeps_no_log_in_the_car(
+        logs: Path, stick: Path, tmp_path: Path, settings: str | None, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "ridelog.yaml"
+    if settings is not None:
+        config.write_text(settings)
+    usual = Config(log=LogConfig(logs))
+    monkeypatch.setattr(export_command, "Config", lambda: usual)
+    assert main(["export", "--config", str(config), "--to", str(stick)]) == 0
+    said = capsys.readouterr()
+    assert "2 files copied" in said.out
+    assert "ridelog.yaml" in said.err
+    assert f"the logs in {logs} are copied" in said.err
 
 
 def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, tmp_path: Path) -> None:
