@@ -108,7 +108,7 @@ class SpaceKeeper:
         found = []
         for path in self._directory.iterdir():
             name = _FINISHED.fullmatch(path.name)
-            if name is None:
+            if name is None or not path.is_file():
                 continue
             is_dump = name[3] == ENDING
             paths = (path,) if is_dump else (path.with_suffix(".json"), path)  # a lone sidecar would stay for ever
@@ -121,8 +121,12 @@ class SpaceKeeper:
         for kept in files:
             if self.room_bytes >= goal_bytes:
                 return
-            for path in kept.paths:
-                self._files.remove(path)
+            try:
+                for path in kept.paths:
+                    self._files.remove(path)
+            except OSError as error:
+                log.warning("%s cannot be removed to make room: %s", kept.paths[-1].name, error)
+                continue
             self.room_bytes += kept.size_bytes
             if kept.is_exported:
                 self.exported_removed += 1

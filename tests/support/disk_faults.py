@@ -293,6 +293,19 @@ def nothing_is_exported(folder: Path, step: int) -> Found:
     return found(trials=len(seen))
 
 
+def name_that_is_a_folder(folder: Path, name: str) -> Found:
+    """Something under the name of an old dump or log that is no file: it is passed over, the rest makes room."""
+    folder = folder / "log"
+    used = old_files(folder)
+    (folder / name).mkdir()
+    with small():
+        room = keeper(folder, Card(folder, used + 4_000), set(), Limits(None, 0))
+        room.look()
+    assert room.dumps_lost == 1
+    assert not (folder / "00001.dump.gz").exists()
+    return found()
+
+
 def card_fills_and_is_emptied(folder: Path, case: None) -> Found:
     """The raw dump stops, the log goes on; then the log waits; then both go on, and no row is missing."""
     folder = folder / "log"
@@ -376,6 +389,9 @@ HAZARDS = (
     Hazard("little room, nothing exported", "the card shrinks step by step",
            "raw dumps stop first, then old dumps go, and it is said; a log never goes; then logs wait", "as promised",
            nothing_is_exported, (3000, 1000), 1),
+    Hazard("folder under the name of an old file", "a folder called as a dump or a log lies among them",
+           "it is passed over, and the rest makes room", "as promised", name_that_is_a_folder,
+           ("00000.dump.gz", "00000-001.csv")),
     Hazard("card fills up and is emptied", "its size changes during a drive",
            "dumps stop, then the log waits in memory, then both go on; no row is lost", "as promised",
            card_fills_and_is_emptied),
