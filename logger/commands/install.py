@@ -10,6 +10,7 @@ import os
 import sys
 from pathlib import Path
 
+import logger
 from logger.errors import EXIT_DONE, BadInput
 from logger.store.installation import PROGRAM, Installation, Step, hidden_from_services, run_command
 
@@ -24,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog install``."""
+    """Carry out ``ridelog install``. A dry run refuses what the real one would, but for the lack of rights."""
+    if args.root.resolve() == _THIS_MACHINE:
+        _refuse_hidden(_program())
     return carry_out(installation(args).install(), args)
 
 
@@ -34,14 +37,22 @@ def installation(args: argparse.Namespace) -> Installation:
         raise BadInput(f"{args.root}: expected a folder")
     if args.root.resolve() != _THIS_MACHINE:
         return Installation(args.root.resolve(), PROGRAM, run_command)
-    program = Path(sys.executable).with_name("ridelog")
-    if args.dry_run:
-        return Installation(_THIS_MACHINE, program, run_command)
-    if hidden_from_services(program):
-        raise BadInput(f"{program}: expected the program in a place that a service can see, such as {PROGRAM}")
-    if os.geteuid() != 0:
+    if os.geteuid() != 0 and not args.dry_run:
         raise BadInput("expected to be run as root: sudo ridelog ... (--dry-run needs no rights)")
-    return Installation(_THIS_MACHINE, program, run_command)
+    return Installation(_THIS_MACHINE, _program(), run_command)
+
+
+def _program() -> Path:
+    return Path(sys.executable).with_name("ridelog")
+
+
+def _refuse_hidden(program: Path) -> None:
+    """Raises BadInput for a program, its Python (of which a venv has but a link) or its code (that of an editable
+    installation stays where it was) in a place that the units hide."""
+    for place in (program, Path(sys.executable).resolve(), Path(logger.__file__).resolve()):
+        if hidden_from_services(place):
+            raise BadInput(f"{place}: expected the program, its Python and its code in a place that a service can see, "
+                           f"such as {PROGRAM.parent.parent}")
 
 
 def carry_out(steps: list[Step], args: argparse.Namespace) -> int:

@@ -68,7 +68,8 @@ class Installation:
         files = {name: self._shipped(source) for name, source in FILES.items()}
         steps = [self._put(name, data) for name, data in files.items()]
         steps += [self._link(ENABLED, Path("/etc/systemd/system/ridelog.service")), self._link(COMMAND, self.program)]
-        steps.append(self._put_record({name: _digest(data) for name, data in files.items()}))
+        links = {COMMAND: str(self.program)} if self._is_ours(COMMAND, self.program) else {}
+        steps.append(self._put_record({name: _digest(data) for name, data in files.items()} | links))
         sysusers = ["systemd-sysusers", str(self.root / SYSUSERS)]
         if not self._is_this_machine:
             return [*steps, self._command("systemd-sysusers", f"--root={self.root}", sysusers[1])]
@@ -85,11 +86,12 @@ class Installation:
         """The steps that take away what ``install`` put in place, but for logs and for what was changed since."""
         steps = []
         if self._is_this_machine:
-            steps.append(self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service"))
+            steps.append(self._stop())
         steps += [self._unlink(ENABLED, Path("/etc/systemd/system/ridelog.service")),
                   self._unlink(COMMAND, self.program)]
-        steps += [self._take(name, digest) for name, digest in self._record.items()]
-        steps += [self._take(f"{name}.new", digest) for name, digest in self._record.items()
+        put = {name: digest for name, digest in self._record.items() if name in FILES}
+        steps += [self._take(name, digest) for name, digest in put.items()]
+        steps += [self._take(f"{name}.new", digest) for name, digest in put.items()
                   if self._place(f"{name}.new").exists()]
         steps += [self._take_record(), self._take_folder("etc/ridelog")]
         if self._is_this_machine:
@@ -136,15 +138,31 @@ class Installation:
         path = self._place(name)
         if path.is_symlink() and path.readlink() == target:
             return Step(f"keep {path}: it is there")
-        if path.is_symlink() or path.exists():
+        if not self._is_ours(name, target):
             return Step(f"keep {path}: it is not ours")
+        if path.is_symlink():
+            return Step(f"link {path} to {target}, no longer to {path.readlink()}", lambda: _make_link(path, target))
         return Step(f"link {path} to {target}", lambda: _make_link(path, target))
 
     def _unlink(self, name: str, target: Path) -> Step:
         path = self._place(name)
-        if path.is_symlink() and path.readlink() == target:
+        if path.is_symlink() and self._is_ours(name, target):
             return Step(f"remove {path}", path.unlink)
         return Step(f"keep {path}: it is not ours" if path.is_symlink() or path.exists() else f"nothing at {path}")
+
+    def _is_ours(self, name: str, target: Path) -> bool:
+        """True where a link is ours to make or to remove: to our target, to one that we recorded, or there is none."""
+        path = self._place(name)
+        if not path.is_symlink():
+            return not path.exists()
+        return str(path.readlink()) in (str(target), self._record.get(name))
+
+    def _stop(self) -> Step:
+        """systemctl fails for a unit that it does not know: then there is nothing to stop."""
+        unit = self._place("etc/systemd/system/ridelog.service")
+        if unit.exists():
+            return self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service")
+        return Step(f"nothing to stop: no {unit}")
 
     def _put_record(self, digests: dict[str, str]) -> Step:
         path = self._place(RECORD)
@@ -168,10 +186,11 @@ class Installation:
         return Step(f"run {' '.join(words)}", lambda: self.run(words))
 
     def _read_record(self) -> dict[str, str]:
-        """Checksums of what was put in place, by name; nothing where there is no record that can be read."""
+        """Checksums of what was put in place, and where the command leads, by name; nothing where there is no record
+        that can be read."""
         try:
             found = json.loads((self.root / RECORD).read_text("ascii"))
-            return {name: str(found[name]) for name in FILES if name in found}
+            return {name: str(found[name]) for name in (*FILES, COMMAND) if name in found}
         except (OSError, ValueError, TypeError):
             return {}
 
@@ -208,7 +227,10 @@ def _write(path: Path, data: bytes) -> None:
 
 def _make_link(path: Path, target: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.symlink_to(target)
+    new = path.with_name(f".{path.name}.ridelog-tmp")
+    new.unlink(missing_ok=True)
+    new.symlink_to(target)
+    new.replace(path)
 
 
 def _digest(data: bytes) -> str:

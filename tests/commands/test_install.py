@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+import logger
 from logger.commands.main import main
 from logger.errors import BadInput, CheckFailed
 from logger.service.config import load_config
 from logger.shipped import shipped
+from logger.store import installation as store
 from logger.store.installation import (
     COMMAND,
     CONFIG,
@@ -159,7 +161,56 @@ def test_a_newer_version_replaces_what_was_not_changed(root: Path, ran: list[tup
     words = take(installation(root, ran, OTHER_PROGRAM).install())
     assert f"replace {root / UNIT}" in words
     assert str(OTHER_PROGRAM) in (root / UNIT).read_text()
-    assert f"keep {root / COMMAND}: it is not ours" in words
+    assert f"link {root / COMMAND} to {OTHER_PROGRAM}, no longer to {PROGRAM}" in words
+    assert (root / COMMAND).readlink() == OTHER_PROGRAM
+    take(installation(root, ran, OTHER_PROGRAM).uninstall())
+    assert not (root / COMMAND).is_symlink()
+
+
+@pytest.mark.parametrize("kind", ["link", "file"])
+def test_a_command_of_somebody_else_stays(root: Path, ran: list[tuple[str, ...]], kind: str) -> None:
+    if kind == "link":
+        (root / COMMAND).symlink_to("/opt/other/ridelog")
+    else:
+        (root / COMMAND).write_text("mine\n")
+    before = everything(root)[COMMAND]
+    assert f"keep {root / COMMAND}: it is not ours" in take(installation(root, ran).install())
+    take(installation(root, ran).install())
+    take(installation(root, ran).uninstall())
+    assert everything(root)[COMMAND] == before
+
+
+def test_what_is_not_installed_is_undone_without_harm(tmp_path: Path) -> None:
+    class OnThisMachine(Installation):
+        @property
+        def _is_this_machine(self) -> bool:
+            return True
+
+    def run(words: Sequence[str]) -> None:
+        if words[1] == "stop":
+            raise CheckFailed("Failed to stop ridelog.service: Unit ridelog.service not loaded.")
+
+    words = take(OnThisMachine(tmp_path, PROGRAM, run).uninstall())
+    assert words[0] == f"nothing to stop: no {tmp_path / UNIT}"
+
+
+@pytest.mark.parametrize("arguments", [["install"], ["install", "--dry-run"]])
+@pytest.mark.parametrize("hidden", ["program", "python", "code"])
+def test_a_dry_run_refuses_what_the_real_one_would(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], hidden: str) -> None:
+    """The venv may be well, and its Python be a link into a home, or its code an editable installation of one."""
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    places = {"program": tmp_path / "venv/bin/python", "python": tmp_path / "pyenv/python",
+              "code": tmp_path / "src/x.py"}
+    monkeypatch.setattr("sys.executable", str(places["program"]))
+    monkeypatch.setattr(logger, "__file__", str(places["code"]))
+    for place in places.values():
+        place.parent.mkdir(parents=True)
+    places["python"].touch()
+    places["program"].symlink_to(places["python"])
+    monkeypatch.setattr(store, "_HIDDEN_FROM_SERVICES", (str(places[hidden].parent),))
+    with pytest.raises(BadInput, match="a place that a service can see"):
+        main(arguments)
 
 
 def test_settings_that_were_there_first_stay_and_a_link_is_not_written_through(
