@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import signal
 import threading
 from pathlib import Path
 
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
 from logger.service.config import find_config, load_config
+
+PAUSE_S = 30
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,16 +30,29 @@ def run(args: argparse.Namespace) -> int:
     logging.basicConfig(
         level=logging.DEBUG if args.verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s"
     )
-    config = load_config(find_config(args.config))
-    from logger.service.start import serve
-
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     try:
+        config = load_config(find_config(args.config))
+        from logger.service.start import serve
+
         serve(config, stop)
+    except RidelogError as error:
+        if _is_restarted():
+            logging.getLogger(__name__).error("%s; tried again in %d s", error, PAUSE_S)
+            stop.wait(PAUSE_S)
+        raise
     except OSError as error:
         # Not status 2: a full card or a lost mount may be well again at the next start, which systemd makes.
         logging.getLogger(__name__).error("stopped by the system: %s", error)
+        if _is_restarted():
+            stop.wait(PAUSE_S)
         return EXIT_CHECK_FAILED
     return EXIT_DONE
+
+
+def _is_restarted() -> bool:
+    """True where systemd starts the service again at once, for ever: what will most likely fail again, and need not
+    wear the card and fill the journal meanwhile, first waits. (RestartSteps= is not known to systemd 252.)"""
+    return "NOTIFY_SOCKET" in os.environ

@@ -132,6 +132,13 @@ def test_it_is_watched_and_never_given_up() -> None:
     assert service["StartLimitIntervalSec"] == settings(EXPORT)["StartLimitIntervalSec"] == ["0"]
 
 
+def test_who_boots_without_memory_limits_is_told() -> None:
+    assert "MemoryMax" in settings(SERVICE)
+    for place in (shipped("systemd") / SERVICE, Path(__file__).resolve().parents[2] / "README.md"):
+        assert {"cgroup_disable=memory", "cgroup_enable=memory"} <= set(re.findall(r"cgroup_\w+=memory",
+                                                                                  place.read_text()))
+
+
 def test_real_time_is_permitted_and_no_condition() -> None:
     service = settings(SERVICE)
     assert service["LimitRTPRIO"] == [str(PRIORITY)]
