@@ -84,7 +84,13 @@ lies about fsync can lose what it lied about; no software can help that, but a d
 
 Power is cut in a model of the disk (what each write, fsync and rename leaves behind when all ends there), not at a
 plug: a cut at every single change of the disk can only be tried so. Sensors are bytes on simulated buses and ports, in
-simulated time. Kills, and a service that may write no more, are those of the real process.
+simulated time. Kills, and a service that may write no more, are those of the real process. Sticks are folders behind a
+model of the system's calls: a FAT file system is mounted by root alone, and was not where these trials were made, so
+that of FAT only its names are tried. Limits of time are of the processor's, so that a busy machine breaks none.
+
+The unit does not ask systemd for `CPUSchedulingPolicy=rr`: with a kernel that schedules real-time tasks in groups
+(`CONFIG_RT_GROUP_SCHED`) it would fail, and the service never start. It permits the priority (`LimitRTPRIO=10`) and the
+service asks for it by itself; where it is refused it goes on with `Nice=-15`.
 """
 
 
@@ -153,7 +159,7 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
     lines = [Line(
         "huge input", f"files and pipes without end, lines of {huge_gb:g} GB, YAML and zip bombs, deep nesting",
         "an answer or a refusal; memory bounded by the largest file that a desk command takes (1 GB)",
-        f"slowest {max(float(row[2]) for row in huge):.0f} s, memory +{max(int(row[3]) for row in huge)} MB"
+        f"slowest {max(float(row[2]) for row in huge):.0f} s of work, memory +{max(int(row[3]) for row in huge)} MB"
         if not failed else f"**BROKEN**: {'; '.join(failed)}", len(huge), wrong=failed)]
     lines += _readers(read_counts(done.stdout))
     _check_ended(done, lines, len(TARGETS) + 1)
