@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.candidates import Base
-from logger.lab.fitting import Problem, State
+from logger.lab.fitting import Problem, State, Weighed
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
 SEEN = 6.0
@@ -31,25 +30,33 @@ class Blind:
 
 def blind(problem: Problem, state: State, effects: Sequence[Effect]) -> tuple[Blind, ...]:
     """Those of the effects that the runs could not show beside a fitted model, the most hidden first."""
-    base = Base.of(problem, state, problem.slopes(state))
-    found = [Blind(effect, _stands_out(problem, base, effect)) for effect in effects]
+    sight = _Sight(problem, state)
+    found = [Blind(effect, sight.of(effect)) for effect in effects]
     return tuple(sorted((one for one in found if one.deviations < SEEN), key=lambda one: one.deviations))
 
 
-def _stands_out(problem: Problem, base: Base, effect: Effect) -> float:
-    usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
-    found = _deviations(problem, base, chosen(effect, usual))
-    if found < _NOTHING and isinstance(effect, VehicleEffect):  # what is usual may be what this vehicle has
-        found = max(_deviations(problem, base, chosen(effect, values)) for values in effect.trials())
-    return found
+class _Sight:
+    """By how much effects would stand out beside a model that was laid out."""
 
+    def __init__(self, problem: Problem, state: State) -> None:
+        self._problem, self._state = problem, state
+        self._slopes = problem.slopes(state)
+        self._weighed = Weighed(problem, self._slopes, problem.whiteners(state))
+        self._uncertainty = np.linalg.inv(self._weighed.information)
 
-def _deviations(problem: Problem, base: Base, one: Chosen) -> float:
-    weighed, state = base.weighed, base.state
-    there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes)
-    here = problem.predicted(state.effects, state.logs, state.wander, base.slopes)
-    change = [whitener((new - old)[None]) for whitener, new, old in zip(
-        weighed.whiteners, there.predictions, here.predictions, strict=True)]
-    mixed = weighed.against(change)[:, 0]
-    own = sum(float(one[0] @ one[0]) for one in change) - float(mixed @ base.uncertainty @ mixed)
-    return float(np.sqrt(max(own, 0.0)))
+    def of(self, effect: Effect) -> float:
+        """At its usual strength."""
+        usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
+        found = self._deviations(chosen(effect, usual))
+        if found < _NOTHING and isinstance(effect, VehicleEffect):  # what is usual may be what this vehicle has
+            found = max(self._deviations(chosen(effect, values)) for values in effect.trials())
+        return found
+
+    def _deviations(self, one: Chosen) -> float:
+        state, weighed = self._state, self._weighed
+        there = self._problem.predicted((*state.effects, one), state.logs, state.wander, self._slopes)
+        change = [whitener((new - old)[None]) for whitener, new, old in zip(
+            weighed.whiteners, there.predictions, state.predictions, strict=True)]
+        mixed = weighed.against(change)[:, 0]
+        own = sum(float(part[0] @ part[0]) for part in change) - float(mixed @ self._uncertainty @ mixed)
+        return float(np.sqrt(max(own, 0.0)))

@@ -1,5 +1,4 @@
-"""``ridelog add-effect``: the effect with its errors, what it changed, a vehicle file that reads back, and one line else.
-"""
+"""``ridelog add-effect``: the effect with its errors, what it changed, a vehicle file, and one line else."""
 
 from __future__ import annotations
 
@@ -13,12 +12,12 @@ from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_model
 
-from lacking import RUBBING, friction, write_runs
+from lacking import OWN, named, write_runs
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    return write_runs(tmp_path_factory.mktemp("friction"), friction(70.0))
+    return write_runs(tmp_path_factory.mktemp("friction"), named("dry_friction", friction_force_n=70.0))
 
 
 def add(effect: str, vehicle: Path | str, out: Path, *arguments: str) -> int:
@@ -56,19 +55,19 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert len(read_model(first).effects) == 1  # what was read stays as it is
 
 
-def test_for_a_person_with_an_effect_of_their_own(runs: list[str], tmp_path: Path,
-                                                  capsys: pytest.CaptureFixture[str]) -> None:
-    own, out = tmp_path / "rubbing.py", tmp_path / "mine.yaml"
-    own.write_text(RUBBING, "utf-8")
+def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    runs = write_runs(tmp_path / "runs", named("sensor_offset", offset_m=0.4))
+    own, out = tmp_path / "bracket.py", tmp_path / "mine.yaml"
+    own.write_text(OWN, "utf-8")
     out.write_text(vehicle_file("rav4-2009").read_text("utf-8"), "utf-8")
     assert add(str(own), out, out, *runs) == 0  # over the old file, as it was asked for
     told = capsys.readouterr().out
-    assert told.startswith("rubbing: rubbing_n ")
+    assert told.startswith("long_bracket: offset_m 0.")
     for words in ("It helps", "Error before: ", "Error after: ", "sprung_mass_kg", "Shift", f"Vehicle: {out}"):
         assert words in told
     model = read_model(out)
     assert model.effects[0].file == str(own)
-    assert 60.0 < model.effects[0].values["rubbing_n"] < 80.0
+    assert 0.36 < model.effects[0].values["offset_m"] < 0.44
 
 
 def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from html import escape
 from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
@@ -16,7 +17,7 @@ from logger.errors import BadInput
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_model
 
-from lacking import FEW, friction, write_runs
+from lacking import FEW, named, write_runs
 
 
 @pytest.fixture(autouse=True)
@@ -27,7 +28,7 @@ def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    return write_runs(tmp_path_factory.mktemp("friction"), friction(70.0))
+    return write_runs(tmp_path_factory.mktemp("offset"), named("sensor_offset", offset_m=0.4))
 
 
 @pytest.fixture
@@ -79,39 +80,38 @@ def test_nobody_to_ask(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     told = capsys.readouterr()
     assert told.err.count("\n") == 1 and "as with --yes" in told.err
     order = [told.out.index(f"=== {title} ===") for title in
-             ("Compare", "Diagnose", "Add dry_friction", "Compare again", "The end")]
+             ("Compare", "Diagnose", "Add sensor_offset", "Compare again", "The end")]
     assert order == sorted(order)
     assert "Nothing more is missing" in told.out
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["story.html", "vehicle-1.yaml"]
-    assert [one.effect.name for one in read_model(tmp_path / "out" / "vehicle-1.yaml").effects] == ["dry_friction"]
+    assert [one.effect.name for one in read_model(tmp_path / "out" / "vehicle-1.yaml").effects] == ["sensor_offset"]
     html = (tmp_path / "out" / "story.html").read_text("utf-8")
     whole = _Whole()
     whole.feed(html)
     assert not whole.open and not {"script", "img", "link"} & whole.seen
     assert not re.search(r"\b(nan|inf)\b", html)
-    for words in ("How the error fell", "with dry_friction", "Before and after", "What the car&#x27;s numbers",
-                  "Canudas" if "Canudas" in shipped_effects()["dry_friction"].source else "dry_friction (Coulomb"):
+    for words in ("How the error fell", "with sensor_offset", "Before and after", "What the car&#x27;s numbers",
+                  escape(shipped_effects()["sensor_offset"].source)):
         assert words in html
 
 
-def test_for_a_program_without_what_is_not_wanted(runs: list[str], tmp_path: Path,
-                                                  capsys: pytest.CaptureFixture[str]) -> None:
-    assert lab(runs, tmp_path / "out", "--json") == 0
+def test_for_a_program_where_nothing_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert lab(write_runs(tmp_path / "runs", []), tmp_path / "out", "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["added"] == ["dry_friction"] and told["refused"] == [] and told["unexplained"] is False
-    errors = [step["error"] for step in told["steps"]]
-    assert len(errors) == 3 and errors[0] == told["error_before"] and errors[2] == told["error_after"] < errors[1]
-    assert told["vehicles"] == [str(tmp_path / "out" / "vehicle-1.yaml")]
+    assert told["added"] == [] and told["refused"] == [] and told["unexplained"] is False
+    assert [step["error"] for step in told["steps"]] == [told["error_before"], told["error_after"]]
+    assert told["error_after"] == pytest.approx(told["noise_floor_error"], rel=0.1)
+    assert told["vehicles"] == [] and Path(told["story"]).read_text("utf-8").startswith("<!doctype html>")
 
 
 def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
                               answering: Callable[..., list[str]]) -> None:
     asked = answering("rust", "no")
     assert lab(runs, tmp_path) == 0
-    assert len(asked) == 2 and "Add dry_friction?" in asked[0]
+    assert len(asked) == 2 and "Add sensor_offset?" in asked[0]
     told = capsys.readouterr().out
     assert "Expected yes, no, or one of " in told
-    assert "left out as you wished: dry_friction" in told
+    assert "left out as you wished: sensor_offset" in told
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
 
 
@@ -121,9 +121,9 @@ def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, c
     assert lab(runs, tmp_path) == 0
     told = capsys.readouterr().out
     assert "elevation_right_m" in told  # why it cannot be roll
-    assert told.index("=== Add tire_damping ===") < told.index("=== Add dry_friction ===")
+    assert told.index("=== Add tire_damping ===") < told.index("=== Add sensor_offset ===")
     assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["tire_damping",
-                                                                                            "dry_friction"]
+                                                                                            "sensor_offset"]
     assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
 
 

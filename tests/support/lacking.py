@@ -17,34 +17,28 @@ from logger.vehicle.effect import Chosen, chosen
 from compared import CAR, RATE_HZ, a_run
 
 SPEEDS_MPS = (7.0, 15.0)
-FEW = ("damper_asymmetry", "dry_friction", "roll", "sensor_offset", "tire_damping")
-"""Enough candidates to choose among, few enough to be quick."""
+FEW = ("roll", "sensor_gain", "sensor_offset", "tire_damping")
+"""Enough candidates to choose among, few enough, and linear, to be quick."""
 
-RUBBING = '''
-import numpy as np
-
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+OWN = '''
+from logger.vehicle.effects.sensor_offset import SensorOffset
 
 
-class Rubbing(ForceEffect):
-    name = "rubbing"
-    title = "something rubs in the suspensions"
-    parameters = (Parameter("rubbing_n", 50.0, 0.0, 500.0, 0.0, Scale.LINEAR, (20.0, 80.0), "in each suspension"),)
+class Bracket(SensorOffset):
+    name = "long_bracket"
+    title = "the sensor sits on a long bracket"
     source = "my own"
-    signature = "the body stands still on smooth roads"
     shown_by = "drive a smooth road"
 
-    def laws(self, p, laws):
-        return laws.with_force(lambda travel_m, rate_mps: p.rubbing_n * np.tanh(rate_mps / 0.004))
 
-
-EFFECT = Rubbing()
+EFFECT = Bracket()
 '''
+"""A user's own effect, which does what one of ridelog's does."""
 
 
-def friction(force_n: float = 70.0) -> Sequence[Chosen]:
-    """Dry friction."""
-    return [chosen(shipped_effects()["dry_friction"], {"friction_force_n": force_n})]
+def named(name: str, **values: float) -> Sequence[Chosen]:
+    """One effect of ridelog's."""
+    return [chosen(shipped_effects()[name], values)]
 
 
 def out_of_balance(run: Run) -> npt.NDArray[np.float64]:
