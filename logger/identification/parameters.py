@@ -23,7 +23,7 @@ WEAKEST = 0.5
 """A number whose standard error is larger than this share of it has not been measured."""
 # How far from its start a number may go when nothing else is said: a factor, and limits for places on the car [m].
 _FACTOR = 20.0
-_LENGTH_FACTOR = 3.0
+_LENGTHS, _LENGTH_FACTOR = ("cg_distance_m", "track_width_m", "contact_patch_m"), 3.0
 _FARTHEST_M = 3.0
 _LONGEST_PATCH_M = 1.0
 
@@ -114,7 +114,7 @@ def free(
 def _bounds(name: str, value: float) -> tuple[float, float]:
     if name.startswith(f"{SENSOR}."):
         return -_FARTHEST_M, _FARTHEST_M
-    factor = _LENGTH_FACTOR if name.endswith("_m") else _FACTOR
+    factor = _LENGTH_FACTOR if name.rpartition(".")[2] in _LENGTHS else _FACTOR
     high = value * factor
     return value / factor, min(high, _LONGEST_PATCH_M) if name == "contact_patch_m" else high
 

@@ -44,6 +44,13 @@ def test_bounds_of_their_own() -> None:
     assert free(CAR, "contact_patch_m", 0.5).high == 1.0
 
 
+def test_dampers_and_springs_are_no_lengths() -> None:
+    for name in names(CAR):
+        one, factor = free(CAR, name), 3 if name.endswith(("cg_distance_m", "track_width_m", "contact_patch_m")) else 20
+        if not name.startswith("sensor."):
+            assert (one.low, one.high) == pytest.approx((one.start / factor, one.start * factor)), name
+
+
 def test_what_cannot_be_free() -> None:
     with pytest.raises(ValueError, match="no parameter 'mass'; expected one of sprung_mass_kg, "):
         read(CAR, "mass")
