@@ -24,7 +24,7 @@ from logger.store.space import Limits
 from logger.store.verify import verify
 
 from fault_trials import Found, Hazard
-from faulty_disk import CrashModel, RecordingFiles, RefusingFiles
+from faulty_disk import CrashModel, RecordingFiles, RefusingFiles, RefusingJournal
 
 FACTS = {"ridelog_version": "test", "sensor": {"driver": "bma220", "verified": True}}
 HEADER = DumpHeader(None, {"driver": "bma220", "range_g": 2}, {"baud": 9600}, "rav4-2009")
@@ -96,6 +96,42 @@ class Life:
     def _record(self, storage: Storage, rng: random.Random) -> None:
         storage.record(event_of(self.promised.events))
         self.promised = replace(self.promised, events=self.promised.events + 1)
+
+
+class TroubledLife(Life):
+    """A session in the middle of which the disk refuses changes of a kind for some rounds, and comes back."""
+
+    def __init__(self, folder: Path, seed: int, steps: int) -> None:
+        rng = random.Random(seed)
+        self.files = RefusingJournal(folder)
+        self.files.note = lambda: self.promised
+        self.promised = Promised()
+        self.utc_from = NEVER
+        now_us = 0
+        storage = Storage(folder, FACTS, 2500, None, WHOLE_DISK, lambda: now_us, self.files)
+        self.session = storage.log.session
+        kinds = rng.choice((("write",), ("sync",), ("rename",), ("remove",), ("sync_directory",), KINDS))
+        begin, length, clock_at = rng.randrange(3, steps // 2), rng.randrange(1, steps // 2), rng.randrange(steps)
+        for step in range(steps):
+            now_us += rng.choice((500_000, 20_000_000))
+            self.files.refuses = lambda kind, bad=begin <= step < begin + length: bad and kind in kinds
+            if step == clock_at:
+                self.utc_from = self.promised.rows + 1
+                storage.log.set_clock_map(ClockMap(OFFSET_US))
+                self.promised = replace(self.promised, clock_safe=not storage.log.trouble)
+            self._append(storage)
+            storage.sync()
+            self._note_what_is_safe(storage)
+            storage.tend()
+            self._note_what_is_safe(storage)
+        self.files.refuses = lambda kind: False
+        storage.close()
+        self.promised = replace(self.promised, rows_safe=self.promised.rows)
+
+    def _note_what_is_safe(self, storage: Storage) -> None:
+        if not storage.log.trouble:
+            assert storage.log.waiting == 0
+            self.promised = replace(self.promised, rows_safe=self.promised.rows)
 
 
 NEVER = 10**9
@@ -307,10 +343,10 @@ def events(folder: Path) -> list[int]:
     return numbers
 
 
-def _cut_everywhere(folder: Path, seed: int, power: bool) -> Found:
+def _cut_everywhere(folder: Path, seed: int, power: bool, kind: type[Life] = Life) -> Found:
     """A life that ends after each change of the disk; without power twice, for each time something else is left."""
     (folder / "life").mkdir()
-    life = Life(folder / "life", seed, LIFE_STEPS)
+    life = kind(folder / "life", seed, LIFE_STEPS)
     rng = random.Random(seed)
     outcomes = [crash(life, count, power, rng, folder / "after")
                 for count in range(len(life.files.journal) + 1) for _ in range(2 if power else 1)]
@@ -327,6 +363,10 @@ def power_cut_at_every_change(folder: Path, seed: int) -> Found:
     return _cut_everywhere(folder, seed, power=True)
 
 
+def power_cut_around_an_outage(folder: Path, seed: int) -> Found:
+    return _cut_everywhere(folder, seed, power=True, kind=TroubledLife)
+
+
 _REPAIRED = ("; the next start leaves only finished files that `ridelog verify` has nothing against, and no session "
              "number is given twice")
 _COUNTED = ("{rows_promised.total:.0f} rows promised, {rows_lost.total:.0f} lost; {torn_or_damaged.total:.0f} damaged "
@@ -339,4 +379,8 @@ HAZARDS = (
            "garbage or other digits, and new names come early, late or never",
            "no row that was synced is lost, none that is damaged is taken for good" + _REPAIRED, _COUNTED,
            power_cut_at_every_change, range(12), 1),
+    Hazard("power cut before, in and after a disk's outage", "the same, and for a while the disk refuses changes of a "
+           "kind, or all (EIO), with half of each refused write done",
+           "no row that was synced is lost, none that is damaged is taken for good" + _REPAIRED, _COUNTED,
+           power_cut_around_an_outage, range(24), 2),
 )

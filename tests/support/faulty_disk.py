@@ -149,6 +149,47 @@ class RecordingFiles(FileSystem):
         self._log("sync_names")
 
 
+class RefusingJournal(RecordingFiles):
+    """The same, of a disk that refuses changes with EIO while ``refuses`` says so of their kind. Half of a write that
+    is refused is done all the same."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.refuses: Callable[[str], bool] = lambda kind: False
+
+    def _ask(self, kind: str) -> None:
+        if self.refuses(kind):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    def create(self, path: Path, new: bool = False) -> int:
+        self._ask("create")
+        return super().create(path, new)
+
+    def write(self, descriptor: int, data: bytes) -> None:
+        try:
+            self._ask("write")
+        except OSError:
+            super().write(descriptor, data[: len(data) // 2])
+            raise
+        super().write(descriptor, data)
+
+    def sync(self, descriptor: int) -> None:
+        self._ask("sync")
+        super().sync(descriptor)
+
+    def rename(self, source: Path, target: Path) -> None:
+        self._ask("rename")
+        super().rename(source, target)
+
+    def remove(self, path: Path) -> None:
+        self._ask("remove")
+        super().remove(path)
+
+    def sync_directory(self, directory: Path) -> None:
+        self._ask("sync_directory")
+        super().sync_directory(directory)
+
+
 @dataclass
 class _Inode:
     """Content that is on the disk for sure, and the content that the system shows."""
