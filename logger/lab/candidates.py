@@ -30,7 +30,7 @@ from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 
 Array = npt.NDArray[np.float64]
 
-_STRONGEST, _WEAKEST = 3.0, 0.03
+_STRONGEST, _WEAKEST = 10.0, 0.03
 _STEPS = 5
 
 

@@ -28,16 +28,18 @@ MOST_EFFECTS = 4
 """No more than so many are looked for."""
 CHANCE = 0.001
 """How often, at most, noise alone may look like an effect, all candidates together."""
-WORTH = 0.006
+WORTH = 0.0025
 """The least that an effect has to lower the mean logarithm of the power that is left."""
+SHARE = 0.006
+"""The least share that an effect has to add to what those before it explain: their laws are never quite the car's."""
+HARM = 0.1
+"""What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
-HARM = 0.002
-"""What an effect may raise that mean by, on stretches that no fit saw."""
 # A band is louder than the noise from so many deviations of the difference on.
 _LOUDER = 2.5
 _WORTH_FITTING = 0.03
-_LEAST_PROMISE = 12.0
+_LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _MOST_THREADS = 4
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
@@ -124,19 +126,22 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
              Step("its numbers refitted within what is granted", now.judged_error)]
     first: list[Tried] = []
     taken: list[_Taken] = []
+    explained = 0.0
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}")
-        tried = _round(problem, now, left, seen, progress, whatever=number == 1)
+        least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
+        tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least)
         first = first or tried
-        best = next((one for one in tried if _accepted(problem, one, len(left))), None)
+        best = next((one for one in tried if _accepted(problem, one, len(left), explained)), None)
         if best is None:
             break
         taken.append(_Taken(best, _rivals(best, tried, problem), len(left)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         now = Base.of(problem, *settled(problem, best.state))
+        explained = before.fitted + before.judged - now.fitted - now.judged
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
-    now, needed = _needed(problem, now, taken, len(present), progress)
+    now, needed = _needed(problem, before, now, taken, len(present), progress)
     progress("fitting all stretches")
     whole = Problem(problem.runs, problem.vehicle, problem.tolerance, whole=True)
     after, _ = settled(whole, now.state)
@@ -164,15 +169,15 @@ def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequenc
 
 
 def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalignment,
-           progress: Progress, whatever: bool) -> list[Tried]:
-    """Every effect tried on the model, best first; if none promises more than chance, nothing, unless ``whatever``."""
+           progress: Progress, promise: float) -> list[Tried]:
+    """Every effect tried on the model, best first; nothing if none promises that gain."""
     with ThreadPoolExecutor(min(_MOST_THREADS, cpu_count() or 1)) as pool:
         promises: list[Screened] = []
         for done, one in enumerate(pool.map(lambda effect: screened(problem, now, effect, seen), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")
             promises.append(one)
         promises.sort(key=lambda one: -one.gain)
-        if promises[0].gain < _LEAST_PROMISE and not whatever:
+        if promises[0].gain < promise:
             return []
         least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
         deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
@@ -199,18 +204,18 @@ def _p_value(gain: float, numbers: int, count: int) -> float:
     return float(min(1.0, count * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
 
 
-def _accepted(problem: Problem, one: Tried, count: int) -> bool:
-    """Whether an effect is there: not by chance, worth naming, and no harm to what no fit saw (which may hold nothing
-    that would show it: a stop that is hit once)."""
-    whole, unseen = (sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, part))
-                     for part in (None, False))
-    return (_p_value(one.gain, one.numbers, count) < CHANCE and one.whole_gain > WORTH * whole
-            and one.judged_gain > -HARM * unseen)
+def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
+    """Whether an effect is there: not by chance, worth naming beside what was explained before, and no harm to what no
+    fit saw."""
+    freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, None))
+    return (_p_value(one.gain, one.numbers, count) < CHANCE
+            and one.whole_gain > max(WORTH * freedom, SHARE * before)
+            and one.judged_gain > -HARM * one.gain)
 
 
 def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
     """Effects that explain as well what this one explains; none for one that explains nothing."""
-    worthy = [other for other in tried if _accepted(problem, other, len(tried))]
+    worthy = [other for other in tried if _accepted(problem, other, len(tried), 0.0)]
     if one not in worthy:
         return ()
     near = max(_ALIKE, _ALIKE_SHARE * one.whole_gain)
@@ -218,7 +223,7 @@ def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, 
                  if other is not one and abs(other.whole_gain - one.whole_gain) < near)
 
 
-def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
+def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], present: int,
             progress: Progress) -> tuple[Base, dict[str, float]]:
     """The model without those that were taken and are not needed by the side of the others, and what each of the
     others is worth."""
@@ -236,7 +241,8 @@ def _needed(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
             without[name] = other
         least = min(worth, key=lambda name: worth[name])
         freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
-        if worth[least] > WORTH * freedom:
+        others = before.fitted + before.judged - without[least].fitted - without[least].judged
+        if worth[least] > max(WORTH * freedom, SHARE * others):
             break
         now = without[least]
         worth.pop(least)

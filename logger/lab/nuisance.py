@@ -33,9 +33,9 @@ class Tolerance:
 
     numbers: float = 0.025
     lengths: float = 0.004
-    scale: float = 0.001
-    start_m: float = 0.03
-    wander_m: float = 0.015
+    scale: float = 0.0003
+    start_m: float = 0.004
+    wander_m: float = 0.004
 
 
 KNOT_S = 2.0

@@ -35,6 +35,8 @@ UNIT_M, UNIT_MPS = 0.01, 0.02
 """Tables of two variables are even in arsinh of travel and rate over these."""
 LANES = 4
 """Numbers that are summed side by side."""
+# Friction looks at the rate at this share of a step: right to second order at a half, where it would not come to rest.
+_RUBS_AT = 0.7
 _PASSES = 2
 
 
@@ -121,13 +123,16 @@ def _tire(i: int, tables: Array, numbers: Array, deflection: float, rate: float)
 
 
 @_compiled
-def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array) -> None:
-    """Find the dry friction that stops each suspension at the end of the step, as far as it reaches, and add what it
-    does to travels and rates."""
+def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array) -> None:
+    """Find the dry friction that stops each suspension a little after the middle of the step, as far as it reaches, and
+    add what it does to travels and rates.
+
+    earlier    (w,) the rates at the beginning, as they count for that instant
+    """
     w = len(numbers)
     for _ in range(2):
         for i in range(w):
-            free = motion[m + w + i]
+            free = motion[m + w + i] + earlier[i]
             for j in range(w):
                 if j != i:
                     free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
@@ -141,7 +146,7 @@ def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array) 
 @_compiled
 def _settle(
     motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
-    rubs: bool, road: Array, mounts: Array, step_s: float,
+    rubs: bool, road: Array, mounts: Array, step_s: float, earlier: Array,
 ) -> None:
     """Find the forces at the end of a step (3 w) from those at its beginning, and the motion there.
 
@@ -153,14 +158,14 @@ def _settle(
     for _ in range(_PASSES):
         _sum(motion, seen, before, forces, 2 * w, by_force)
         if rubs:
-            _rub(motion, m, forces, numbers, by_force)
+            _rub(motion, m, forces, numbers, by_force, earlier)
         for i in range(w):
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
     if rubs:
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        _rub(motion, m, forces, numbers, by_force)
+        _rub(motion, m, forces, numbers, by_force, earlier)
     _sum(motion, 0, before, forces, 3 * w, by_force)
 
 
@@ -187,6 +192,7 @@ def steps(
     states[0] = start
     known, forces, road, mounts = np.zeros(m + 4 * w), np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3))
     known[:m] = start
+    earlier = np.zeros(w)
     rubs = numbers[:, FRICTION_N].max() > 0.0
     size = by_known.shape[1]
     nothing, before, motion = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -197,12 +203,17 @@ def steps(
             road[i] = elevation[k + 1, i]
             road[w + i] = (around[k + 2, i] - around[k + 1, i]) / step_s
             mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
+            earlier[i] = (1 - _RUBS_AT) / _RUBS_AT * motion[m + w + i]
         _sum(before, 0, nothing, known, m + 4 * w, by_known)
-        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, rubs, road, mounts, step_s)
+        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, rubs, road, mounts, step_s,
+                earlier)
         for r in range(m):
             known[r] = motion[r]
             states[k + 1, r] = motion[r]
         for i in range(w):
             known[m + i], known[m + w + i] = forces[i], forces[w + i]
-            recorded[k + 1, i], recorded[k + 1, w + i] = forces[i] + forces[2 * w + i], forces[w + i]
+            recorded[k + 1, i] += forces[i] + 0.5 * forces[2 * w + i]
+            recorded[k + 1, w + i] = forces[w + i]
+            # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
+            recorded[k, i] += 0.5 * forces[2 * w + i]
     return states, recorded

@@ -14,6 +14,9 @@ from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
 
 Array = npt.NDArray[np.float64]
 
+# A search begins no nearer to nothing than this.
+_LEAST = 0.0005
+
 
 class SpeedScale(DriveEffect):
     name = "speed_scale"
@@ -26,7 +29,9 @@ class SpeedScale(DriveEffect):
     shown_by = "drive a long stretch with a mark at each end, and measure it"
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        return super().trials() if seen is None else [{"scale": seen.scale}]
+        if seen is None or abs(seen.scale - 1) < _LEAST:
+            return [{"scale": 1 - _LEAST}, {"scale": 1 + _LEAST}]
+        return [{"scale": seen.scale}]
 
     def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
         return distance_m / p.scale

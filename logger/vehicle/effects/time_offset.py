@@ -11,6 +11,9 @@ from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 
 Complex = npt.NDArray[np.complex128]
 
+# A search begins no nearer to nothing than this.
+_LEAST_S = 0.002
+
 
 class TimeOffset(SensorEffect):
     name = "time_offset"
@@ -24,7 +27,9 @@ class TimeOffset(SensorEffect):
     stage = 4
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        return super().trials() if seen is None else [{"delay_s": seen.delay_s}]
+        if seen is None or abs(seen.delay_s) < _LEAST_S:
+            return [{"delay_s": -_LEAST_S}, {"delay_s": _LEAST_S}]
+        return [{"delay_s": seen.delay_s}]
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         return np.exp(-s * p.delay_s)
