@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(as_json(found), allow_nan=False))
         return EXIT_DONE
     print(paragraphs([_compared(given)]), "", *lines(found, None if args.all else _SHOWN), "",
-          paragraphs([_next(args, given, found)]), sep="\n")
+          _next(args, given, found), sep="\n")
     if args.out is not None:
         print(f"\nPage: {args.out}")
     return EXIT_DONE
@@ -95,13 +95,13 @@ def _compared(given: Bench) -> str:
 
 
 def _next(args: argparse.Namespace, given: Bench, found: Verdict) -> str:
-    """What to do now."""
+    """What to do now; a command in one piece, so that it can be copied."""
     if found.missing:
         one = found.missing[0]
         name = given.files.get(one.effect.name, one.effect.name)
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
     if found.diagnosis.unexplained:
-        return ("Next: look at the shape above. An effect of your own is one Python file (--effect-file); ridelog "
-                "compare shows where what is left sits.")
+        return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
+                           "ridelog compare shows where what is left sits."])
     return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."
