@@ -121,7 +121,7 @@ def _enveloping(rng: np.random.Generator, car: Car) -> Path:
 
 
 def _speedometer(rng: np.random.Generator, car: Car) -> Path:
-    sign, size = _sign(rng, 0.6), between(2e-4, 0.04)
+    sign, size = _sign(rng, 0.6), between(3e-3, 0.04)
     return lambda u: {"scale": 1 + sign * size(u)}
 
 
@@ -164,7 +164,7 @@ EFFECTS: dict[str, Effect] = {effect.name: effect for effect in (
            _physics(bend_hz="frequency_hz", bend_zeta="damping_ratio", bend_gain="participation")),
     Effect("tire_enveloping", _enveloping, _physics(patch_m="contact_patch_m")),
     Effect("speed_scale", _speedometer, lambda scene, p: replace(scene, speed_scale=p["scale"])),
-    Effect("time_offset", lambda rng, car: one("delay_s", 0.0004, 0.15), _sensor(delay_s="delay_s")),
+    Effect("time_offset", lambda rng, car: one("delay_s", 0.005, 0.15), _sensor(delay_s="delay_s")),
     Effect("roll", _tracks, _physics(track_m="track_width_m", roll_inertia_kg_m2="roll_inertia_kg_m2"),
            stage=lambda scene, u: replace(scene, tracks_apart=between(0.01, 1.0)(u)), models=_HALF),
 )}
