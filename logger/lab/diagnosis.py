@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 
 import numpy as np
 
@@ -41,7 +40,6 @@ _LOUDER = 2.5
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
-_MOST_THREADS = 4
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
 
@@ -114,8 +112,8 @@ class _Taken:
 
 
 def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None) -> Diagnosis:
-    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks."""
+             progress: Progress = lambda words: None, workers: int = 2) -> Diagnosis:
+    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks, in so many threads."""
     obstacles = _obstacles(problem, effects, present)
     left = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
@@ -130,7 +128,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}")
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
-        tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least)
+        tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
         first = first or tried
         best = next((one for one in tried if _accepted(problem, one, len(left), explained)), None)
         if best is None:
@@ -169,9 +167,9 @@ def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequenc
 
 
 def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalignment,
-           progress: Progress, promise: float) -> list[Tried]:
+           progress: Progress, promise: float, workers: int) -> list[Tried]:
     """Every effect tried on the model, best first; nothing if none promises that gain."""
-    with ThreadPoolExecutor(min(_MOST_THREADS, cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         promises: list[Screened] = []
         for done, one in enumerate(pool.map(lambda effect: screened(problem, now, effect, seen), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -71,7 +70,6 @@ class Runs:
 
     def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
-        self._lock = Lock()
         self._passages: list[dict[bytes, Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
@@ -90,16 +88,16 @@ class Runs:
 
     def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
         found = []
-        for index, (run, known) in enumerate(zip(self.runs, self._passages, strict=True)):
+        for index, run in enumerate(self.runs):
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
             distance = car.driven(distance)
             key = distance.tobytes()
-            with self._lock:
-                if key not in known:
-                    if len(known) >= _KEPT_PASSAGES:
-                        del known[next(iter(known))]
-                    known[key] = Passage(run.track, run.rate_hz, distance, self.fine_hz)
-                found.append(known[key])
+            passage = self._passages[index].get(key)  # another thread may put others in its place at any time
+            if passage is None:
+                passage = Passage(run.track, run.rate_hz, distance, self.fine_hz)
+                kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
+                self._passages[index] = dict(kept) | {key: passage}
+            found.append(passage)
         return found
 
 
