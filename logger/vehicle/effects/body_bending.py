@@ -20,7 +20,8 @@ class BodyBending(BodyEffect):
     name = "body_bending"
     title = "first bending mode of the body"
     parameters = (
-        Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, (12.0, 16.0, 21.0, 27.0, 33.0, 40.0), "of the mode"),
+        Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, (12.0, 16.0, 21.0, 27.0, 33.0, 40.0),
+                  "of the mode"),
         Parameter("damping_ratio", 0.04, 0.003, 0.5, None, Scale.LOG, (0.04,), "of the mode"),
         Parameter("participation", 0.5, -10.0, 10.0, 0.0, Scale.LINEAR, (-0.5, 0.5),
                   "how strongly the axles' forces drive the mode at the sensor"),

@@ -19,8 +19,8 @@ class SensorMountResonance(SensorEffect):
     name = "sensor_mount_resonance"
     title = "the bracket or console under the sensor resonates"
     parameters = (
-        Parameter("frequency_hz", 25.0, 2.0, 400.0, float("inf"), Scale.RECIPROCAL, (12.0, 16.0, 21.0, 27.0, 33.0, 40.0, 60.0),
-                  "natural frequency of the sensor on its bracket"),
+        Parameter("frequency_hz", 25.0, 2.0, 400.0, float("inf"), Scale.RECIPROCAL,
+                  (12.0, 16.0, 21.0, 27.0, 33.0, 40.0, 60.0), "natural frequency of the sensor on its bracket"),
         Parameter("damping_ratio", 0.08, 0.002, 1.5, None, Scale.LOG, (0.05, 0.25), "of the bracket"),
     )
     source = "C. M. Harris, A. G. Piersol, Shock and Vibration Handbook (2002), chapter 2: transmissibility"
