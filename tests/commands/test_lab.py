@@ -117,12 +117,12 @@ def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.Ca
 
 def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                               answering: Callable[..., list[str]]) -> None:
-    answering("roll", "tire_damping", "y")
+    answering("roll", "sensor_gain", "y")
     assert lab(runs, tmp_path) == 0
     told = capsys.readouterr().out
     assert "elevation_right_m" in told  # why it cannot be roll
-    assert told.index("=== Add tire_damping ===") < told.index("=== Add sensor_offset ===")
-    assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["tire_damping",
+    assert told.index("=== Add sensor_gain ===") < told.index("=== Add sensor_offset ===")
+    assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["sensor_gain",
                                                                                             "sensor_offset"]
     assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
 

@@ -17,7 +17,7 @@ from logger.vehicle.effect import Chosen, chosen
 from compared import CAR, RATE_HZ, a_run
 
 SPEEDS_MPS = (7.0, 15.0)
-FEW = ("roll", "sensor_gain", "sensor_offset", "tire_damping")
+FEW = ("roll", "sensor_gain", "sensor_offset", "time_offset")
 """Enough candidates to choose among, few enough, and linear, to be quick."""
 
 OWN = '''
