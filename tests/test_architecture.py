@@ -12,7 +12,10 @@ TREES = {
     ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): ast.parse(path.read_text("utf-8"))
     for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
 }
-BELOW = {"dsp", "roads", "comfort", "vehicle", "estimation", "identification", "modal", "lab", "units", "records", "errors"}
+BELOW = {
+    "dsp", "roads", "comfort", "vehicle", "estimation", "identification", "modal", "lab",
+    "units", "records", "errors",
+}
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + ["logger.commands.run"]
 

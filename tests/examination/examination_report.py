@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from html import escape
 from statistics import median
 
-from matrix_figure import matrix_figure
-
 from logger.report.document import document, grid, paragraphs, section
 
 from effects import EFFECTS
@@ -46,6 +44,7 @@ from marking import (
     unseen,
     verdict,
 )
+from matrix_figure import matrix_figure
 from outsiders import OUTSIDERS
 
 TITLE = "The lab examined"
