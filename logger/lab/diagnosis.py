@@ -19,6 +19,8 @@ import numpy as np
 
 from logger.lab.candidates import Base, Screened, Tried, as_screened, fitted, misalignment, screened, settled_further
 from logger.lab.fitting import Problem, State, settled
+from logger.lab.noise import Noise, floor_error, noise_of
+from logger.lab.prediction import Runs
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 
 Progress = Callable[[str], None]
@@ -35,21 +37,11 @@ HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
-# A band is louder than the noise from so many deviations of the difference on.
-_LOUDER = 2.5
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """The noise of the sensors: its deviation, and how certain that is [m/s2]."""
-
-    deviation_mps2: float
-    standard_error_mps2: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +133,13 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         left = [one for one in left if one.name != best.effect.name]
     now, needed = _needed(problem, before, now, taken, len(present), progress)
     progress("fitting all stretches")
-    whole = Problem(problem.runs, problem.vehicle, problem.tolerance, whole=True)
+    whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
     after, _ = settled(whole, now.state)
-    noise = _noise(whole, after)
+    noise = noise_of(whole, after)
     excess = _excess(whole, after, noise)
     verdict = tuple(needed)
     return Diagnosis(
-        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=_floor(problem, noise),
+        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
         unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=after,
         problem=whole,
@@ -245,27 +237,6 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
         now = without[least]
         worth.pop(least)
     return now, dict(sorted(worth.items(), key=lambda pair: -pair[1]))
-
-
-def _noise(problem: Problem, state: State) -> Noise:
-    """The sensor's noise, taken for white: from the highest frequencies, where no car moves it, and, from there down,
-    from every band that is no louder than what was found above it."""
-    quiet = [one.quiet(left) for one, left in zip(problem.stretches, problem.residuals(state), strict=True)]
-    freedom = sum(n for _, n in quiet)
-    power = sum(level * n for level, n in quiet) / freedom
-    cells = problem.cells(state, None)
-    for band in reversed(range(min(len(one.power) for one in cells))):
-        n = sum(float(one.freedom[band]) for one in cells)
-        level = sum(float(one.freedom[band] * one.power[band]) for one in cells) / n
-        if level < power * (1 + _LOUDER * np.sqrt(2 / n + 2 / freedom)):
-            power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
-    return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
-
-
-def _floor(problem: Problem, noise: Noise) -> float:
-    """The error that the noise alone makes."""
-    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
-    return float(noise.deviation_mps2 / np.sqrt((counted**2).mean()))
 
 
 def _excess(problem: Problem, state: State, noise: Noise) -> float:

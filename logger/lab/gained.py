@@ -8,14 +8,13 @@ side without and with the effect, in per cent and in standard errors.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from logger.lab.addition import Added
 from logger.lab.fitting import Problem, moves_of
-from logger.lab.floor import noise_floor
+from logger.lab.noise import floor_error, noise_of
 from logger.lab.quantities import chance, finite, numbers_of
-from logger.lab.spread import with_spread
 from logger.vehicle.effect import Chosen
 
 CHANCE = 0.001
@@ -89,13 +88,9 @@ def gained(problem: Problem, added: Added, names: Sequence[str]) -> Gained:
 
     gain = problem.deviance(added.before) - problem.deviance(added.after)
     which = [index for index, one in enumerate(added.effects) if one.effect.name in names]
-    effects, deviations = with_spread(problem, added.after)
-    added = replace(added, effects=effects, numbers=tuple(
-        replace(one, found_standard_error=one.found * float(deviation))
-        for one, deviation in zip(added.numbers, deviations, strict=True)))
     numbers = max(1, len(moves_of(added.effects, which)))
     return Gained(added, tuple(names), float(gammaincc(numbers / 2, max(gain, 0.0) / 2)),
-                  noise_floor(problem, added.after))
+                  floor_error(problem, noise_of(problem, added.after)))
 
 
 def moved_between(first: Added, last: Added) -> list[Moved]:

@@ -1,0 +1,45 @@
+"""The noise of the sensors, which is not given, from what a model leaves; and the error that it alone makes.
+
+Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
+moves no sensor and the recorder's filter lets hardly anything pass, so that what is there is the sensor's own noise.
+Taken for white, it is looked for from there down: every band that is no louder than what was found above it tells more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from logger.lab.fitting import Problem, State
+
+# A band is louder than the noise from so many deviations of the difference on.
+_LOUDER = 2.5
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of the sensors: its deviation, and how certain that is [m/s2]."""
+
+    deviation_mps2: float
+    standard_error_mps2: float
+
+
+def noise_of(problem: Problem, state: State) -> Noise:
+    """The sensor's noise under what a state leaves."""
+    quiet = [one.quiet(left) for one, left in zip(problem.stretches, problem.residuals(state), strict=True)]
+    freedom = sum(n for _, n in quiet)
+    power = sum(level * n for level, n in quiet) / freedom
+    cells = problem.cells(state, None)
+    for band in reversed(range(min(len(one.power) for one in cells))):
+        n = sum(float(one.freedom[band]) for one in cells)
+        level = sum(float(one.freedom[band] * one.power[band]) for one in cells) / n
+        if level < power * (1 + _LOUDER * np.sqrt(2 / n + 2 / freedom)):
+            power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
+    return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
+
+
+def floor_error(problem: Problem, noise: Noise) -> float:
+    """rms(noise) / rms(measured) over all samples that count."""
+    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
+    return float(noise.deviation_mps2 / np.sqrt((counted**2).mean()))
