@@ -25,8 +25,9 @@ from logger.identification.low_pass import LowPass
 
 Array = npt.NDArray[np.float64]
 
-LEAST_SHARE = 1e-9
-"""Noise is never taken for less than this share of the measurement."""
+LEAST_SHARE = 1e-5
+"""Noise is never taken for less than this share of the measurement: predictions are not more accurate themselves, and
+what they leave of a record without noise is no process at all."""
 _MOST_ORDER = 60
 _SAMPLES_PER_ORDER = 20
 _MEMORY_S, _FILTER_MEMORY_S = 4.0, 1.0
@@ -128,8 +129,8 @@ class Autoregressive:
         """As ``Noise``. The order is at most 60, and a twentieth of the samples."""
         count = sum(map(len, residuals))
         most = min(_MOST_ORDER, count // _SAMPLES_PER_ORDER) if self.order is None else self.order
-        reflections = _burg(residuals, min(most, min(map(len, residuals)) - 1))
-        power = max(_rms(residuals), floor) ** 2
+        reflections = _burg(residuals, min(most, min(map(len, residuals)) - 1), floor)
+        power = _rms(residuals) ** 2 + floor**2
         powers = power * np.cumprod(np.concatenate([[1.0], 1 - reflections**2]))
         order = len(reflections)
         if self.order is None:
@@ -209,12 +210,13 @@ def _rms(parts: Sequence[Array]) -> float:
 # --- predictors ---
 
 
-def _burg(parts: Sequence[Array], order: int) -> Array:
-    """Reflection coefficients (order,) that make forward and backward errors of all parts least (J. P. Burg 1975)."""
+def _burg(parts: Sequence[Array], order: int, floor: float) -> Array:
+    """Reflection coefficients (order,) that make forward and backward errors of all parts least (J. P. Burg 1975), with
+    white noise of the deviation ``floor`` added to the parts."""
     forward, backward = [part[1:] for part in parts], [part[:-1] for part in parts]
     reflections = np.zeros(order)
     for k in range(order):
-        energy = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
+        energy = sum(float(f @ f + b @ b) + 2 * len(f) * floor**2 for f, b in zip(forward, backward, strict=True))
         if energy <= 0:
             break
         r = -2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / energy

@@ -38,6 +38,9 @@ class Test:
         return not self.p_value < DOUBT
 
 
+UNTESTED = Test(0.0, 0, float("nan"))
+
+
 def autocorrelation(white: Sequence[Array], fitted: int, lags: int = LAGS) -> Test:
     """Whether residuals [(n,), ...] are uncorrelated over 1 to ``lags`` samples (G. M. Ljung and G. E. P. Box 1978).
 
@@ -46,7 +49,7 @@ def autocorrelation(white: Sequence[Array], fitted: int, lags: int = LAGS) -> Te
     count, power = sum(map(len, white)), sum(float(one @ one) for one in white)
     reach = min(lags + fitted, min(map(len, white)) - 1)
     if power <= 0 or reach <= fitted:
-        return Test(0.0, 0, float("nan"))
+        return UNTESTED
     at = np.arange(1, reach + 1)
     correlations = np.array([sum(float(one[lag:] @ one[:-lag]) for one in white) for lag in at]) / power
     return _test(count * (count + 2) * float((correlations**2 / (count - at)).sum()), reach - fitted)
@@ -65,7 +68,7 @@ def cross_correlation(
     joined = np.concatenate(white)
     lengths = np.sqrt((columns**2).sum(axis=0))
     if not (joined.any() and lengths.any()):
-        return Test(0.0, 0, float("nan"))
+        return UNTESTED
     basis, values, _ = np.linalg.svd(columns / lengths.max(), full_matrices=False)
     basis = basis[:, values > _RANK * values[0]]
     variance = float(joined @ joined) / len(joined)
