@@ -31,6 +31,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,6 +57,8 @@ NOISES = ("auto", "white", "ar", "road")
 _SAME_RATE = 1e-6
 _LEAST_SAMPLES = 50
 _MOST_TRIES = 1000
+# A mean beyond this is gravity [m/s2]; a fit that leaves more than this share is tried with the record turned over.
+_LARGEST_MEAN_MPS2, _POOR = 2.0, 0.3
 # Of roads that were not measured: how wavy, and how much of one is enough, and not too much, for one fit [m].
 _WAVINESS, _FLATTEST, _STEEPEST, _FREE_WAVINESS = 2.0, 1.0, 3.5, "road.waviness"
 _LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
@@ -79,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
-                        help="where to stay (default: within a factor of 20, lengths 3); may repeat")
+                        help="where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat")
     parser.add_argument("--tries", type=int, default=0, metavar="N", help="so many further starts, spread around")
     parser.add_argument("--noise", choices=NOISES, default="auto",
                         help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
@@ -99,8 +104,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(args: argparse.Namespace) -> int:
     """A fit over roads that are known, but for a few numbers."""
-    from logger.identification.fit import fit
-    from logger.identification.prediction import VehicleModel
     from logger.identification.report import as_json, lines, tests
     from logger.identification.verdict import NotIdentifiable
     from logger.shipped import vehicle_path
@@ -111,22 +114,16 @@ def _measured(args: argparse.Namespace) -> int:
     vehicle = read_vehicle(vehicle_path(args.vehicle))
     road, unplaced = _road(args)
     records = [_record(path, args.skip, bool(road.obstacles)) for path in args.runs]
-    free = _free(args, vehicle, road, _starts(vehicle, records, road, unplaced))
+    model_of = partial(_model, args, vehicle, road, unplaced)
+    model = model_of(records)
     try:
-        model = VehicleModel(vehicle, free, records, road)
-    except ValueError as error:
-        raise BadInput(f"--free: {error}") from None
-    options = _options(args, model)
-    try:
-        found = fit(model, model.measured, options)
+        found = _upright_fit(args, model_of, records)
     except NotIdentifiable as refusal:
         if args.json:
             print(json.dumps(_refused(model, refusal), allow_nan=False))
             print(f"ridelog: {refusal}", file=sys.stderr)
             return EXIT_CHECK_FAILED
         raise
-    except ValueError as error:
-        raise BadInput(f"{args.runs[0]}: {error}") from None
     checks = tests(model, found)
     if args.out is not None:
         _write(args.out, model, found)
@@ -139,6 +136,50 @@ def _measured(args: argparse.Namespace) -> int:
         if args.out is not None:
             print(f"Vehicle: {args.out}")
     return EXIT_DONE if found.converged else EXIT_CHECK_FAILED
+
+
+def _upright_fit(args: argparse.Namespace, model_of: Callable[[list[Record]], VehicleModel],
+                 records: list[Record]) -> Fit:
+    """The fit. NotIdentifiable for what the records do not tell, or tell only when they are turned over."""
+    from logger.identification.verdict import NotIdentifiable, upside_down
+
+    try:
+        found: Fit | NotIdentifiable = _fit(args, model_of(records))
+    except NotIdentifiable as refusal:
+        found = refusal
+    error = 1.0 if isinstance(found, NotIdentifiable) else found.error_after
+    if error > _POOR:
+        turned = [replace(record, measured_mps2=-record.measured_mps2) for record in records]
+        try:
+            findings = upside_down(error, _fit(args, model_of(turned)).error_after)
+        except NotIdentifiable:
+            findings = []
+        if findings:
+            raise NotIdentifiable(findings)
+    if isinstance(found, NotIdentifiable):
+        raise found
+    return found
+
+
+def _fit(args: argparse.Namespace, model: VehicleModel) -> Fit:
+    from logger.identification.fit import fit
+
+    options = _options(args, model)
+    try:
+        return fit(model, model.measured, options)
+    except ValueError as error:
+        raise BadInput(f"{args.runs[0]}: {error}") from None
+
+
+def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced: list[str],
+           records: list[Record]) -> VehicleModel:
+    from logger.identification.prediction import VehicleModel
+
+    free = _free(args, vehicle, road, _starts(vehicle, records, road, unplaced))
+    try:
+        return VehicleModel(vehicle, free, records, road)
+    except ValueError as error:
+        raise BadInput(f"--free: {error}") from None
 
 
 def _unmeasured(args: argparse.Namespace) -> int:
@@ -309,17 +350,29 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
     if not 0 <= skip_s < len(drive.time_s) / drive.rate_hz - _LEAST_SAMPLES / drive.rate_hz:
         raise BadInput(f"{path}: expected at least {_LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
                        f"left out (--skip), found {len(drive.time_s) / drive.rate_hz:g} s in all")
-    return Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
+    record = Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
+    if not np.ptp(record.kept_mps2) > 0:
+        raise BadInput(f"{path}: expected an acceleration that moves, found {record.kept_mps2[0]:g} m/s2 all along")
+    if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
+        raise BadInput(f"{path}: expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on average "
+                       "(subtract the mean while the car stood)")
+    return record
 
 
 def _options(args: argparse.Namespace, model: VehicleModel) -> Any:
     from logger.identification.fit import Options, spread_starts
+    from logger.identification.low_pass import LowPass
     from logger.identification.noise import Autoregressive, RoadNoise, White
 
     rate_hz = model.records[0].rate_hz
     _check_rates(args.runs, [record.rate_hz for record in model.records])
     if args.low_pass is not None and not 0 < args.low_pass < rate_hz / 2:
         raise BadInput(f"--low-pass {args.low_pass:g}: expected above 0 and below {rate_hz / 2:g} Hz")
+    reach = LowPass(rate_hz, args.low_pass).reach
+    for path, measured in zip(args.runs, model.measured, strict=True):
+        if len(measured) <= reach:
+            raise BadInput(f"{path}: expected more than {reach} samples for --low-pass {args.low_pass:g}, found "
+                           f"{len(measured)} after the first {args.skip:g} s")
     if not 0 <= args.tries <= _MOST_TRIES:
         raise BadInput(f"--tries {args.tries}: expected 0 to {_MOST_TRIES}")
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
@@ -351,7 +404,7 @@ def _refused(model: VehicleModel, refusal: NotIdentifiable) -> dict[str, Any]:
     predictions = model.predict(np.array([one.start for one in model.parameters]))
     before = normalised_error(model.measured, [seen - one for seen, one in
                                                zip(model.measured, predictions, strict=True)])
-    return _nothing_told(refusal, before if isfinite(before) else None)
+    return _nothing_told(refusal, before)
 
 
 def _nothing_told(refusal: NotIdentifiable, before: float | None) -> dict[str, Any]:

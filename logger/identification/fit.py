@@ -5,9 +5,11 @@ the data cannot tell. Solution, in this order:
 
 1. ask whether the data could tell at all (``verdict``), before any fit;
 2. Levenberg and Marquardt's steps, in the logarithm of what can only be positive, within bounds, on residuals as they
-   are (output error), from every start that was given; the best goes on;
+   are (output error), from every start that was given; the best goes on; by squares, as far from the end a robust
+   loss has hills of its own;
 3. fit a noise model to what is left, weigh by it (innovations form), and repeat 2 from there, until neither moves;
-4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate.
+4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
+   whether the model at its best has anything to do with what was measured.
 
 It knows models by ``Model`` only.
 """
@@ -31,6 +33,7 @@ from logger.identification.verdict import (
     NotIdentifiable,
     statistical,
     structural,
+    unexplained,
 )
 
 Array = npt.NDArray[np.float64]
@@ -123,14 +126,14 @@ def fit(model: Model, measured: Sequence[Array], options: Options | None = None)
     """Fit a model's free numbers to records (n,), each as long as its prediction.
 
     Raises NotIdentifiable when the data cannot tell them, ValueError for measurements of other lengths than the
-    predictions, no free number, or a start outside its bounds.
+    predictions or nothing but zeros, no free number, or a start outside its bounds.
     """
     problem = _Problem(model, measured, options or Options())
     starts = problem.starts()
     findings = problem.structural_findings(problem.beside(starts[0]))
     if findings and problem.options.refuse:
         raise NotIdentifiable(findings)
-    descents = [_descend(problem, start, problem.plain) for start in starts]
+    descents = [_descend(problem, start, problem.plain, robust=False) for start in starts]
     best = descents[int(np.argmin([one.cost for one in descents]))]
     iterations = sum(one.steps for one in descents)
     noise, best, rounds, settled = _innovations(problem, best)
@@ -162,9 +165,9 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
 
 
 def normalised_error(measured: Sequence[Array], residuals: Sequence[Array]) -> float:
-    """rms(residuals) / rms(measured) over all records."""
+    """rms(residuals) / rms(measured) over all records, which are not all zeros."""
     left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))
-    return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+    return float(np.sqrt(left / whole))
 
 
 # --- the problem in the coordinates that steps are taken in ---
@@ -203,7 +206,9 @@ class _Problem:
         low, high = (self.coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high"))
         self.low, self.high = np.minimum(low, high), np.maximum(low, high)
         self.observed = [self.low_pass.apply(one) for one in self.measured]
-        self.floor = LEAST_SHARE * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2))) or LEAST_SHARE
+        if not any(one.any() for one in self.measured):
+            raise ValueError("expected measurements that move, found nothing but 0")
+        self.floor = LEAST_SHARE * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
 
     def coordinates(self, values: Array) -> Array:
@@ -276,12 +281,12 @@ def robust_deviation(white: Array) -> float:
 # --- descent ---
 
 
-def _descend(problem: _Problem, start: Array, noise: Whitening) -> _Point:
+def _descend(problem: _Problem, start: Array, noise: Whitening, robust: bool) -> _Point:
     """Levenberg and Marquardt's steps with Nielsen's rule for the damping; a number at a bound that it presses against
     stays there."""
     deviation = None
     point = problem.at(np.clip(start, problem.low, problem.high), noise, deviation)
-    if problem.options.robust:
+    if robust:
         deviation = robust_deviation(point.white)
         point = problem.at(point.x, noise, deviation)
     damping, growth = _FIRST_DAMPING, 2.0
@@ -348,7 +353,7 @@ def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, i
         if noise.name == "ar":
             kinds = [Autoregressive(int(noise.levels["order"]))]
         before = point.x
-        point = _descend(problem, before, noise)
+        point = _descend(problem, before, noise, problem.options.robust)
         steps += point.steps
         moved = point.x - before
         _, hessian, moving = _normal(problem, point)
@@ -367,8 +372,9 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
     at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
                 if x - low < _AT_BOUND or high - x < _AT_BOUND]
     if not findings:
-        findings = problem.structural_findings(point.x) or statistical(
-            names, relative, np.array([one.weakest for one in problem.free]))
+        findings = (problem.structural_findings(point.x)
+                    or statistical(names, relative, np.array([one.weakest for one in problem.free]))
+                    or unexplained(normalised_error(problem.observed, point.plain)))
         if findings and problem.options.refuse:
             raise NotIdentifiable(findings)
     values = problem.values(point.x)

@@ -39,16 +39,21 @@ class LowPass:
         """Rate of what comes out."""
         return self.rate_hz if self.cutoff_hz is None else min(self.rate_hz, _SAMPLES_PER_PERIOD * self.cutoff_hz)
 
+    @property
+    def reach(self) -> int:
+        """How many samples the filter looks back and ahead, in all."""
+        return 0 if self.cutoff_hz is None else 2 * self._half
+
     def apply(self, samples: Array) -> Array:
         """What is left (m, ...) of samples (n, ...); the ends, where the filter would look outside, are left out.
 
-        ValueError if they are shorter than the filter.
+        ValueError unless they are more than its ``reach``.
         """
         if self.cutoff_hz is None:
             return samples
         half = self._half
-        if len(samples) <= 2 * half:
-            raise ValueError(f"low-pass: expected more than {2 * half} samples, found {len(samples)}")
+        if len(samples) <= self.reach:
+            raise ValueError(f"low-pass: expected more than {self.reach} samples, found {len(samples)}")
         at = np.arange(half, len(samples) - half - 0.5, self.rate_hz / self.kept_hz)
         nearest = np.rint(at).astype(int)
         offsets = np.arange(-half, half + 1)

@@ -105,10 +105,13 @@ def free(
     """A free number of a vehicle: from its present value, within a factor of 20, unless something else is said.
 
     Lengths along the car stay within a factor of 3, the sensor within 3 m of the centre of gravity. ValueError as
-    ``read`` and ``Free``, and for a size whose start is 0 and which so has no bounds of its own.
+    ``read`` and ``Free``, and for a size whose start or bounds are not above 0: what fits best may be none at all then.
     """
     value = read(vehicle, name) if start is None else start
-    return Free(name, value, *(_bounds(name, value) if bounds is None else bounds))
+    low, high = _bounds(name, value) if bounds is None else bounds
+    if not name.startswith(f"{SENSOR}.") and not (low > 0 and value > 0):
+        raise ValueError(f"{name}: expected a start and bounds above 0, found {value:g} and {low:g} to {high:g}")
+    return Free(name, value, low, high)
 
 
 def _bounds(name: str, value: float) -> tuple[float, float]:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from logger.identification.fit import Fit
+from logger.identification.noise import LEAST_SHARE
 from logger.identification.prediction import VehicleModel
-from logger.identification.whiteness import Test, autocorrelation, cross_correlation
+from logger.identification.whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 
 NORMAL_95 = 1.959964
 _MENTIONED = 0.7
@@ -17,7 +18,10 @@ _DOUBTFUL = 0.1
 
 
 def tests(model: VehicleModel, fit: Fit) -> tuple[Test, Test]:
-    """Whether the fit's residuals are white, and whether they are free of the road."""
+    """Whether the fit's residuals are white, and whether they are free of the road; untested where they are no more
+    than the predictions' own inaccuracy."""
+    if fit.error_after < LEAST_SHARE:
+        return UNTESTED, UNTESTED
     inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
               zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
     return (autocorrelation(fit.white, fit.noise.parameters - 1),
@@ -29,7 +33,7 @@ def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
     names = list(fit.parameters)
     return {
         "parameters": fit.parameters, "standard_errors": fit.standard_errors,
-        "error_before": _finite(fit.error_before), "error_after": _finite(fit.error_after), "converged": fit.converged,
+        "error_before": fit.error_before, "error_after": fit.error_after, "converged": fit.converged,
         "start": {one.name: one.start for one in fit.free},
         "bounds": {one.name: [one.low, one.high] for one in fit.free},
         "interval_95": {name: list(interval(fit, name)) for name in names},
@@ -38,13 +42,23 @@ def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
         "at_bound": fit.at_bound, "iterations": fit.iterations,
         "noise": {"model": fit.noise.name, **fit.noise.levels},
         "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
-        "cannot_tell": [finding.words for finding in fit.verdict],
+        "cannot_tell": list(doubts(fit, white, free_of_road)),
     }
 
 
-def _finite(error: float) -> float | None:
-    """None for the error of a record that is nothing but zeros."""
-    return error if np.isfinite(error) else None
+def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+    """What stands between the estimates and their being believed, each in words; nothing when all is well."""
+    yield from (finding.words for finding in fit.verdict)
+    if not fit.converged:
+        yield "the fit did not come to rest."
+    if fit.at_bound:
+        yield f"{', '.join(fit.at_bound)} ended at a bound, which is where it was stopped and not what was measured."
+    if not white.passed:
+        yield (f"residuals are like their neighbours (p = {white.p_value:.2g}): there is more than this noise model "
+               "knows, and the standard errors are a guide only.")
+    if not free_of_road.passed:
+        yield (f"residuals follow the road (p = {free_of_road.p_value:.2g}): the model misses something of the car, or "
+               "of the road, and the estimates lean to make up for it.")
 
 
 def _p_value(test: Test) -> float | None:
@@ -75,7 +89,7 @@ def lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield f"What is left is taken for {fit.noise.words}."
     yield from _correlations(fit)
     yield from _checks(white, free_of_road)
-    yield from _limits(fit)
+    yield from _limits(fit, sound=not any(doubts(fit, white, free_of_road)))
 
 
 def _ends(fit: Fit) -> str:
@@ -114,13 +128,15 @@ def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
         yield (f"Are residuals like their neighbours? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
                + ("no, standard errors can be trusted." if white.passed else
                   "yes, there is more than this noise model knows; the standard errors are a guide only."))
+    if not white.degrees and not free_of_road.degrees:
+        yield "Nothing is left that could be tested."
     if free_of_road.degrees:
         yield (f"Do residuals follow the road? p = {free_of_road.p_value:.2g} over {free_of_road.degrees} degrees of "
                "freedom: " + ("no." if free_of_road.passed else
                               "yes, the model misses something of the car, and the estimates lean to make up for it."))
 
 
-def _limits(fit: Fit) -> Iterator[str]:
+def _limits(fit: Fit, sound: bool) -> Iterator[str]:
     if fit.at_bound:
         yield (f"At a bound: {', '.join(fit.at_bound)}. That is where it was stopped, not what was measured; its "
                "standard error means nothing. Widen --bounds, or ask what the model lacks.")
@@ -131,7 +147,7 @@ def _limits(fit: Fit) -> Iterator[str]:
              if name in sizes and error > _DOUBTFUL * abs(fit.parameters[name])}
     if vague:
         yield "Hardly told by these runs: " + ", ".join(f"{name} ({share:.0%})" for name, share in vague.items()) + "."
-    elif not fit.verdict and not fit.at_bound:
+    elif sound:
         yield "These runs tell all that was asked."
     if len(fit.parameters) > 1:
         yield _least_known(fit)

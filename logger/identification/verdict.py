@@ -9,6 +9,8 @@ of each number and in units of the noise, are looked at before anything is belie
   scaled derivatives), whatever the noise;
 - a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak; of some
   numbers, such as a speed that was recorded, a rougher estimate than they came with is worth nothing.
+
+And a model that at its best leaves as much as there was has not been fitted to this record, whatever its numbers.
 """
 
 from __future__ import annotations
@@ -24,19 +26,22 @@ from logger.identification.parameters import WEAKEST
 
 Array = npt.NDArray[np.float64]
 
-SILENT, TOGETHER, WEAK = "silent", "together", "weak"
+SILENT, TOGETHER, WEAK, UNEXPLAINED, TURNED = "silent", "together", "weak", "unexplained", "turned"
 NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
 _PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
+# Rms of what is left over that of what was measured; and how much less of it is clearly less.
+_EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
 
 
 @dataclass(frozen=True)
 class Finding:
     """Something that the data cannot tell.
 
-    kind         silent, together or weak
-    direction    relative changes by name that the predictions do not feel, the largest 1
+    kind         silent, together, weak, unexplained or turned
+    direction    relative changes by name that the predictions do not feel, the largest 1; empty where it is no number
+                 that cannot be told
     words        a sentence
     """
 
@@ -106,6 +111,24 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         findings.append(Finding(WEAK, shares, words))
         weak &= ~np.isin(names, list(shares))
     return findings
+
+
+def unexplained(error: float) -> list[Finding]:
+    """Whether a model explains anything: ``error`` is the rms of what it leaves over that of what was measured."""
+    if error < _EXPLAINS_NOTHING:
+        return []
+    return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (error "
+                    f"{error:.2f}): this is not the road that was driven, or not where it was driven.")]
+
+
+def upside_down(error: float, turned_error: float) -> list[Finding]:
+    """Whether a record is explained far better when its sign is changed: errors as measured and with the sign changed,
+    as ``unexplained``."""
+    if turned_error > _CLEARLY_LESS * error:
+        return []
+    return [Finding(TURNED, {}, f"the acceleration is upside down: turned over, what was measured is explained but for "
+                    f"an error of {turned_error:.2f}, and as it is of {error:.2f}. Up is positive; a step has the "
+                    "other sign then, or the sensor does.")]
 
 
 def _together(names: Sequence[str], direction: Array) -> Finding:

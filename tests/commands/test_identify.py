@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from logger.commands.main import main
@@ -16,6 +18,8 @@ from logger.store.drive_file import write_drive, write_profile
 from logger.store.vehicle_file import read_vehicle
 
 from bump_drives import bump_record, road_record
+
+Array = npt.NDArray[np.float64]
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 MASS, DAMPERS = "sprung_mass_kg", "both.suspension_damping_n_s_per_m"
@@ -86,6 +90,76 @@ def test_what_the_runs_cannot_tell(runs: list[str], capsys: pytest.CaptureFixtur
     assert printed.err.count("\n") == 1
 
 
+def other_run(run: str, folder: Path, change: Callable[[Array], Array]) -> str:
+    """A run with other readings, samples (n,) of them being given."""
+    drive = np.genfromtxt(Path(run) / "drive.csv", delimiter=",", names=True)
+    columns = {name: drive[name] for name in drive.dtype.names}
+    folder.mkdir(exist_ok=True)
+    write_drive(folder / "drive.csv", {**columns, "accel_z_mps2": change(columns["accel_z_mps2"])})
+    (folder / "profile.csv").write_bytes((Path(run) / "profile.csv").read_bytes())
+    return str(folder)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda z: 0 * z, "expected an acceleration that moves, found 0 m/s2 all along"),
+    (lambda z: 0 * z - 0.4, "expected an acceleration that moves, found -0.4 m/s2 all along"),
+    (lambda z: z + 9.81, "expected gravity removed from the acceleration, found 9.8[0-9] m/s2 on average"),
+    (lambda z: -z - 9.81, "expected gravity removed from the acceleration, found -9.8[0-9] m/s2 on average"),
+])
+def test_readings_that_are_none(runs: list[str], tmp_path: Path, change: Callable[[Array], Array],
+                                message: str) -> None:
+    with pytest.raises(BadInput, match=f"{tmp_path.name}/bad: {message}"):
+        identify([runs[0], other_run(runs[1], tmp_path / "bad", change)], MASS)
+
+
+def test_another_road_than_the_one_that_was_driven(runs: list[str], tmp_path: Path,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    other = other_run(runs[0], tmp_path / "other", np.array)
+    write_profile(tmp_path / "other" / "profile.csv", road_record(CAR, 10.0, 4.0, 2, gd_n0_cm3=4000.0).track)
+    assert identify([other], MASS, "--json") == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["parameters"], told["converged"]) == ({}, False)
+    assert "explains nothing of what was measured" in told["cannot_tell"][0]
+
+
+@pytest.mark.parametrize("more", [(), ("--bump", "height_m=0.15,width_m=2.6")])
+def test_a_sensor_upside_down(runs: list[str], tmp_path: Path, more: tuple[str, ...]) -> None:
+    run = other_run(runs[0], tmp_path / "turned", np.negative)
+    place = ",bump.start_m,speed_scale" if more else ""
+    with pytest.raises(NotIdentifiable, match="the acceleration is upside down"):
+        identify([f"{run}/drive.csv" if more else run], f"{MASS},{DAMPERS}{place}", *more)
+    assert identify([f"{runs[0]}/drive.csv" if more else runs[0]], f"{MASS},{DAMPERS}{place}", *more) == 0
+
+
+def test_what_speaks_against_an_estimate_is_told(runs: list[str], tmp_path: Path,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    narrow = ("--bounds", f"{MASS}=600,700", "--start", f"{MASS}=650", "--noise", "white")
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
+    assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, *narrow, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["cannot_tell"]
+    assert len(told) == 3
+    expected = (f"{MASS} ended at a bound", "like their neighbours", "follow the road")
+    for words, found in zip(expected, told, strict=True):
+        assert words in found
+    assert identify(runs, MASS, *narrow) == 0
+    assert "all that was asked" not in capsys.readouterr().out
+    assert identify(runs, MASS, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["cannot_tell"] == []
+
+
+def test_a_simulation_without_noise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    road = tmp_path / "profile.csv"
+    assert main(["road", "generate", "--class", "C", "--length", "200", "--seed", "1", "--out", str(road)]) == 0
+    assert main(["simulate", "--vehicle", "rav4-2009", "--profile", str(road), "--speed", "14", "--out",
+                 str(tmp_path / "drive.csv")]) == 0
+    capsys.readouterr()
+    assert identify([str(tmp_path)], f"{MASS},{DAMPERS}", "--start", f"{MASS}=700", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["converged"], told["cannot_tell"]) == (True, [])
+    assert [told["parameters"][name] for name in (MASS, DAMPERS)] == pytest.approx([875, 1776], rel=1e-6)
+
+
 def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     drives = []
@@ -149,6 +223,8 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     (MASS, ("--start", f"{DAMPERS}=3"), "expected one of what is free"),
     (MASS, ("--bounds", f"{MASS}=900,1000"), "expected a start between its bounds"),
     (MASS, ("--bounds", f"{MASS}=900"), "expected PARAM=NUMBER,NUMBER"),
+    (MASS, ("--bounds", f"{MASS}=0,2000"), "expected a start and bounds above 0"),
+    (MASS, ("--start", f"{MASS}=-700"), "expected a start and bounds above 0"),
     (MASS, ("--low-pass", "70"), "below 50 Hz"),
     (MASS, ("--skip", "30"), "after the first 30 s"),
     (MASS, ("--tries", "-1"), "expected 0 to 1000"),
@@ -158,9 +234,18 @@ def test_wrong_use_is_one_line(runs: list[str], free: str, more: tuple[str, ...]
         identify(runs, free, *more)
 
 
+def test_a_run_too_short_for_the_low_pass_is_the_one_named(runs: list[str], tmp_path: Path) -> None:
+    record = bump_record(CAR, 2.6)
+    write_drive(tmp_path / "short.csv", {"t_s": record.time_s, "accel_z_mps2": record.measured_mps2,
+                                         "speed_mps": record.speed_mps, "distance_m": record.distance_m})
+    with pytest.raises(BadInput, match=r"short.csv: expected more than [0-9]+ samples for --low-pass 2, found 60"):
+        identify([f"{runs[0]}/drive.csv", str(tmp_path / "short.csv")], MASS, "--bump",
+                 "start_m=2,height_m=0.1,width_m=2", "--low-pass", "2")
+
+
 def test_runs_of_different_rates(runs: list[str], tmp_path: Path) -> None:
     time_s = np.arange(400) / 50
-    write_drive(tmp_path / "drive.csv", {"t_s": time_s, "accel_z_mps2": 0 * time_s, "speed_mps": 0 * time_s + 5,
+    write_drive(tmp_path / "drive.csv", {"t_s": time_s, "accel_z_mps2": np.sin(time_s), "speed_mps": 0 * time_s + 5,
                                          "distance_m": 5 * time_s})
     write_profile(tmp_path / "profile.csv", bump_record(CAR).track)
     with pytest.raises(BadInput, match="expected 100 samples a second"):

@@ -12,6 +12,7 @@ from logger.identification.fit import Fit, Options, fit, normalised_error, sprea
 from logger.identification.noise import Autoregressive, RoadNoise, White
 from logger.identification.parameters import Free, changed, free
 from logger.identification.prediction import VehicleModel
+from logger.identification.verdict import UNEXPLAINED, NotIdentifiable
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 
@@ -173,6 +174,23 @@ def test_what_is_not_asked_right() -> None:
 
 def test_records_of_nothing_but_zeros() -> None:
     model = VehicleModel(CAR, [free(CAR, MASS)], [BUMP])
-    found = fit(model, [np.zeros_like(model.measured[0])], Options(refuse=False))
-    assert np.isnan(found.error_after)
-    assert found.at_bound == [MASS]
+    with pytest.raises(ValueError, match="expected measurements that move, found nothing but 0"):
+        fit(model, [np.zeros_like(model.measured[0])], Options(refuse=False))
+
+
+def test_another_record_than_this_one_is_not_explained() -> None:
+    model = VehicleModel(CAR, [free(CAR, MASS)], [road_record(CAR, 10.0, 14.0, 1)])
+    other = road_record(CAR, 10.0, 14.0, 2).kept_mps2
+    with pytest.raises(NotIdentifiable, match="explains nothing of what was measured"):
+        fit(model, [other])
+    assert fit(model, [other], Options(refuse=False)).verdict[0].kind == UNEXPLAINED
+    assert not fit(model, model.measured).verdict
+
+
+def test_a_robust_loss_has_no_ends_of_its_own() -> None:
+    records = [bump_record(CAR, 8.0, seed=seed, height_m=height_m, start_m=12.0)
+               for seed, height_m in enumerate((0.15, 0.10))]
+    wanted = [free(CAR, MASS), free(CAR, "both.suspension_damping_n_s_per_m")]
+    model = VehicleModel(CAR, wanted, records)
+    found = fit(model, model.measured, Options(robust=True, low_pass_hz=20.0, starts=spread_starts(wanted, 4)))
+    assert np.abs(found.ends / [875, 1776] - 1).max() < 0.01

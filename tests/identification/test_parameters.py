@@ -56,5 +56,13 @@ def test_what_cannot_be_free() -> None:
         read(CAR, "mass")
     with pytest.raises(ValueError, match="start between its bounds"):
         free(CAR, "sprung_mass_kg", 700, (800, 900))
-    with pytest.raises(ValueError, match="start between its bounds"):
+    with pytest.raises(ValueError, match="start and bounds above 0"):
         free(read_vehicle(vehicle_file("rav4-2009-full")), "front.anti_roll_stiffness_n_m_per_rad")
+
+
+@pytest.mark.parametrize(("start", "bounds"), [(0.0, (0.0, 2000.0)), (700.0, (0.0, 2000.0)), (700.0, (-1.0, 2000.0)),
+                                               (-700.0, (-2000.0, -100.0)), (-700.0, None)])
+def test_a_mass_is_more_than_nothing(start: float, bounds: tuple[float, float] | None) -> None:
+    with pytest.raises(ValueError, match="sprung_mass_kg: expected a start and bounds above 0"):
+        free(CAR, "sprung_mass_kg", start, bounds)
+    assert free(CAR, "sensor.ahead_m", 0.0, (-1.0, 1.0)).start == 0.0
