@@ -21,7 +21,7 @@ from logger.lab.candidates import Base, Screened, Tried, as_screened, fitted, mi
 from logger.lab.fitting import Problem, State, settled
 from logger.lab.noise import Noise, floor_error, noise_of
 from logger.lab.prediction import Runs
-from logger.vehicle.effect import Chosen, Effect, Misalignment
+from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
 Progress = Callable[[str], None]
 
@@ -40,6 +40,7 @@ UNEXPLAINED = 0.10
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
+_NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 # Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
 
@@ -148,11 +149,15 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
 
 def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
+    from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
     two_tracks = all(run.two_tracks for run in problem.runs.runs)
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
         why = "the model has it" if name in there else effect.obstacle(problem.vehicle, two_tracks)
+        if why is None and isinstance(effect, ForceEffect) and not COMPILED:
+            why = _NOT_COMPILED
         if why is not None:
             found[name] = why
     return found
