@@ -292,6 +292,7 @@ def test_without_a_folder_or_rights_nothing_is_begun(tmp_path: Path, monkeypatch
     with pytest.raises(BadInput, match="expected a folder"):
         main(["install", "--root", str(tmp_path / "none")])
     monkeypatch.setattr("sys.executable", "/opt/ridelog/bin/python")
+    monkeypatch.setattr("logger.__file__", "/opt/ridelog/lib/logger/__init__.py")
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     with pytest.raises(BadInput, match="sudo"):
         main(["install"])
