@@ -25,6 +25,7 @@ and dampers all larger by one factor) are refused by ``verdict``.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -41,20 +42,22 @@ from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, di
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-GD_N0, WAVINESS, NOISE, OFFSET = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m"
+GD_N0, WAVINESS, NOISE, OFFSET, SCALE = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m", "distance_scale"
 # Level and waviness can be told apart where a car is shaken; the flattest and the steepest road there is.
 _PIVOT_CPM = 0.2
 _FLATTENED_BELOW_CPM = 0.01
 _WAVINESS = (1.0, 3.5)
 _SHORTEST_CPM = 4.0
 _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
-_MOST_SOLVING, _SOLVED = 150, 3e-4
+_MOST_SOLVING, _AT_ONCE = 150, 256
 # How long a step may be; how many standard errors from the end the information is near enough, and the end is reached.
 _LONGEST_STEP = 0.3
 _NEAR, _CLOSE = 1.0, 0.02
 _NOTHING, _RANK = 1e-4, 1e-10
 _OFFSET_WEAKEST_M, _OFFSET_STEP_M = 0.5, 0.04
-_FISHER_PROBES = 2
+# A scale of distances moves by hundredths. To begin with it is looked for by the shifts of parts of a drive.
+_HUNDREDTH, _SCALE_WEAKEST = 0.01, 1.0
+_PARTS, _SCALE_STEPS, _MOST_SHIFT_M = 12, 41, 12.0
 _NUDGE = 0.03
 
 
@@ -82,9 +85,12 @@ class Options:
     waviness         of every road, or where it starts
     free_waviness    find it, one for each road
     place_off_m      how far the places of two drives over one road may be off; 0: they are exact
+    scale_off        how far their distances may be off beyond that, as a share; 0: they are exact
     probes           simulated drives that slopes are compared with
     seed             of them
     most_steps       of Fisher's
+    solved           what is left of a set of equations when it counts as solved, of what it began with
+    fisher_probes    simulated drives that the information is a mean over
     refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` tells
     """
 
@@ -94,7 +100,10 @@ class Options:
     probes: int = 10
     seed: int = 1
     most_steps: int = 30
+    solved: float = 3e-4
+    fisher_probes: int = 2
     refuse: bool = True
+    scale_off: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +113,8 @@ class RoadFit:
     parameters         the car's, by name
     standard_errors    by name, what is not known of roads, places and noise counted in
     roads              their numbers, by name, and the noise's; ``road_errors`` alike. ``place_offset_m`` is to be added
-                       to a drive's distances for the first one's
+                       to a drive's distances for the first one's, and ``distance_scale`` times its distances from its
+                       middle are the first one's
     covariance         (m, m) of all of them, relative for sizes
     names              (m,)
     elevations         the most probable elevations of each road on its grid [m]
@@ -178,12 +188,14 @@ class _Problem:
         if not self.free or not roads or not all(roads):
             raise ValueError("expected at least one free number, and a drive over every road")
         generator = np.random.default_rng(options.seed)
-        self.roads = [_Road(car, list(drives), options, generator) for drives in roads]
+        self.roads = [UnknownRoad(car, list(drives), options, generator) for drives in roads]
         self.names = [one.name for one in self.free]
         self.places: list[list[int]] = []
         for number, road in enumerate(self.roads, 1):
             part = [GD_N0] + [WAVINESS] * options.free_waviness
-            part += [f"drive{drive}.{OFFSET}" for drive in range(2, len(road.crossings) + 1) if options.place_off_m]
+            later = range(2, len(road.crossings) + 1)
+            part += [f"drive{drive}.{OFFSET}" for drive in later if options.place_off_m]
+            part += [f"drive{drive}.{SCALE}" for drive in later if options.scale_off]
             first = len(self.names)
             self.names += [f"road{number}.{one}" for one in part]
             self.places.append([*range(len(self.free)), *range(first, len(self.names))])
@@ -214,8 +226,11 @@ class _Problem:
             for road, part in zip(self.roads, self.places, strict=True):
                 first = len(self.free) + 1 + self.options.free_waviness
                 at = self._at(x, part)
-                for number in range(1, len(road.crossings)):
-                    x[part[first + number - 1]] = road.offset(at, number)
+                later = len(road.crossings) - 1
+                for number in range(later):
+                    x[part[first + number]], scale = road.place(at, number + 1)
+                    if self.options.scale_off:
+                        x[part[first + later + number]] = (scale - 1) / _HUNDREDTH
         return x
 
     def beside(self, x: Array) -> Array:
@@ -277,6 +292,7 @@ class _Problem:
         if not findings:
             offsets = np.array([name.endswith(OFFSET) for name in self.names])
             weakest = np.where(offsets, _OFFSET_WEAKEST_M, WEAKEST)
+            weakest[self._where(SCALE)] = _SCALE_WEAKEST
             weakest[:p] = [one.weakest for one in self.free]
             findings = self.structural(here) or statistical(self.names, relative, weakest)
             if findings and self.options.refuse:
@@ -293,6 +309,8 @@ class _Problem:
                 part = next(one for one in self.places if index in one)
                 value *= _at_n0(self._at(here.x, part).waviness)
             roads[name], road_errors[name] = value, float(deviations[index] * (value if logarithm else 1.0))
+            if name.endswith(SCALE):
+                roads[name], road_errors[name] = 1 + _HUNDREDTH * value, _HUNDREDTH * road_errors[name]
         parts = zip(self.roads, self.places, strict=True)
         elevations = [road.elevation(self._at(here.x, part)) for road, part in parts]
         at_bound = [name for name, x, low, high in zip(self.names[:p], here.x, self.low, self.high, strict=False)
@@ -316,26 +334,31 @@ class _Problem:
         scale[: len(self.free)] = np.where(self.log, self._values(x), self.unit)
         return scale
 
-    def _at(self, x: Array, part: list[int]) -> _At:
+    def _at(self, x: Array, part: list[int]) -> RoadState:
         own = x[part]
         p, road = len(self.free), self.roads[self.places.index(part)]
         first = p + 1 + self.options.free_waviness
-        offsets = np.zeros(len(road.crossings))
+        drives = len(road.crossings)
+        offsets, scales = np.zeros(drives), np.ones(drives)
         if self.options.place_off_m:
-            offsets[1:] = own[first:-1]
+            offsets[1:] = own[first : first + drives - 1]
+        if self.options.scale_off:
+            scales[1:] += _HUNDREDTH * own[len(own) - drives : -1]
         waviness = float(own[p + 1]) if self.options.free_waviness else self.options.waviness
-        return _At(self._values(x), float(own[p]), waviness, offsets, float(np.exp(own[-1])))
+        return RoadState(self._values(x), float(own[p]), waviness, offsets, float(np.exp(own[-1])), scales)
 
 
 @dataclass(frozen=True, eq=False)
-class _At:
-    """A place in plain numbers; the level is the logarithm of Gd at the pivot, in units of 1 cm3 at n0."""
+class RoadState:
+    """Numbers of a car and a road in plain units; the level is the logarithm of Gd at the pivot, in units of 1 cm3 at
+    n0, and the scales those of the drives' distances, 1 if none are given."""
 
     values: Array
     level: float
     waviness: float
     offsets_m: Array
     noise_mps2: float
+    scales: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,18 +372,20 @@ class _Model:
     variance: float
 
 
-class _Road:
-    """One road and the drives over it."""
+class UnknownRoad:
+    """One road and the drives over it: what they say of a car's numbers, the road's, their places and the noise."""
 
     def __init__(self, car: LinearCar, drives: list[Drive], options: Options, generator: np.random.Generator) -> None:
         self._car, self._options = car, options
         highest = max(_highest_cpm(drive) for drive in drives)
         spacing_m = float(np.clip(1 / (_PER_WAVE * min(highest, _SHORTEST_CPM)), *_SPACING_M))
-        self.grid = grid_under(drives, car.behind_m, spacing_m, options.place_off_m)
+        scale_off = options.scale_off * (len(drives) > 1)
+        self.grid = grid_under(drives, car.behind_m, spacing_m, options.place_off_m, scale_off)
         self.drives = drives
         self.crossings = [Crossing(drive, self.grid, car.behind_m, car.contact_patch_m) for drive in drives]
         self.measured = [one.measured_mps2 - one.measured_mps2.mean() for one in self.crossings]
         self._rounds = _MOST_SOLVING
+        self._factor: tuple[npt.NDArray[np.float32], bool] | None = None
         self._white = generator.standard_normal((options.probes, self.grid.count))
         self._noise = [generator.standard_normal((options.probes, len(one))) for one in self.measured]
 
@@ -382,28 +407,89 @@ class _Road:
         levels = RoadNoise(spectra).fitted(self.measured, values, low_pass, 1e-3 * size).levels
         return float(np.log(levels[GD_N0] / _at_n0(self._options.waviness))), levels["deviation_mps2"]
 
-    def offset(self, at: _At, number: int) -> float:
+    def offset(self, at: RoadState, number: int) -> float:
         """Where a drive's places best agree with those of the first one [m]."""
+        return self.place(at, number)[0]
+
+    def place(self, at: RoadState, number: int) -> tuple[float, float]:
+        """Where a drive's places best agree with those of the first one [m], and at what scale of its distances.
+
+        What the first one tells is laid out at every shift once; a scale shifts each part of the drive by another one.
+        """
         model = self._model(at)
         alone = _Model(model.waves[:1], model.responses[:1], model.derivatives[:1], model.precondition, model.variance)
         found = self._solve(alone, [self.measured[0][None]])[0]
-        crossing, n = self.crossings[number], self.grid.wave_number_cpm
-        best, place = -np.inf, 0.0
-        for shift in np.arange(-self._options.place_off_m, self._options.place_off_m + 1e-9, _OFFSET_STEP_M):
+        crossing, n, options = self.crossings[number], self.grid.wave_number_cpm, self._options
+        way_m = self.drives[number].distance_m
+        length_m = float(np.ptp(way_m))
+        scale_off = min(options.scale_off, 2 * _MOST_SHIFT_M / length_m)
+        most_m = options.place_off_m + scale_off * length_m / 2
+        shifts = np.arange(-np.ceil(most_m / _OFFSET_STEP_M), np.ceil(most_m / _OFFSET_STEP_M) + 1) * _OFFSET_STEP_M
+        parts = np.array_split(np.arange(len(way_m)), _PARTS)
+        like, power = np.empty((2, len(shifts), _PARTS))
+        for index, shift in enumerate(shifts):
             waves = model.waves[0] * np.exp(2j * np.pi * n * shift)
             told = crossing.readings(crossing.under_axles(found, waves), model.responses[number])[0]
-            likeness = float(told @ self.measured[number]) / float(np.sqrt(told @ told) + 1e-300)
-            if likeness > best:
-                best, place = likeness, float(shift)
-        return place
+            for place, part in enumerate(parts):
+                like[index, place] = told[part] @ self.measured[number][part]
+                power[index, place] = told[part] @ told[part]
+        from_middle_m = np.array([way_m[part].mean() for part in parts]) - 0.5 * (way_m.min() + way_m.max())
+        best, found_at = -np.inf, (0.0, 1.0)
+        steps = _SCALE_STEPS if scale_off else 1
+        for scale in np.linspace(-scale_off, scale_off, steps):
+            moved = np.rint(scale * from_middle_m / _OFFSET_STEP_M).astype(int)
+            off = int(options.place_off_m / _OFFSET_STEP_M)
+            at_shift = len(shifts) // 2 + np.arange(-off, off + 1)[:, None] + moved
+            at_shift = np.clip(at_shift, 0, len(shifts) - 1)
+            likeness = (np.take_along_axis(like, at_shift, 0).sum(axis=1)
+                        / np.sqrt(np.take_along_axis(power, at_shift, 0).sum(axis=1) + 1e-300))
+            index = int(likeness.argmax())
+            if likeness[index] > best:
+                best, found_at = float(likeness[index]), ((index - off) * _OFFSET_STEP_M, 1 + float(scale))
+        return found_at
 
-    def elevation(self, at: _At) -> Array:
+    def with_car(self, car: LinearCar) -> UnknownRoad:
+        """The same road and drives with another car, whose axles stand where they stood."""
+        other = copy(self)
+        other._car = car
+        return other
+
+    @property
+    def rounds(self) -> int:
+        """How many it took to solve the equations last."""
+        return self._rounds
+
+    def prepare(self, at: RoadState) -> None:
+        """Factor the equations as they are here, so that those of a place nearby are solved in few rounds."""
+        from scipy.linalg import cho_factor
+
+        model, count = self._model(at), self.grid.count
+        normal = np.eye(count, dtype=np.float32)
+        for one, waves, response in zip(self.crossings, model.waves, model.responses, strict=True):
+            unit = np.eye(count)
+            rows = np.concatenate([one.readings(one.under_axles(unit[first : first + _AT_ONCE], waves), response)
+                                   for first in range(0, count, _AT_ONCE)]).astype(np.float32)
+            rows /= np.float32(at.noise_mps2)
+            normal += rows @ rows.T
+        self._factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
+
+    def told(self, at: RoadState, number: int) -> Array:
+        """What the other drives make one expect in the drive of this number (n,), less its mean [m/s2]."""
+        model, crossings = self._model(at), self.crossings
+        others = [index for index in range(len(crossings)) if index != number]
+        rest = _Model([model.waves[one] for one in others], [model.responses[one] for one in others], [],
+                      model.precondition, model.variance)
+        white = self._solve(rest, [self.measured[one][None] for one in others], which=others)[0]
+        own = crossings[number]
+        return np.asarray(own.readings(own.under_axles(white, model.waves[number]), model.responses[number])[0])
+
+    def elevation(self, at: RoadState) -> Array:
         """The most probable elevations (count,) [m]."""
         model = self._model(at)
         found = self._solve(model, [one[None] for one in self.measured])[0]
         return np.asarray(np.fft.irfft(np.fft.rfft(found[0]) * np.abs(model.waves[0]), self.grid.count))
 
-    def score(self, at: _At, information: bool) -> tuple[Array, Array, tuple[float, float]]:
+    def score(self, at: RoadState, information: bool) -> tuple[Array, Array, tuple[float, float]]:
         """Slopes of the likelihood (m,), the information (m, m) or zeros, and squares unexplained and measured."""
         model = self._model(at)
         readings = []
@@ -411,14 +497,15 @@ class _Road:
             made = one.readings(one.under_axles(self._white, model.waves[number]), model.responses[number])
             made = made + at.noise_mps2 * self._noise[number]
             readings.append(np.concatenate([self.measured[number][None], made - made.mean(axis=1, keepdims=True)]))
-        white, rest, self._rounds = self._solve(model, readings, None if information else self._rounds)
+        known_rounds = None if information or self._factor is not None else self._rounds
+        white, rest, self._rounds = self._solve(model, readings, known_rounds)
         slopes = self._quadratics(model, white, rest)
         left = sum(float((model.variance * one[0]) @ (model.variance * one[0])) for one in rest)
         whole = sum(float(one @ one) for one in self.measured)
         count = slopes.shape[1]
         known = np.zeros((count, count))
         if information:
-            probes = slice(1, 1 + _FISHER_PROBES)
+            probes = slice(1, 1 + self._options.fisher_probes)
             known = self._information(model, white[probes], [one[probes] for one in rest])
         return slopes[0] - slopes[1:].mean(axis=0), known, (left, whole)
 
@@ -426,7 +513,7 @@ class _Road:
         """Half of u' dC u (b, m), of whitened readings u = ``rest`` with their roads ``white``."""
         p = len(self._car.parameters)
         by_car = np.zeros((len(white), p))
-        by_place = []
+        by_place, by_scale = [], []
         by_noise = np.zeros(len(white))
         slope = 2j * np.pi * self.grid.wave_number_cpm
         for one, waves, response, derivative, u in zip(
@@ -437,12 +524,16 @@ class _Road:
             by_car += one.products(transform, derivative, under)
             moved = one.under_axles(white, waves * slope)
             by_place.append(one.products(transform, response[None], moved)[:, 0])
+            if self._options.scale_off:
+                moved = _HUNDREDTH * one.under_axles(white, waves * slope, lever=True)
+                by_scale.append(one.products(transform, response[None], moved)[:, 0])
             by_noise += model.variance * (u**2).sum(axis=1)
         columns = [*by_car.T, 0.5 * (white**2).sum(axis=1)]
         if self._options.free_waviness:
             columns.append(0.5 * (white * self._tilted(white)).sum(axis=1))
         if self._options.place_off_m:
             columns += by_place[1:]
+        columns += by_scale[1:]
         return np.stack([*columns, by_noise], axis=1)
 
     def _information(self, model: _Model, white: Array, rest: list[Array]) -> Array:
@@ -465,31 +556,48 @@ class _Road:
         roads.append(white)
         if self._options.free_waviness:
             roads.append(self._tilted(white))
-        places = range(1, drives) if self._options.place_off_m else range(0)
-        roads += [self.crossings[number].back(rest[number], model.waves[number] * slope, model.responses[number])
-                  for number in places]
+        moves = [(number, size, lever) for size, lever, free in
+                 ((1.0, False, self._options.place_off_m), (_HUNDREDTH, True, self._options.scale_off)) if free
+                 for number in range(1, drives)]
+        roads += [size * self.crossings[number].back(rest[number], model.waves[number] * slope,
+                                                     model.responses[number], lever) for number, size, lever in moves]
         innovations = np.concatenate([np.asarray(one) for one in roads])
         changed = []
         for number, one in enumerate(self.crossings):
             readings = one.readings(one.under_axles(innovations, model.waves[number]), model.responses[number])
             for index in range(p):
                 readings[index] += one.readings(under[number], model.derivatives[number][index])[0]
-            if number and self._options.place_off_m:
-                moved = one.under_axles(white, model.waves[number] * slope)
-                readings[len(roads) - drives + number] += one.readings(moved, model.responses[number])[0]
+            for index, (moving, size, lever) in enumerate(moves, len(roads) - len(moves)):
+                if moving == number:
+                    moved = size * one.under_axles(white, model.waves[number] * slope, lever)
+                    readings[index] += one.readings(moved, model.responses[number])[0]
             changed.append(np.concatenate([readings, 2 * model.variance * rest[number]]))
         return changed
+
+    def _conditioned(self, residual: Array, model: _Model) -> Array:
+        """About what solves the equations for a residual (b, count)."""
+        if self._factor is None:
+            return self._filtered(residual, model)
+        from scipy.linalg import cho_solve
+
+        return np.asarray(cho_solve(self._factor, residual.T.astype(np.float32), check_finite=False).T, float)
+
+    def _filtered(self, residual: Array, model: _Model) -> Array:
+        """The same were the drives endless and their speeds even."""
+        return np.asarray(np.fft.irfft(np.fft.rfft(residual) * model.precondition, self.grid.count))
 
     def _tilted(self, white: Array) -> Array:
         """Innovations times the derivative of the logarithm of the spectrum by the waviness."""
         n = np.maximum(self.grid.wave_number_cpm, _FLATTENED_BELOW_CPM)
         return np.asarray(np.fft.irfft(-np.log(n / _PIVOT_CPM) * np.fft.rfft(white), self.grid.count))
 
-    def _model(self, at: _At) -> _Model:
+    def _model(self, at: RoadState) -> _Model:
         n = self.grid.wave_number_cpm
         psd = np.exp(at.level) * CM3_M3 * (np.maximum(n, _FLATTENED_BELOW_CPM) / _PIVOT_CPM) ** -at.waviness
         psd[0] = 0.0
         factor = np.sqrt(psd / (2 * self.grid.spacing_m))
+        if at.scales is not None:
+            self.crossings = [one.laid(float(scale)) for one, scale in zip(self.crossings, at.scales, strict=True)]
         pairs = [self._car.responses(at.values, one.f_hz) for one in self.crossings]
         gain = np.zeros(len(n))
         for one, (response, _) in zip(self.crossings, pairs, strict=True):
@@ -503,14 +611,15 @@ class _Road:
     def _rate_hz(self) -> float:
         return self.drives[0].rate_hz
 
-    def _solve(self, model: _Model, readings: list[Array], rounds: int | None = None) -> tuple[Array, list[Array], int]:
-        """Innovations (b, count) of the most probable roads, inv(C) times the readings (b, n) of each drive, and how
-        many rounds that took.
+    def _solve(self, model: _Model, readings: list[Array], rounds: int | None = None,
+               which: Sequence[int] | None = None) -> tuple[Array, list[Array], int]:
+        """Innovations (b, count) of the most probable roads, inv(C) times the readings (b, n) of each drive (of all,
+        or of those in ``which``), and how many rounds that took.
 
         Conjugate gradients on (1 + B' B / variance) w = B' y / variance, for all b at once, until they are right, or
         so many ``rounds``: slopes at neighbouring places can be compared only if they come from as many.
         """
-        crossings = self.crossings[: len(readings)]
+        crossings = [self.crossings[one] for one in (range(len(readings)) if which is None else which)]
 
         def forth(white: Array) -> list[Array]:
             return [one.readings(one.under_axles(white, waves), response) for one, waves, response in
@@ -528,10 +637,10 @@ class _Road:
         direction, before = np.zeros_like(residual), np.full(len(residual), np.inf)
         first, count = None, 0
         while count < (_MOST_SOLVING if rounds is None else rounds):
-            conditioned = np.fft.irfft(np.fft.rfft(residual) * model.precondition, self.grid.count)
+            conditioned = self._conditioned(residual, model) if which is None else self._filtered(residual, model)
             size = (residual * conditioned).sum(axis=1)
             first = size if first is None else first
-            if rounds is None and (size <= _SOLVED**2 * first).all():
+            if rounds is None and (size <= self._options.solved**2 * first).all():
                 break
             count += 1
             direction = conditioned + (size / before)[:, None] * direction

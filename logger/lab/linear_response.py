@@ -1,0 +1,96 @@
+"""What a car with effects records of a road as a linear response, where it is one.
+
+Problem: where nobody measured the road, it has to be integrated out, and that can be done for a car that answers in
+proportion to it. Most effects leave a car so, some of them in ways that no constant matrix holds (a spring in series
+with a damper, a delay). Solution: the response is computed frequency by frequency from the same parts that simulations
+are made of; whether a corner's laws are straight is found by asking them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.parameters import Free
+from logger.identification.prediction import recorder_gain
+from logger.vehicle.compose import Car
+from logger.vehicle.laws import CornerLaws
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_STEP_HZ = 0.025
+_RATES_MPS = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
+_STRAIGHT = 1e-9
+
+
+def straight(laws: CornerLaws) -> bool:
+    """Whether all forces of a corner are in proportion to how it is moved."""
+    if laws.springs or laws.others or laws.tires or laws.dry_friction_n or not laws.tire_pulls:
+        return False
+    slopes = laws.damper(_RATES_MPS) / _RATES_MPS
+    return bool(np.ptp(slopes) <= _STRAIGHT * np.abs(slopes).max())
+
+
+def frequencies_of(rate_hz: float) -> Array:
+    """Frequencies (f,) that responses are given at [Hz]."""
+    return np.arange(0.0, rate_hz / 2 + _STEP_HZ, _STEP_HZ)
+
+
+def response_of(car: Car, rate_hz: float) -> Complex:
+    """Readings per elevation under each axle (x, f) at ``frequencies_of``, behind the recorder's filter [1/s2].
+
+    Left and right wheels see the same road. ValueError for a car whose laws are not straight.
+    """
+    if not all(map(straight, car.laws)):
+        raise ValueError("expected a car that answers in proportion to the road")
+    f_hz = frequencies_of(rate_hz)
+    structure, s = car.structure, np.asarray(2j * np.pi * f_hz, np.complex128)
+    axles = np.unique(structure.behind_m, return_inverse=True)[1]
+    dampers = np.stack([_damper(one, s) for one in car.laws], axis=1) - s[:, None] * structure.dampers
+    tires = s[:, None] * np.array([one.tire_damping_n_s_per_m for one in car.laws])
+    dynamic = (s * s)[:, None, None] * structure.mass + s[:, None, None] * structure.damping + structure.stiffness
+    dynamic = dynamic + np.einsum("fw,wi,wj->fij", dampers, structure.travel, structure.travel)
+    dynamic = dynamic + np.einsum("fw,wi,wj->fij", tires, structure.wheels, structure.wheels)
+    forces = (structure.road + tires[:, None, :] * structure.wheels.T) @ np.eye(axles.max() + 1)[axles]
+    motion = np.linalg.solve(dynamic, forces)
+    behind = recorder_gain(f_hz / rate_hz) * car.factor(s) * s * s
+    return np.asarray(behind * np.einsum("n,fnx->xf", car.row, motion))
+
+
+def _damper(laws: CornerLaws, s: Complex) -> Complex:
+    """Force per extension of a damper behind its mount."""
+    alone = s * float(laws.damper(np.ones(1))[0])
+    return alone if np.isinf(laws.mount_n_per_m) else alone / (1 + alone / laws.mount_n_per_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Tabulated:
+    """A car as a table of its response, whatever values it is asked for.
+
+    behind_m, contact_patch_m    as its structure's, each axle once
+    rate_hz                      of the recorder
+    gains, slopes                (x, f) and (p, x, f) at ``frequencies_of``
+    """
+
+    behind_m: Array
+    contact_patch_m: float
+    rate_hz: float
+    gains: Complex
+    slopes: Complex
+
+    @property
+    def parameters(self) -> Sequence[Free]:
+        """What the slopes are by."""
+        return [Free(f"number {index}", 0.0, -1.0, 1.0, place=True) for index in range(len(self.slopes))]
+
+    def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
+        """The table at other frequencies."""
+        place = np.minimum(f_hz / _STEP_HZ, self.gains.shape[-1] - 1.001)
+        low = place.astype(np.intp)
+        share = place - low
+        gains, slopes = ((1 - share) * one[..., low] + share * one[..., low + 1] for one in (self.gains, self.slopes))
+        return gains, slopes

@@ -1,0 +1,439 @@
+"""Which effects a model lacks, from drives over one road that nobody measured.
+
+Problem: without a profile there is no prediction to compare a drive with; the road would explain whatever the model
+does not. Solution: drives at different speeds meet the same road, and what one of them says of it the others have to
+agree with. The road, a Gaussian process of free level and waviness, is integrated out (``shared_road``), and models are
+compared by the likelihood of all drives together. The way is cut into stretches of some seconds, each with a level and
+a waviness of its own and with places that may be a little off, as roads change and distance signals wander.
+
+The likelihood itself is never computed, only its slopes are. What one model gains over another is their integral along
+a straight way from the one response to the other, which is short: the slopes, by a few points, are Gauss's.
+
+Only effects that leave a car answering in proportion to the road can be tried. What a road that is free takes for
+itself (a gain; a longer contact patch) shows in the information that is left of an effect beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.crossing import Drive
+from logger.identification.shared_road import Options, RoadState, UnknownRoad
+from logger.lab.fitting import Move, coordinates_of, moved, moves_of
+from logger.lab.linear_response import Tabulated, response_of
+from logger.lab.nuisance import Nuisance, Tolerance, nuisance_of
+from logger.lab.prediction import Run
+from logger.lab.stretches import Stretches
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_STRETCH_S, _LEAST_S = 10.0, 3.0
+_PLACE_OFF_M = 3.0
+_PROBES = 8
+# What is granted to a stretch: deviations of its waviness, and of its places from those of the whole way.
+_WAVINESS, _WAVINESS_OFF = 2.0, 0.3
+_OFFSET_OFF_M = 0.05
+_LOG_STEP, _SHARE_STEP, _LEAST_SHARE = 1e-3, 1e-3, 0.1
+_MOST_STEPS, _LONGEST_LOG, _SETTLED, _MANY_ROUNDS = 10, 0.5, 0.1, 12
+_LEVEL, _TILT = 0, 1
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A model with all its numbers.
+
+    effects    with their values
+    logs       (p,) logarithms of the car's numbers over the nominal ones
+    roads      (r,) of every stretch its level, its waviness and the places of its drives but the first; the
+               logarithm of the noise last
+    gains      (x, f) its response
+    """
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    roads: Array
+    gains: Complex
+
+    @property
+    def noise_mps2(self) -> float:
+        """Deviation of what no road explains."""
+        return float(np.exp(self.roads[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
+    the information (m, m) or zeros; nothing of what is granted is in them."""
+
+    slopes: Array
+    information: Array
+
+
+class SameRoad:
+    """Drives over one road, a nominal vehicle, and what may be a little off.
+
+    ValueError unless two of the runs share some seconds of the way.
+    """
+
+    def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance) -> None:
+        self.runs, self.vehicle, self.rate_hz = list(runs), vehicle, runs[0].rate_hz
+        known = nuisance_of(vehicle, tolerance)
+        kept = [not name.endswith("contact_patch_m") for name in known.names]
+        self.nuisance = Nuisance(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept])
+        structure = compose(vehicle).structure
+        self._behind_m = np.unique(structure.behind_m)
+        self._patch_m = structure.contact_patch_m
+        self.stretches = _cut(self.runs)
+        if not self.stretches:
+            raise ValueError("expected two drives over the same road, some seconds of it by both")
+        options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=_PROBES)
+        generator = np.random.default_rng(options.seed)
+        nominal = self.table(response_of(self.car((), np.zeros(len(known.names[: sum(kept)]))), self.rate_hz))
+        self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
+        sizes = [1 + len(parts) for parts in self.stretches]
+        ends = np.cumsum(sizes)
+        self._parts = [np.append(np.arange(end - size, end), ends[-1]) for size, end in zip(sizes, ends, strict=True)]
+        self._first = self._start(nominal)
+        self.count, self.rounds = len(self._first), 0
+
+    def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
+        """The car with these numbers and effects."""
+        return compose(self.nuisance.vehicle(self.vehicle, logs), effects)
+
+    def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
+        """Its response (x, f). ValueError if it does not answer in proportion to the road."""
+        return response_of(self.car(effects, logs), self.rate_hz)
+
+    def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
+        """A response with slopes (p, x, f), as roads are asked with."""
+        found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
+        return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
+
+    def start(self, effects: Sequence[Chosen] = ()) -> State:
+        """The nominal car on roads of a likely level."""
+        logs = np.zeros(len(self.nuisance.names))
+        return State(tuple(effects), logs, self._first, self.response(effects, logs))
+
+    def look(self, table: Tabulated, roads: Array, information: bool) -> Look:
+        """The slopes, by the table's and by the roads' numbers, and the information."""
+        p, self.rounds = len(table.slopes), 0
+        slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
+        for road, part in zip(self._roads, self._parts, strict=True):
+            whole = np.append(np.arange(p), p + part)
+            asked = road.with_car(table)
+            own, known, _ = asked.score(self._at(roads[part], p), information)
+            self.rounds = max(self.rounds, asked.rounds)
+            slopes[whole] += own
+            matrix[np.ix_(whole, whole)] += known
+        return Look(slopes, matrix)
+
+    def prepared(self, state: State) -> SameRoad:
+        """The same, quick for models that are like this one."""
+        table, other = self.table(state.gains), copy(self)
+        other._roads = [road.with_car(table) for road in self._roads]
+        for road, part in zip(other._roads, self._parts, strict=True):
+            road.prepare(self._at(state.roads[part], 0))
+        return other
+
+    def granted(self, roads: Array) -> tuple[Array, Array]:
+        """How far roads are from what they usually are (r,), and the precision of that (r,)."""
+        off, precision = np.zeros(self.count), np.zeros(self.count)
+        for part in self._parts:
+            off[part[_TILT]] = roads[part[_TILT]] - _WAVINESS
+            precision[part[_TILT]] = _WAVINESS_OFF**-2
+            places = part[_TILT + 1 : -1]
+            off[places] = roads[places] - self._first[places]
+            precision[places] = _OFFSET_OFF_M**-2
+        return off, precision
+
+    def cost(self, state: State) -> float:
+        """What the state's numbers cost: squares of their deviations."""
+        off, precision = self.granted(state.roads)
+        return float(((state.logs / self.nuisance.deviations) ** 2).sum() + precision @ off**2)
+
+    def gain(self, before: State, after: State) -> float:
+        """By how much minus twice the log-likelihood falls from one state to another, what is granted counted in."""
+        change, road_change = after.gains - before.gains, after.roads - before.roads
+        total = 0.0
+        for node, weight in zip(0.5 * (_NODES + 1), 0.5 * _WEIGHTS, strict=True):
+            table = self.table(before.gains + node * change, change[None])
+            look = self.look(table, before.roads + node * road_change, information=False)
+            total += weight * float(look.slopes[0] + look.slopes[1:] @ road_change)
+        return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / _PROBES)
+
+    def told(self, state: State) -> list[tuple[int, Array, Array]]:
+        """Of every drive over every stretch: its run, what was read, and what the other drives make one expect."""
+        found = []
+        table = self.table(state.gains)
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            other, at = road.with_car(table), self._at(state.roads[part], 0)
+            found += [(run, road.measured[number], other.told(at, number)) for number, (run, _) in enumerate(parts)]
+        return found
+
+    def errors(self, state: State) -> list[float]:
+        """Of every run, rms(read - expected) / rms(read), the road being told by the other drives alone; nan for one
+        that no other shares a stretch with."""
+        left, whole = np.zeros(len(self.runs)), np.zeros(len(self.runs))
+        for run, read, expected in self.told(state):
+            left[run] += float(((read - expected) ** 2).sum())
+            whole[run] += float((read**2).sum())
+        return [float(np.sqrt(one / all_)) if all_ > 0 else float("nan") for one, all_ in zip(left, whole, strict=True)]
+
+    def error(self, state: State) -> float:
+        """The same of all of them together."""
+        told = self.told(state)
+        return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in told)
+                             / sum(float((read**2).sum()) for _, read, _ in told)))
+
+    @property
+    def samples(self) -> int:
+        """How many there are, of all drives."""
+        return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
+
+    def quiet_mps2(self) -> float:
+        """The sensor's noise, from where no car moves it: the highest frequencies."""
+        parts = [Stretches(run, whole=True).quiet(run.measured_mps2) for run in self.runs]
+        return float(np.sqrt(sum(power * freedom for power, freedom in parts) / sum(freedom for _, freedom in parts)))
+
+    def _at(self, own: Array, count: int) -> RoadState:
+        places = np.append(0.0, own[_TILT + 1 : -1])
+        return RoadState(np.zeros(count), float(own[_LEVEL]), float(own[_TILT]), places, float(np.exp(own[-1])))
+
+    def _start(self, nominal: Tabulated) -> Array:
+        """Levels and noise from the spectra; places by trying them on the longest stretch."""
+        first = np.zeros(int(self._parts[-1][-1]) + 1)
+        noises = []
+        for road, part in zip(self._roads, self._parts, strict=True):
+            level, noise = road.first_guess(np.zeros(0))
+            first[part[_LEVEL]], first[part[_TILT]] = level, _WAVINESS
+            noises.append(noise)
+        first[-1] = np.log(np.median(noises))
+        offsets = self._offsets(first)
+        for part, parts in zip(self._parts, self.stretches, strict=True):
+            own = [offsets[run] for run, _ in parts]
+            first[part[_TILT + 1 : -1]] = np.array(own[1:]) - own[0]
+        return first
+
+    def _offsets(self, first: Array) -> Array:
+        """By how much each run's places are off against the first's [m], from the stretch that most runs share."""
+        offsets = np.zeros(len(self.runs))
+        index = max(range(len(self.stretches)), key=lambda one: len(self.stretches[one]))
+        road, part, parts = self._roads[index], self._parts[index], self.stretches[index]
+        for number, (run, _) in enumerate(parts):
+            if number:
+                offsets[run] = road.offset(self._at(first[part], 0), number)
+        return offsets
+
+
+def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
+    """Stretches of the way that at least two runs share: of each the runs, by number, and their drives."""
+    ways = [np.maximum.accumulate(run.distance_m) for run in runs]
+    begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
+                    for places in ([run.first for run in runs], [-1] * len(runs)))
+    low, high = begins[min(1, len(begins) - 1)], ends[max(0, len(ends) - 2)]
+    if len(runs) < 2 or not high > low:
+        return []
+    pace = float(np.median([np.median(run.speed_mps) for run in runs]))
+    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / _STRETCH_S)) + 1)
+    found = []
+    for start, end in pairwise(edges):
+        parts = []
+        for number, (run, way) in enumerate(zip(runs, ways, strict=True)):
+            first, last = np.searchsorted(way, (start, end))
+            first = max(int(first), run.first)
+            if last - first >= _LEAST_S * run.rate_hz:
+                part = slice(first, int(last))
+                parts.append((number, Drive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
+        if len(parts) > 1:
+            found.append(parts)
+    return found
+
+
+# --- fits ---
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A state that was fitted, with the information on its numbers.
+
+    moves          numbers of its effects
+    data           (m, m) information of the drives on the logs, the moves (on their scales) and the roads' numbers
+    information    the same with what is granted
+    problem        quick for states like this one
+    """
+
+    state: State
+    moves: tuple[Move, ...]
+    data: Array
+    information: Array
+    problem: SameRoad
+
+
+def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
+    """The most probable state, by Fisher's steps from this one."""
+    moves = moves_of(state.effects)
+    p, q = len(state.logs), len(moves)
+    here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
+    low, high = _bounds(state.effects, moves, len(here), p)
+    longest = _longest(state.effects, moves, len(here), p)
+    for count in range(steps):
+        logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+        gains, slopes = _sloped(problem, effects, moves, logs)
+        if problem.rounds > _MANY_ROUNDS:
+            problem = problem.prepared(State(effects, logs, roads, gains))
+        look = problem.look(problem.table(gains, slopes), roads, information=True)
+        pull, grant = _granted(problem, logs, q, roads)
+        score = look.slopes - pull
+        step = _step(score, look.information + np.diag(grant), here, low, high)
+        if count and float(score @ step) < _SETTLED:
+            break
+        here = np.clip(here + step * min(1.0, float((longest / np.maximum(np.abs(step), 1e-300)).min())), low, high)
+    logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+    found = State(effects, logs, roads, problem.response(effects, logs))
+    return Fitted(found, tuple(moves), look.information, look.information + np.diag(grant), problem)
+
+
+def _granted(problem: SameRoad, logs: Array, moves: int, roads: Array) -> tuple[Array, Array]:
+    """How strongly what is granted pulls at each number (m,), and its precision (m,)."""
+    off, precision = problem.granted(roads)
+    own = problem.nuisance.deviations**-2
+    grant = np.concatenate([own, np.zeros(moves), precision])
+    return grant * np.concatenate([logs, np.zeros(moves), off]), grant
+
+
+def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
+    """Fisher's step within bounds."""
+    free = ~(((here <= low) & (score < 0)) | ((here >= high) & (score > 0)))
+    step = np.zeros_like(here)
+    step[free] = inverse(information[np.ix_(free, free)]) @ score[free]
+    return step
+
+
+def inverse(information: Array, ridge: float = 1e-6) -> Array:
+    """Of a matrix whose rows may differ by powers of ten, held off singularity."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
+
+
+def _sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move],
+            logs: Array) -> tuple[Complex, Complex]:
+    """A response and its slopes by the logs and the moves."""
+    gains = problem.response(effects, logs)
+    slopes = []
+    for index in range(len(logs)):
+        beside = logs.copy()
+        beside[index] += _LOG_STEP
+        slopes.append((problem.response(effects, beside) - gains) / _LOG_STEP)
+    here = coordinates_of(effects, moves)
+    for index, move in enumerate(moves):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        usual = abs(parameter.coordinate(parameter.start))
+        step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here[index]), _LEAST_SHARE * usual)
+        if abs(parameter.coordinate(parameter.value(here[index] + step)) - here[index]) < 0.5 * step:
+            step = -step
+        beside = here.copy()
+        beside[index] += step
+        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / step)
+    return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
+
+
+def _bounds(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> tuple[Array, Array]:
+    low, high = np.full(count, -np.inf), np.full(count, np.inf)
+    for index, move in enumerate(moves, first):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        ends = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
+        low[index], high[index] = ends
+    return low, high
+
+
+def _longest(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> Array:
+    """How far each number may go in one step."""
+    longest = np.full(count, _LONGEST_LOG)
+    for index, move in enumerate(moves, first):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        if parameter.scale is not Scale.LOG:
+            longest[index] = max(abs(parameter.coordinate(parameter.start)),
+                                 0.5 * abs(coordinates_of(effects, [move])[0]))
+    return longest
+
+
+# --- trials ---
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect at some values beside a model.
+
+    gain           what it promises, in minus twice the log-likelihood
+    at             the values at which it does
+    deviations     how many standard errors it stands out by at its values beside all that is free
+    beside_road    the same share of its information (0 to 1) that roads and places do not take
+    """
+
+    one: Chosen
+    gain: float
+    at: Chosen
+    deviations: float
+    beside_road: float
+
+
+def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
+    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response."""
+    state = base.state
+    gains, own = _sloped(problem, state.effects, base.moves, state.logs)
+    changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
+    k, p = len(ones), len(own)
+    look = problem.look(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
+    rest = np.r_[0:p, p + k : p + k + problem.count]
+    road = np.arange(p + k, p + k + problem.count)
+    pull, grant = _granted(problem, state.logs, len(base.moves), state.roads)
+    known = inverse(look.information[np.ix_(rest, rest)] + np.diag(grant))
+    by_road = inverse(look.information[np.ix_(road, road)] + np.diag(grant[p:]))
+    score = look.slopes[rest] - pull
+    found = []
+    for index, one in enumerate(ones, p):
+        alone, mixed = look.information[index, index], look.information[index, rest]
+        left = max(float(alone - mixed @ known @ mixed), 0.0)
+        taken = look.information[index, road]
+        share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
+        slope = float(look.slopes[index] - mixed @ known @ score)
+        found.append(_trial(one, slope, left, alone, share))
+    return found
+
+
+_STRONGEST, _WEAKEST, _NOTHING = 3.0, 0.03, 1e-4
+
+
+def _trial(one: Chosen, slope: float, left: float, alone: float, share: float) -> Trial:
+    if not left > _NOTHING * alone:
+        return Trial(one, 0.0, one, 0.0, max(share, 0.0))
+    strength = float(np.clip(slope / left, _WEAKEST, _STRONGEST))
+    scaled = _scaled(one, strength)
+    if scaled is None:
+        strength, scaled = 1.0, one
+    gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / _PROBES)
+    return Trial(one, gain, scaled, float(np.sqrt(left)), max(share, 0.0))
+
+
+def _scaled(one: Chosen, strength: float) -> Chosen | None:
+    """The effect at a share of its strength; None if it has no null."""
+    for place, parameter in enumerate(one.effect.parameters):
+        if parameter.null is None or parameter.choices:
+            continue
+        move = [Move(0, place)]
+        null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
+        here = float(coordinates_of([one], move)[0])
+        return moved([one], move, np.array([null + strength * (here - null)]))[0]
+    return None

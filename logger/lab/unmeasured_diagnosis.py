@@ -1,0 +1,326 @@
+"""The rounds of a diagnosis without a profile: what is missing, and what such drives cannot tell.
+
+Problem: as in ``diagnosis``, but the road is unknown, and part of what an effect does the road takes for itself.
+Solution: in each round every effect that can be tried is tried by the slopes beside the model, the promising ones are
+fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
+What cannot be learned is not a list in a text: it is read off the information that these drives hold, with the road
+and without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.verdict import structural
+from logger.lab.blind import SEEN
+from logger.lab.diagnosis import CHANCE, UNEXPLAINED, WORTH
+from logger.lab.fitting import coordinates_of
+from logger.lab.quantities import chance, finite, numbers_of
+from logger.lab.unmeasured import Fitted, SameRoad, State, Trial, fitted, inverse, trials
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[str], None]
+
+MOST_EFFECTS = 3
+TAKEN_BY_ROAD = 0.02
+"""The road takes an effect of whose information it leaves no more than this share."""
+_FITTED, _STARTS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 0.1, 6.0
+_ALIKE, _ALIKE_SHARE = 10.0, 0.01
+_NOTHING = 1e-2
+_TINY_STEP = 1e-4
+# Of a sample's freedom the recorder's filter leaves this share.
+_FREEDOM = 0.74
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect that was tried on the model of its round.
+
+    error          of all drives, each with the road that the others tell; None where it was not fitted
+    p_value        how often noise alone would gain as much, times the number of candidates
+    gain           of minus twice the log-likelihood; where it was not fitted, what its slopes promise
+    confused_with  effects that explain about as much
+    """
+
+    one: Chosen
+    error: float | None
+    p_value: float
+    gain: float
+    confused_with: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found.
+
+    candidates    best first, those of the verdict before the others
+    missing       effects that the model lacks, with standard errors, in the order they were found
+    steps         models on the way: words, and the error of all drives
+    by_run        error of each run, before and after
+    untried       effects that could not be tried, and why
+    hidden        effects that would stand out by so many deviations at their usual strength, which are too few
+    together      of the car's numbers: what these drives cannot tell, in words
+    noise_mps2    what no road explains; ``quiet_mps2``: the sensor's noise where no car moves it
+    """
+
+    candidates: tuple[Candidate, ...]
+    missing: tuple[Chosen, ...]
+    steps: tuple[tuple[str, float], ...]
+    by_run: tuple[tuple[float, float], ...]
+    floor_error: float
+    untried: Mapping[str, str]
+    taken_by_road: Mapping[str, float]
+    hidden: Mapping[str, float]
+    together: tuple[str, ...]
+    noise_mps2: float
+    quiet_mps2: float
+
+    @property
+    def excess(self) -> float:
+        """By what share more is left than the sensor's noise."""
+        return self.noise_mps2 / self.quiet_mps2 - 1
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether more is left than that noise."""
+        return self.excess > UNEXPLAINED
+
+
+def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+                       progress: Progress = lambda words: None) -> Found:
+    """Find the effects that the model, with those that are ``present``, lacks.
+
+    ValueError if one that is present leaves the car answering out of proportion to the road.
+    """
+    progress("refitting the car's own numbers and the road")
+    nominal = problem.start(present)
+    base = fitted(problem.prepared(nominal), nominal)
+    untried = _obstacles(problem, effects, present)
+    left = {name: one for name, one in effects.items() if name not in untried}
+    first_base, first, taken = base, None, list[Candidate]()
+    steps = [("the vehicle as its file says", base.problem.error(replace(nominal, roads=base.state.roads))),
+             ("its numbers refitted within what is granted", base.problem.error(base.state))]
+    for number in range(1, MOST_EFFECTS + 1):
+        progress(f"round {number}: trying {len(left)} effects")
+        tried = trials(base.problem, base, _trials(left))
+        if first is None:
+            first = tried
+        models = _fits(base, tried, progress)
+        candidates = _judged(base, models, len(left), problem.samples)
+        if not candidates or not _accepted(candidates[0], len(left), problem.samples):
+            break
+        best = candidates[0]
+        taken.append(best)
+        base = models[best.one.effect.name]
+        base = replace(base, problem=base.problem.prepared(base.state))
+        steps.append((f"with {best.one.effect.name}", best.error or float("nan")))
+        del left[best.one.effect.name]
+    assert first is not None
+    others = first if taken else []
+    listed = [*taken, *(candidates if not taken else [])]
+    listed += _promises(others or first, {one.one.effect.name for one in listed}, len(first))
+    usual = trials(base.problem, base, [_usual(one) for one in left.values()])
+    road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
+    return Found(
+        tuple(listed), _with_errors(base, len(present)), tuple(steps),
+        tuple(zip(base.problem.errors(first_base.state), base.problem.errors(base.state), strict=True)),
+        problem.quiet_mps2() / _size(problem), untried, road,
+        {one.one.effect.name: one.deviations for one in usual
+         if one.deviations < SEEN and one.one.effect.name not in road},
+        _together(base), base.state.noise_mps2, problem.quiet_mps2(),
+    )
+
+
+def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
+    """Effects that cannot be tried, and why."""
+    found = {}
+    logs = np.zeros(len(problem.nuisance.names))
+    for name, effect in effects.items():
+        why = effect.obstacle(problem.vehicle, True)
+        if why is None and effect.obstacle(problem.vehicle, False) is not None:
+            why = "the road has to be known under the right wheels too"
+        if name in [one.effect.name for one in present]:
+            why = "the model has it"
+        elif why is None and isinstance(effect, DriveEffect):
+            why = "it changes the way of every drive alike, and so would another road"
+        elif why is None:
+            try:
+                problem.response((*present, _usual(effect)), logs)
+            except ValueError:
+                why = "a car with it does not answer in proportion to the road, which takes a measured road"
+        if why is not None:
+            found[name] = why
+    return found
+
+
+def _usual(effect: Effect) -> Chosen:
+    return chosen(effect, {one.name: one.start if one.default is None else one.default for one in effect.parameters})
+
+
+def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:
+    return [chosen(effect, values) for effect in effects.values() for values in effect.trials()]
+
+
+def _fits(base: Fitted, tried: Sequence[Trial], progress: Progress) -> dict[str, Fitted]:
+    """The most promising effects fitted beside the model, by name."""
+    ranked: dict[str, list[Trial]] = {}
+    for one in sorted(tried, key=lambda one: -one.gain):
+        ranked.setdefault(one.one.effect.name, []).append(one)
+    least = max(_LEAST_PROMISE, _WORTH_FITTING * max((one.gain for one in tried), default=0.0))
+    worth = [name for name, ones in ranked.items() if ones[0].gain > least]
+    found = {}
+    for name in worth[:_FITTED]:
+        progress(f"fitting {name}")
+        found[name] = fitted(base.problem, _start(base, ranked[name]))
+    return found
+
+
+def _start(base: Fitted, ranked: Sequence[Trial]) -> State:
+    """Where the fit of an effect begins: of its best trials, as they are and at the strength that they promise, the one
+    that is most likely. What is promised holds for small changes only."""
+    starts = {tuple(one.values.values()): one for trial in ranked[:_STARTS] for one in (trial.at, trial.one)}
+    states = []
+    for one in starts.values():
+        effects = (*base.state.effects, one)
+        states.append(replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs)))
+    return max(states, key=lambda state: base.problem.gain(base.state, state))
+
+
+def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, samples: int) -> list[Candidate]:
+    """Fitted effects as candidates, best first."""
+    found = []
+    for model in models.values():
+        one = model.state.effects[-1]
+        gain = model.problem.gain(base.state, model.state)
+        found.append(Candidate(one, model.problem.error(model.state), _p_value(gain, _numbers(one), count), gain))
+    found.sort(key=lambda one: 2 * _numbers(one.one) - one.gain)
+    return [replace(one, confused_with=_rivals(one, found, count, samples)) for one in found]
+
+
+def _p_value(gain: float, numbers: int, count: int) -> float:
+    """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction)."""
+    from scipy.special import gammaincc
+
+    return float(min(1.0, count * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
+
+
+def _numbers(one: Chosen) -> int:
+    return sum(not parameter.choices for parameter in one.effect.parameters)
+
+
+def _accepted(one: Candidate, count: int, samples: int) -> bool:
+    return one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * samples
+
+
+def _rivals(one: Candidate, found: Sequence[Candidate], count: int, samples: int) -> tuple[str, ...]:
+    worthy = [other for other in found if _accepted(other, count, samples)]
+    near = max(_ALIKE, _ALIKE_SHARE * one.gain)
+    return tuple(other.one.effect.name for other in worthy
+                 if one in worthy and other is not one and abs(other.gain - one.gain) < near)
+
+
+def _promises(tried: Sequence[Trial], told: set[str], count: int) -> list[Candidate]:
+    """What was tried by its slopes only, best first."""
+    best: dict[str, Trial] = {}
+    for one in sorted(tried, key=lambda one: -one.gain):
+        best.setdefault(one.one.effect.name, one)
+    return [Candidate(one.at, None, _p_value(one.gain, _numbers(one.at), count), one.gain)
+            for name, one in best.items() if name not in told]
+
+
+def _with_errors(model: Fitted, present: int) -> tuple[Chosen, ...]:
+    """The effects that were found, with standard errors."""
+    first = len(model.state.logs)
+    deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
+    effects = list(model.state.effects)
+    for move, here, deviation in zip(model.moves, coordinates_of(effects, model.moves), deviations, strict=True):
+        one = effects[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        step = _TINY_STEP * max(abs(here), _TINY_STEP)
+        rise = abs(parameter.value(here + step) - parameter.value(here - step)) / (2 * step)
+        errors = {**one.standard_errors, parameter.name: float(rise * deviation)}
+        effects[move.effect] = replace(one, standard_errors=errors)
+    return tuple(effects[present:])
+
+
+def _together(model: Fitted) -> tuple[str, ...]:
+    """What these drives cannot tell of masses, springs and dampers beside the road, whatever is granted."""
+    names = model.problem.nuisance.names
+    own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
+    road = np.arange(len(names) + len(model.moves), len(model.data))
+    mixed = model.data[np.ix_(own, road)]
+    left = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
+    powers, directions = np.linalg.eigh(left)
+    derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
+    return tuple(one.words for one in structural([names[index] for index in own], derivatives, 1.0, _NOTHING))
+
+
+def _size(problem: SameRoad) -> float:
+    read = np.concatenate([drive.measured_mps2 for parts in problem.stretches for _, drive in parts])
+    return float(np.std(read))
+
+
+# --- as it is told ---
+
+
+def summary(found: Found) -> list[str]:
+    """What is missing, how certain that is, and what it could be instead: paragraphs."""
+    lines = []
+    for one in found.missing:
+        candidate = next(other for other in found.candidates if other.one.effect.name == one.effect.name)
+        numbers = f": {numbers_of(one)}" if one.values else ""
+        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The chance that noise looks like "
+                     f"that, all candidates together: {chance(candidate.p_value)}.")
+        if candidate.confused_with:
+            lines.append(f"These drives cannot tell {one.effect.name} from {' or '.join(candidate.confused_with)}.")
+    if not lines:
+        lines.append("None of the effects that can be tried without a profile is missing.")
+    by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
+               for index, (words, error) in enumerate(found.steps)]
+    lines.append(f"Error of each drive over the road that the others tell: {', '.join(by_step)}. The sensor's noise "
+                 f"alone makes {found.floor_error:.3f}.")
+    if found.unexplained:
+        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
+                     "missing, maybe one of the effects that only a measured road can show.")
+    return lines
+
+
+def cannot_tell(found: Found) -> list[str]:
+    """What these drives cannot tell, in sentences."""
+    lines = []
+    if found.taken_by_road:
+        lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
+                     "measured would do the same.")
+    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
+              for why in dict.fromkeys(found.untried.values())]
+    lines += [f"{name}: at its usual strength it would hide in these drives ({deviations:.1f} standard deviations)."
+              for name, deviations in found.hidden.items()]
+    return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
+
+
+def as_json(found: Found) -> dict[str, Any]:
+    """The diagnosis as one JSON object. An effect that was not fitted is told with the error of the refitted car."""
+    base = found.steps[1][1]
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    values = {one.effect.name: dict(one.values) for one in found.missing}
+    return {
+        "baseline_error": found.steps[0][1], "noise_floor_error": found.floor_error,
+        "candidates": [
+            {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
+             "error": base if one.error is None else one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "fitted": one.error is not None,
+             "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
+            for one in found.candidates],
+        "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
+        "left_over_noise": 1 + found.excess,
+        "steps": [{"step": words, "error": error} for words, error in found.steps],
+        "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),
+        "sentences": [*summary(found), *cannot_tell(found)],
+    }

@@ -1,0 +1,132 @@
+"""The parts of a diagnosis without a profile: responses against the stepping simulation, likelihoods against dense
+algebra."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from logger.identification.crossing import Crossing, Drive, grid_under
+from logger.lab.linear_response import Tabulated, response_of
+from logger.lab.nuisance import Tolerance
+from logger.lab.prediction import Run
+from logger.lab.unmeasured import SameRoad, State, trials
+from logger.lab.unmeasured import fitted as fit
+from logger.roads.iso8608 import CM3_M3, generate
+from logger.roads.track import Track
+from logger.shipped import vehicle_file
+from logger.store.effect_file import shipped_effects
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.compose import compose, recorded
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.passage import Passage
+
+Array = npt.NDArray[np.float64]
+
+CAR = read_vehicle(vehicle_file("rav4-2009"))
+RATE_HZ, SPACING_M, NOISE_MPS2 = 100.0, 0.05, 0.05
+LONG = Track(SPACING_M, generate(64.0, 220.0, SPACING_M, 3), -110.0)
+FLAT = Track(1.0, np.zeros(2))
+
+
+def named(name: str, **values: float) -> Chosen:
+    return chosen(shipped_effects()[name], values)
+
+
+def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int) -> Run:
+    """A drive over the road, the simulation having begun five seconds before the record."""
+    time_s = np.arange(-500, round(RATE_HZ * length_m / speed_mps)) / RATE_HZ
+    distance_m = speed_mps * time_s + 0.8 * (1 - np.cos(time_s / 2))
+    car = compose(CAR, effects)
+    clean = recorded(car, Passage(LONG, RATE_HZ, car.driven(distance_m)))[500:]
+    noise = NOISE_MPS2 * np.random.default_rng(seed).standard_normal(len(clean))
+    return Run(f"run{seed}", RATE_HZ, clean + noise, distance_m[500:], np.full(len(clean), speed_mps), FLAT)
+
+
+@pytest.mark.parametrize("effect", [
+    named("tire_damping", tire_damping_n_s_per_m=600.0), named("top_mount_compliance", mount_stiffness_n_per_m=5e4),
+    named("occupant", mass_kg=90.0, frequency_hz=4.0, damping_ratio=0.25), named("time_offset", delay_s=0.05),
+    named("sensor_mount_resonance", frequency_hz=18.0, damping_ratio=0.1), named("sensor_offset", offset_m=0.5),
+], ids=lambda one: one.effect.name)
+def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
+    run = run_of([effect], 14.0, 80.0, 1)
+    drive = Drive(RATE_HZ, run.measured_mps2, run.distance_m)
+    structure = compose(CAR).structure
+    behind_m = np.unique(structure.behind_m)
+    grid = grid_under([drive], behind_m, SPACING_M, 0.0)
+    crossing = Crossing(drive, grid, behind_m, structure.contact_patch_m)
+    place = grid.start_m + SPACING_M * np.arange(grid.count)
+    elevation = np.interp(place, LONG.start_m + SPACING_M * np.arange(len(LONG.elevation_m)), LONG.elevation_m)
+    gains = response_of(compose(CAR, [effect]), RATE_HZ)
+    table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
+    response = table.responses(np.zeros(0), crossing.f_hz)[0]
+    waves = np.ones(len(grid.wave_number_cpm), complex)
+    told = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
+    read = run.measured_mps2 - run.measured_mps2.mean()
+    assert np.mean((told - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
+
+
+@pytest.mark.parametrize("effect", [
+    named("dry_friction", friction_force_n=50.0), named("damper_asymmetry", rebound_to_bump_ratio=1.5),
+    named("progressive_spring", cubic_stiffness_n_per_m3=1e6), named("wheel_lift"),
+    named("bump_stop", clearance_m=0.03, stop_stiffness_n_per_m=1e5),
+], ids=lambda one: one.effect.name)
+def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
+    with pytest.raises(ValueError, match="in proportion"):
+        response_of(compose(CAR, [effect]), RATE_HZ)
+
+
+def deviance(problem: SameRoad, state: State) -> float:
+    """Minus twice the log-likelihood of all drives by their covariance, written out, and what is granted."""
+    total = problem.cost(state)
+    for road, part, parts in zip(problem._roads, problem._parts, problem.stretches, strict=True):
+        own, grid = state.roads[part], road.grid
+        n = np.maximum(grid.wave_number_cpm, 0.01)
+        psd = np.exp(own[0]) * CM3_M3 * (n / 0.2) ** -own[1]
+        psd[0] = 0.0
+        table = problem.table(state.gains)
+        rows = []
+        for number, crossing in enumerate(road.crossings):
+            off = 0.0 if number == 0 else own[1 + number]
+            waves = np.sqrt(psd / (2 * grid.spacing_m)) * np.exp(2j * np.pi * grid.wave_number_cpm * off)
+            response = table.responses(np.zeros(0), crossing.f_hz)[0]
+            rows.append(crossing.readings(crossing.under_axles(np.eye(grid.count), waves), response).T)
+        matrix = np.concatenate(rows)
+        covariance = matrix @ matrix.T + np.exp(2 * own[-1]) * np.eye(len(matrix))
+        read = np.concatenate([drive.measured_mps2 - drive.measured_mps2.mean() for _, drive in parts])
+        total += float(np.linalg.slogdet(covariance)[1] + read @ np.linalg.solve(covariance, read))
+    return total
+
+
+def test_gains_are_those_of_dense_likelihoods() -> None:
+    problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
+    assert len(problem.stretches) == 1
+    start = problem.start()
+    before = replace(start, roads=start.roads + 0.02 * np.cos(np.arange(len(start.roads))))
+    logs = 0.02 * np.cos(np.arange(len(start.logs)))
+    after = State((), logs, start.roads, problem.response((), logs))
+    own = deviance(problem, before) - deviance(problem, after)
+    found = problem.prepared(before).gain(before, after) * (1 + 1 / 8)
+    assert found == pytest.approx(own, abs=max(4.0, 0.15 * abs(own)))
+
+
+def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
+    problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
+    start = problem.start()
+    base = fit(problem.prepared(start), start)
+    gain, patch, damping = trials(base.problem, base, [
+        named("sensor_gain", gain=1.1), named("tire_enveloping", contact_patch_m=0.4),
+        named("tire_damping", tire_damping_n_s_per_m=300.0)])
+    assert gain.beside_road < 0.02 and patch.beside_road < 0.02 < 0.2 < damping.beside_road
+    assert 0.8 < base.state.noise_mps2 / NOISE_MPS2 < 1.2
+    assert all(error < 0.5 for error in base.problem.errors(base.state))
+
+
+def test_drives_over_other_roads_are_refused() -> None:
+    here = run_of([], 14.0, 80.0, 1)
+    far = replace(here, distance_m=here.distance_m + 500.0)
+    with pytest.raises(ValueError, match="same road"):
+        SameRoad([here, far], CAR, Tolerance())
