@@ -35,6 +35,7 @@ from replaying import rows_of
 
 PATIENCE_S = 120.0
 PIECE_S = 25
+BUSY_LOAD = 2 * (os.cpu_count() or 1)  # processes that want to run
 BRIDGE_S = Config().gps.bridge_s
 BMA220 = DumpHeader(None, {"driver": "bma220", "range_g": 4, "vertical_axis": "-z"}, {"baud": 9600}, "rav4-2009")
 
@@ -350,9 +351,8 @@ def test_a_drive_through_serial_ports_and_the_running_service(
         finally:
             service.send_signal(signal.SIGTERM)
     found = json.loads(played.stdout)
-    if not found["sent"]["in_time"]:
-        assert played.returncode == 1
-        pytest.skip(f"this machine was too busy to send in time: 99 of 100 within {found['sent']['late_p99_ms']:.0f} ms")
+    if played.returncode and os.getloadavg()[0] > BUSY_LOAD:
+        pytest.skip("other work keeps this machine from playing and logging in real time")
     assert played.returncode == 0, (found, (tmp_path / "stderr.txt").read_text())
     assert found["bridged_to_lines"] is True
     assert found["sent"]["duration_s"] == pytest.approx(PIECE_S, abs=0.1)
