@@ -62,6 +62,8 @@ _LARGEST_MEAN_MPS2, _POOR = 2.0, 0.3
 # Of roads that were not measured: how wavy, and how much of one is enough, and not too much, for one fit [m].
 _WAVINESS, _FLATTEST, _STEEPEST, _FREE_WAVINESS = 2.0, 1.0, 3.5, "road.waviness"
 _LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
+# By how much the distances of two drives over one road may disagree.
+_PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--unmeasured-road", action="store_true",
                         help="the roads were not measured; each run has one of its own")
     parser.add_argument("--same-road", action="store_true",
-                        help="the road was not measured; all runs are over the same one, at the same places within 3 m")
+                        help="the road was not measured; all runs are over the same one; their places may be "
+                             "off by 10 m, their distances by 1 per cent")
     parser.add_argument("--waviness", type=float, metavar="W",
                         help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
@@ -238,7 +241,8 @@ def _road_options(args: argparse.Namespace) -> Any:
         raise BadInput(f"--waviness {waviness:g}: expected {_FLATTEST:g} to {_STEEPEST:g}")
     names = [name.strip() for name in args.free.split(",")]
     args.free = ",".join(name for name in names if name != _FREE_WAVINESS)
-    return Options(waviness=waviness, free_waviness=_FREE_WAVINESS in names)
+    return Options(waviness=waviness, free_waviness=_FREE_WAVINESS in names, place_off_m=_PLACES_OFF_M,
+                   scale_off=_SCALE_OFF)
 
 
 def _drives(args: argparse.Namespace) -> list[Drive]:

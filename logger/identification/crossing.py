@@ -8,6 +8,7 @@ zero is not trusted: the mean of all readings is left out.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,37 +56,33 @@ class Grid:
         return np.asarray(np.fft.rfftfreq(self.count, self.spacing_m))
 
 
-def grid_under(drives: list[Drive], behind_m: Array, spacing_m: float, most_off_m: float) -> Grid:
-    """A grid that holds the way of all drives, from where they came to where they went on."""
+def grid_under(drives: list[Drive], behind_m: Array, spacing_m: float, most_off_m: float,
+               scale_off: float = 0.0) -> Grid:
+    """A grid that holds the way of all drives, from where they came to where they went on, were their places so much
+    off and their distances longer by such a share."""
     ways = [_way(drive)[0] for drive in drives]
-    first_m = min(float(way.min()) for way in ways) - float(behind_m.max()) - most_off_m - _MARGIN_M
-    last_m = max(float(way.max()) for way in ways) + most_off_m + _MARGIN_M
+    off_m = most_off_m + scale_off * max(float(np.ptp(way)) for way in ways) + _MARGIN_M
+    first_m = min(float(way.min()) for way in ways) - float(behind_m.max()) - off_m
+    last_m = max(float(way.max()) for way in ways) + off_m
     return Grid(first_m, spacing_m, smooth_length(int((last_m - first_m) / spacing_m) + 2))
 
 
 class Crossing:
     """A drive as a linear map of innovations (b, count) of the road to readings (b, n).
 
-    A response is (x, f) at ``f_hz``; ``waves`` (k,) makes elevations of innovations, by wave number.
+    A response is (x, f) at ``f_hz``; ``waves`` (k,) makes elevations of innovations, by wave number. With ``lever``
+    what is under the axles counts times the distance from the drive's middle, about which distances can be scaled.
     """
 
     def __init__(self, drive: Drive, grid: Grid, behind_m: Array, contact_patch_m: float) -> None:
-        from scipy.sparse import csr_array
-
         self.measured_mps2, self._grid, self._axles = drive.measured_mps2, grid, len(behind_m)
         way, lead = _way(drive)
+        self._middle_m = 0.5 * float(drive.distance_m.min() + drive.distance_m.max())
+        self._lever_m, self._behind_m = way - self._middle_m, behind_m
         self.kept = slice(lead, lead + len(drive.distance_m))
         self._length = len(way)
         self._count = smooth_length(len(way) + int(_REST_S * drive.rate_hz))
         self.f_hz = np.arange(self._count // 2 + 1) * drive.rate_hz / self._count
-        place = ((way - behind_m[:, None] - grid.start_m) / grid.spacing_m).ravel()
-        low = np.floor(place).astype(np.int64)
-        rows = np.arange(len(place))
-        share = place - low
-        self._read = csr_array((np.concatenate([1 - share, share]), (np.concatenate([rows, rows]),
-                                                                     np.concatenate([low, low + 1]))),
-                               shape=(len(place), grid.count))
-        self._spread = self._read.T.tocsr()
         self._window = _window(len(way), int(_SWELL_S * drive.rate_hz), int(_TAIL_S * drive.rate_hz))
         self.speed_mps = np.maximum(np.abs(np.gradient(drive.distance_m)) * drive.rate_hz, _SLOWEST_MPS)
         n = grid.wave_number_cpm
@@ -93,25 +90,52 @@ class Crossing:
         # Reading between two places by a straight line weakens short waves; the division makes up for it.
         averaged = np.sinc(n * contact_patch_m) / np.sinc(n * grid.spacing_m) ** 2
         self._averaged = np.where(n <= self.seen_cpm, averaged, 0.0)
+        self._lay(1.0)
 
-    def under_axles(self, innovations: Array, waves: Complex) -> Complex:
+    def laid(self, scale: float) -> Crossing:
+        """The same drive, its distances from its middle so many times what was recorded."""
+        if scale == self._scale:
+            return self
+        other = copy(self)
+        other._lay(scale)
+        return other
+
+    def _lay(self, scale: float) -> None:
+        from scipy.sparse import csr_array
+
+        self._scale = scale
+        way = self._middle_m + scale * self._lever_m
+        place = ((way - self._behind_m[:, None] - self._grid.start_m) / self._grid.spacing_m).ravel()
+        place = np.clip(place, 0, self._grid.count - 1.001)
+        low = np.floor(place).astype(np.int64)
+        rows = np.arange(len(place))
+        share = place - low
+        self._read = csr_array((np.concatenate([1 - share, share]), (np.concatenate([rows, rows]),
+                                                                     np.concatenate([low, low + 1]))),
+                               shape=(len(place), self._grid.count))
+        self._spread = self._read.T.tocsr()
+
+    def under_axles(self, innovations: Array, waves: Complex, lever: bool = False) -> Complex:
         """Transforms (b, x, f) in time of the elevations under the axles."""
         elevation = np.fft.irfft(np.fft.rfft(innovations) * (waves * self._averaged), self._grid.count)
-        under = (self._read @ elevation.T).T.reshape(-1, self._axles, self._length) * self._window
+        under = (self._read @ elevation.T).T.reshape(-1, self._axles, self._length) * self._weight(lever)
         return np.asarray(np.fft.rfft(under, self._count))
 
     def readings(self, under: Complex, response: Complex) -> Array:
         """Readings (b, n), less the mean of each."""
         return _level(np.fft.irfft((response * under).sum(axis=1), self._count)[:, self.kept])
 
-    def back(self, readings: Array, waves: Complex, response: Complex) -> Array:
+    def back(self, readings: Array, waves: Complex, response: Complex, lever: bool = False) -> Array:
         """The transposed map: of readings (b, n), to innovations (b, count)."""
         time = np.zeros((len(readings), self._count))
         time[:, self.kept] = _level(readings)
         transform = np.fft.rfft(time)[:, None, :] * np.conj(response)
-        under = np.fft.irfft(transform, self._count)[..., : self._length] * self._window
+        under = np.fft.irfft(transform, self._count)[..., : self._length] * self._weight(lever)
         elevation = (self._spread @ under.reshape(len(readings), -1).T).T
         return np.asarray(np.fft.irfft(np.fft.rfft(elevation) * np.conj(waves * self._averaged), self._grid.count))
+
+    def _weight(self, lever: bool) -> Array:
+        return self._window * self._lever_m if lever else self._window
 
     def transform(self, readings: Array) -> Complex:
         """Transforms (b, f) of readings (b, n) in the frame of ``under_axles``, so that ``products`` can be taken."""

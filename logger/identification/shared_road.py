@@ -36,7 +36,7 @@ from logger.identification.crossing import Crossing, Drive, Grid, grid_under
 from logger.identification.low_pass import LowPass
 from logger.identification.noise import RoadNoise
 from logger.identification.parameters import WEAKEST, Free
-from logger.identification.verdict import Finding, NotIdentifiable, statistical, structural
+from logger.identification.verdict import APART, Finding, NotIdentifiable, statistical, structural
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +57,9 @@ _NOTHING, _RANK = 1e-4, 1e-10
 _OFFSET_WEAKEST_M, _OFFSET_STEP_M = 0.5, 0.04
 # A scale of distances moves by hundredths. To begin with it is looked for by the shifts of parts of a drive.
 _HUNDREDTH, _SCALE_WEAKEST = 0.01, 1.0
-_PARTS, _SCALE_STEPS, _MOST_SHIFT_M = 12, 41, 12.0
+_PART_SHIFTS_M, _MOST_SHIFT_M = 0.3, 12.0
+# Drives over one road leave no more together than each alone, but for so many times, and this share of the readings.
+_MORE_TOGETHER, _LITTLE = 1.5, 0.05
 _NUDGE = 0.03
 
 
@@ -294,7 +296,7 @@ class _Problem:
             weakest = np.where(offsets, _OFFSET_WEAKEST_M, WEAKEST)
             weakest[self._where(SCALE)] = _SCALE_WEAKEST
             weakest[:p] = [one.weakest for one in self.free]
-            findings = self.structural(here) or statistical(self.names, relative, weakest)
+            findings = self.structural(here) or self._apart(here) or statistical(self.names, relative, weakest)
             if findings and self.options.refuse:
                 raise NotIdentifiable(findings)
         deviations = np.sqrt(np.diag(relative))
@@ -317,6 +319,20 @@ class _Problem:
                     if min(x - low, high - x) < 1e-6]
         return RoadFit(numbers, errors, roads, road_errors, relative, self.names, elevations,
                        [road.grid for road in self.roads], before, here.error, findings, settled, steps, at_bound)
+
+    def _apart(self, here: _Look) -> list[Finding]:
+        """Whether drives that are said to be over one road disagree on it."""
+        together = float(np.exp(here.x[-1]))
+        for number, (road, part) in enumerate(zip(self.roads, self.places, strict=True), 1):
+            at = self._at(here.x, part)
+            alone, size = road.noise_alone(at.values, at.waviness), road.size_mps2
+            if len(road.drives) > 1 and together > max(_MORE_TOGETHER * alone, _LITTLE * size):
+                where = f"road {number}" if len(self.roads) > 1 else "one road"
+                words = (f"the drives do not agree on {where}: together they leave {together:.2g} m/s2, each by itself "
+                         f"{alone:.2g}. It is not the same road, not the same line on it, or their distances disagree "
+                         "by more than can be found; take them for roads of their own.")
+                return [Finding(APART, {}, words)]
+        return []
 
     def _where(self, what: str) -> npt.NDArray[np.bool_]:
         return np.array([name.endswith(f".{what}") for name in self.names])
@@ -389,23 +405,38 @@ class UnknownRoad:
         self._white = generator.standard_normal((options.probes, self.grid.count))
         self._noise = [generator.standard_normal((options.probes, len(one))) for one in self.measured]
 
+    @property
+    def size_mps2(self) -> float:
+        """R.m.s. of all readings."""
+        return float(np.sqrt(np.mean(np.concatenate(self.measured) ** 2)))
+
     def first_guess(self, values: Array) -> tuple[float, float]:
         """Logarithm of the level, and the noise, from the readings' spectra alone."""
+        level, noise_mps2 = self._spectral_levels(values, self._options.waviness, range(len(self.crossings)))
+        return float(np.log(level / _at_n0(self._options.waviness))), noise_mps2
+
+    def noise_alone(self, values: Array, waviness: float) -> float:
+        """The same noise [m/s2], r.m.s. over the drives, each of which may have had a road of its own."""
+        noises = [self._spectral_levels(values, waviness, [one])[1] for one in range(len(self.crossings))]
+        return float(np.sqrt(np.mean(np.square(noises))))
+
+    def _spectral_levels(self, values: Array, waviness: float, which: Sequence[int]) -> tuple[float, float]:
+        """Gd(n0) [cm3] and the noise [m/s2] from the spectra of these drives."""
         def spectra(_: Array, f_hz: Array) -> list[Array]:
             f = np.maximum(f_hz, 0.05)
             found = []
-            for one in self.crossings:
+            for one in (self.crossings[number] for number in which):
                 speed = float(np.median(one.speed_mps))
                 delay = np.exp(-2j * np.pi * f / speed * self._car.behind_m[:, None])
                 gain = np.abs((self._car.responses(values, f)[0] * delay).sum(axis=0)) ** 2
                 gain = gain * np.sinc(f / speed * self._car.contact_patch_m) ** 2
-                found.append(gain * displacement_psd(f / speed, 1.0, self._options.waviness) / speed)
+                found.append(gain * displacement_psd(f / speed, 1.0, waviness) / speed)
             return found
 
-        size = float(np.sqrt(np.mean(np.concatenate(self.measured) ** 2)))
         low_pass = LowPass(self.drives[0].rate_hz, None)
-        levels = RoadNoise(spectra).fitted(self.measured, values, low_pass, 1e-3 * size).levels
-        return float(np.log(levels[GD_N0] / _at_n0(self._options.waviness))), levels["deviation_mps2"]
+        measured = [self.measured[number] for number in which]
+        levels = RoadNoise(spectra).fitted(measured, values, low_pass, 1e-3 * self.size_mps2).levels
+        return levels[GD_N0], levels["deviation_mps2"]
 
     def offset(self, at: RoadState, number: int) -> float:
         """Where a drive's places best agree with those of the first one [m]."""
@@ -425,8 +456,8 @@ class UnknownRoad:
         scale_off = min(options.scale_off, 2 * _MOST_SHIFT_M / length_m)
         most_m = options.place_off_m + scale_off * length_m / 2
         shifts = np.arange(-np.ceil(most_m / _OFFSET_STEP_M), np.ceil(most_m / _OFFSET_STEP_M) + 1) * _OFFSET_STEP_M
-        parts = np.array_split(np.arange(len(way_m)), _PARTS)
-        like, power = np.empty((2, len(shifts), _PARTS))
+        parts = np.array_split(np.arange(len(way_m)), max(1, int(np.ceil(scale_off * length_m / _PART_SHIFTS_M))))
+        like, power = np.empty((2, len(shifts), len(parts)))
         for index, shift in enumerate(shifts):
             waves = model.waves[0] * np.exp(2j * np.pi * n * shift)
             told = crossing.readings(crossing.under_axles(found, waves), model.responses[number])[0]
@@ -435,8 +466,8 @@ class UnknownRoad:
                 power[index, place] = told[part] @ told[part]
         from_middle_m = np.array([way_m[part].mean() for part in parts]) - 0.5 * (way_m.min() + way_m.max())
         best, found_at = -np.inf, (0.0, 1.0)
-        steps = _SCALE_STEPS if scale_off else 1
-        for scale in np.linspace(-scale_off, scale_off, steps):
+        steps = int(scale_off * length_m / 2 / (2 * _OFFSET_STEP_M))
+        for scale in np.linspace(-scale_off, scale_off, 2 * steps + 1):
             moved = np.rint(scale * from_middle_m / _OFFSET_STEP_M).astype(int)
             off = int(options.place_off_m / _OFFSET_STEP_M)
             at_shift = len(shifts) // 2 + np.arange(-off, off + 1)[:, None] + moved

@@ -26,7 +26,8 @@ from logger.identification.parameters import WEAKEST
 
 Array = npt.NDArray[np.float64]
 
-SILENT, TOGETHER, WEAK, UNEXPLAINED, TURNED = "silent", "together", "weak", "unexplained", "turned"
+SILENT, TOGETHER, WEAK, UNEXPLAINED = "silent", "together", "weak", "unexplained"
+TURNED, APART = "turned", "apart"
 NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
 _PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
@@ -39,7 +40,7 @@ _EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
 class Finding:
     """Something that the data cannot tell.
 
-    kind         silent, together, weak, unexplained or turned
+    kind         silent, together, weak, unexplained, turned or apart
     direction    relative changes by name that the predictions do not feel, the largest 1; empty where it is no number
                  that cannot be told
     words        a sentence

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -10,7 +12,7 @@ from logger.identification.axle_response import AxleResponse
 from logger.identification.crossing import Crossing, Drive, grid_under
 from logger.identification.parameters import changed, free
 from logger.identification.shared_road import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
-from logger.identification.verdict import SILENT, TOGETHER, WEAK, NotIdentifiable
+from logger.identification.verdict import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
 from logger.roads.iso8608 import generate
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
@@ -95,9 +97,10 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     """C built as a matrix from the same maps, its derivatives by differences, everything else from textbooks."""
     road = track(120.0, 2)
     drives = [driven(HALF, road, 12.0, 25.0, 1), driven(HALF, road, 20.0, 25.0, 2, 0.4)]
-    options = Options(free_waviness=True, probes=40)
+    options = Options(free_waviness=True, probes=40, scale_off=0.01)
     problem = _Problem(response(HALF, MASS, DAMPERS), [drives], options)
     x = problem.start()
+    x[-2] = 0.3
     one = problem.roads[0]
 
     def covariance(at: Array) -> Array:
@@ -150,6 +153,29 @@ def test_two_drives_over_one_road_at_different_speeds() -> None:
     truth = np.interp(place, road.start_m + SPACING_M * np.arange(len(road.elevation_m)), road.elevation_m)
     slopes = np.diff(elevation[inside]), np.diff(truth[inside])
     assert np.corrcoef(*slopes)[0, 1] > 0.8
+
+
+def test_distances_that_disagree_a_little_are_found() -> None:
+    road = track(150.0, 4)
+    slow, fast = driven(HALF, road, 10.0, 120.0, 1), driven(HALF, road, 18.0, 120.0, 2)
+    stretched = replace(fast, distance_m=fast.distance_m / 1.004 + 5.0)
+    fitted = found(HALF, [[slow, stretched]], MASS, DAMPERS, place_off_m=10.0, scale_off=0.01)
+    assert fitted.converged
+    for name in fitted.parameters:
+        assert fitted.parameters[name] == pytest.approx(free(HALF, name).start, abs=3.5 * fitted.standard_errors[name])
+        assert fitted.standard_errors[name] < 0.04 * free(HALF, name).start
+    scale, error = fitted.roads["road1.drive2.distance_scale"], fitted.road_errors["road1.drive2.distance_scale"]
+    assert scale == pytest.approx(1.004, abs=max(3.5 * error, 1e-4))
+    assert error < 2e-4
+    with pytest.raises(NotIdentifiable, match="do not agree on one road"):
+        found(HALF, [[slow, stretched]], MASS, probes=2)
+
+
+def test_drives_over_two_roads_are_not_over_one() -> None:
+    drives = [driven(HALF, track(120.0, seed), speed, 90.0, seed) for seed, speed in ((4, 10.0), (5, 18.0))]
+    with pytest.raises(NotIdentifiable) as caught:
+        found(HALF, [drives], MASS, probes=2, scale_off=0.01)
+    assert [finding.kind for finding in caught.value.findings] == [APART]
 
 
 def test_roads_add_up() -> None:
