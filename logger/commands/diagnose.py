@@ -30,6 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog diagnose``."""
     add_bench_arguments(parser)
     parser.add_argument("--all", action="store_true", help=f"list all candidates, not the first {_SHOWN}")
+    parser.add_argument("--same-road", action="store_true",
+                        help="no profile is known: two runs or more over one road, at different speeds; only effects "
+                             "that keep the car linear are tried")
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
 
 
@@ -37,6 +40,10 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose``."""
     from logger.lab.verdict import as_json
 
+    if args.same_road:
+        from logger.commands.diagnose_same_road import run_same_road
+
+        return run_same_road(args)
     given = bench(args)
     found = diagnosed(given)
     if args.out is not None:

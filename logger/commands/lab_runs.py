@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _SAME_RATE = 1e-6
 LEAST_S = 5.0
+_SKIP_S = 2.0  # what the lab leaves out of each run
+_MOST_MEAN_MPS2 = 2.0
 
 
 def lab_runs(folders: Sequence[Path]) -> Runs:
@@ -47,6 +49,9 @@ def _checked(drive: Drive, others: Sequence[Drive]) -> Drive:
     if last_m < drive.track.start_m or first_m > drive.track.end_m:
         raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to {drive.track.end_m:g} "
                        f"m, found {first_m:g} to {last_m:g} m")
-    if not drive.accel_z_mps2.any():
-        raise BadInput(f"{file}: expected accelerations, found zeros only")
+    counted = drive.accel_z_mps2[int(_SKIP_S * drive.rate_hz):]
+    if not counted.any():
+        raise BadInput(f"{file}: expected accelerations after the first {_SKIP_S:g} s, found zeros only")
+    if abs(counted.mean()) > _MOST_MEAN_MPS2:
+        raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     return drive

@@ -215,8 +215,10 @@ def _by_amplitude(beside: Beside) -> tuple[Part, ...]:
     size = round(BLOCK_S * beside.rate_hz)
     level = np.concatenate([running_rms(one, size) for one in beside.model])
     edges = np.unique(np.quantile(level, np.linspace(0, 1, _LEVELS + 1)))
+    if len(edges) == 1:  # a model that does not move
+        edges = np.array([edges[0], edges[0] + 1e-9])
     edges[-1] = np.nextafter(edges[-1], np.inf)
-    return _binned(beside, level, edges if len(edges) > 1 else np.array([edges[0], edges[0] + 1e-9]))
+    return _binned(beside, level, edges)
 
 
 def _by_place(beside: Beside) -> tuple[Part, ...]:

@@ -1,8 +1,9 @@
 """The noise of the sensors, which is not given, from what a model leaves; and the error that it alone makes.
 
 Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
-moves no sensor and the recorder's filter lets hardly anything pass, so that what is there is the sensor's own noise.
-Taken for white, it is looked for from there down: every band that is no louder than what was found above it tells more.
+moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
+well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more. No noise
+is taken for less than what two right simulations of a car differ by.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from logger.lab.fitting import Problem, State
 
 # A band is louder than the noise from so many deviations of the difference on.
 _LOUDER = 2.5
+# Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
+_FILTERED = 0.6
+_LEAST_SHARE = 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +35,18 @@ def noise_of(problem: Problem, state: State) -> Noise:
     freedom = sum(n for _, n in quiet)
     power = sum(level * n for level, n in quiet) / freedom
     cells = problem.cells(state, None)
-    for band in reversed(range(min(len(one.power) for one in cells))):
-        n = sum(float(one.freedom[band]) for one in cells)
-        level = sum(float(one.freedom[band] * one.power[band]) for one in cells) / n
+    bands = range(min(len(one.power) for one in cells))
+    freedoms = [sum(float(one.freedom[band]) for one in cells) for band in bands]
+    levels = [sum(float(one.freedom[band] * one.power[band]) for one in cells) / freedoms[band] for band in bands]
+    quietest = min(bands, key=lambda band: levels[band])
+    if power < _FILTERED * levels[quietest]:
+        power, freedom = levels[quietest], freedoms[quietest]
+    for band in reversed(bands):
+        level, n = levels[band], freedoms[band]
         if level < power * (1 + _LOUDER * np.sqrt(2 / n + 2 / freedom)):
             power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
+    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
+    power = max(power, _LEAST_SHARE**2 * float((counted**2).mean()))
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 

@@ -32,7 +32,7 @@ class Tolerance:
     """
 
     numbers: float = 0.025
-    lengths: float = 0.004
+    lengths: float = 0.015
     scale: float = 0.0003
     start_m: float = 0.004
     wander_m: float = 0.004

@@ -84,7 +84,7 @@ def turns_of(beside: Beside) -> Turns | None:
     names = short_names(beside.runs)
     for run, left in zip(beside.runs, beside.left, strict=True):
         speed = run.speed_mps[run.first:]
-        if speed.min() < _SLOWEST_MPS:
+        if speed.min() < _SLOWEST_MPS or run.distance_m[-1] <= run.distance_m[run.first]:
             continue
         way = np.maximum.accumulate(run.distance_m[run.first:])
         step_m = float(np.median(speed)) / run.rate_hz

@@ -298,7 +298,7 @@ def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
         step = _step(score, look.information + np.diag(grant), here, low, high)
         if count and float(score @ step) < _SETTLED:
             break
-        here = np.clip(here + step * min(1.0, float((longest / np.maximum(np.abs(step), 1e-300)).min())), low, high)
+        here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
     found = State(effects, logs, roads, problem.response(effects, logs))
     return Fitted(found, tuple(moves), look.information, look.information + np.diag(grant), problem)

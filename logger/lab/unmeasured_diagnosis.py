@@ -30,7 +30,7 @@ Progress = Callable[[str], None]
 MOST_EFFECTS = 3
 TAKEN_BY_ROAD = 0.02
 """The road takes an effect of whose information it leaves no more than this share."""
-_FITTED, _STARTS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 0.1, 6.0
+_FITTED, _STARTS, _FIRST_STEPS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 4, 0.1, 6.0
 _ALIKE, _ALIKE_SHARE = 10.0, 0.01
 _NOTHING = 1e-2
 _TINY_STEP = 1e-4
@@ -103,33 +103,33 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     base = fitted(problem.prepared(nominal), nominal)
     untried = _obstacles(problem, effects, present)
     left = {name: one for name, one in effects.items() if name not in untried}
-    first_base, first, taken = base, None, list[Candidate]()
+    before = base
+    first: list[Trial] = []
+    fits: list[Candidate] = []
+    taken: list[Candidate] = []
     steps = [("the vehicle as its file says", base.problem.error(replace(nominal, roads=base.state.roads))),
              ("its numbers refitted within what is granted", base.problem.error(base.state))]
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}: trying {len(left)} effects")
         tried = trials(base.problem, base, _trials(left))
-        if first is None:
-            first = tried
         models = _fits(base, tried, progress)
         candidates = _judged(base, models, len(left), problem.samples)
+        first, fits = first or tried, fits or candidates
         if not candidates or not _accepted(candidates[0], len(left), problem.samples):
             break
         best = candidates[0]
         taken.append(best)
         base = models[best.one.effect.name]
         base = replace(base, problem=base.problem.prepared(base.state))
-        steps.append((f"with {best.one.effect.name}", best.error or float("nan")))
+        steps.append((f"with {best.one.effect.name}", base.problem.error(base.state)))
         del left[best.one.effect.name]
-    assert first is not None
-    others = first if taken else []
-    listed = [*taken, *(candidates if not taken else [])]
-    listed += _promises(others or first, {one.one.effect.name for one in listed}, len(first))
+    listed = [*taken, *(one for one in fits if one.one.effect.name not in [own.one.effect.name for own in taken])]
+    listed += _promises(first, {one.one.effect.name for one in listed}, len(effects) - len(untried))
     usual = trials(base.problem, base, [_usual(one) for one in left.values()])
     road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
     return Found(
         tuple(listed), _with_errors(base, len(present)), tuple(steps),
-        tuple(zip(base.problem.errors(first_base.state), base.problem.errors(base.state), strict=True)),
+        tuple(zip(base.problem.errors(before.state), base.problem.errors(base.state), strict=True)),
         problem.quiet_mps2() / _size(problem), untried, road,
         {one.one.effect.name: one.deviations for one in usual
          if one.deviations < SEEN and one.one.effect.name not in road},
@@ -177,19 +177,18 @@ def _fits(base: Fitted, tried: Sequence[Trial], progress: Progress) -> dict[str,
     found = {}
     for name in worth[:_FITTED]:
         progress(f"fitting {name}")
-        found[name] = fitted(base.problem, _start(base, ranked[name]))
+        tries = [fitted(base.problem, start, _FIRST_STEPS) for start in _starts(base, ranked[name])]
+        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
+        found[name] = fitted(best.problem, best.state)
     return found
 
 
-def _start(base: Fitted, ranked: Sequence[Trial]) -> State:
-    """Where the fit of an effect begins: of its best trials, as they are and at the strength that they promise, the one
-    that is most likely. What is promised holds for small changes only."""
-    starts = {tuple(one.values.values()): one for trial in ranked[:_STARTS] for one in (trial.at, trial.one)}
-    states = []
-    for one in starts.values():
-        effects = (*base.state.effects, one)
-        states.append(replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs)))
-    return max(states, key=lambda state: base.problem.gain(base.state, state))
+def _starts(base: Fitted, ranked: Sequence[Trial]) -> list[State]:
+    """Where fits of an effect begin: its best trials as they are, and the best at the strength that it promises, which
+    holds for small changes only."""
+    ones = [ranked[0].at, *(trial.one for trial in ranked[:_STARTS])]
+    return [replace(base.state, effects=(*base.state.effects, one),
+                    gains=base.problem.response((*base.state.effects, one), base.state.logs)) for one in ones]
 
 
 def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, samples: int) -> list[Candidate]:
@@ -199,7 +198,7 @@ def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, samples: int
         one = model.state.effects[-1]
         gain = model.problem.gain(base.state, model.state)
         found.append(Candidate(one, model.problem.error(model.state), _p_value(gain, _numbers(one), count), gain))
-    found.sort(key=lambda one: 2 * _numbers(one.one) - one.gain)
+    found.sort(key=lambda one: _numbers(one.one) * float(np.log(samples)) - one.gain)  # G. Schwarz 1978
     return [replace(one, confused_with=_rivals(one, found, count, samples)) for one in found]
 
 

@@ -1,0 +1,94 @@
+"""``ridelog diagnose --same-road``: which effect is missing, from drives over one road that nobody measured.
+
+Each RUN is a folder with drive.csv; a profile.csv in it is not read. The runs are drives over the same road at
+different speeds, their distances counted from the same place (to about 3 m). An error is rms(measured - model) /
+rms(measured) of each drive over the road that the other drives tell.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.commands.lab_model import columns, on_screen, paragraphs, wipe
+from logger.errors import EXIT_DONE, BadInput
+
+if TYPE_CHECKING:
+    from logger.lab.prediction import Run
+    from logger.lab.unmeasured_diagnosis import Found
+
+_SHOWN = 8
+_LEAST_S = 5.0
+_SAME_RATE = 1e-6
+_BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
+
+
+def run_same_road(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog diagnose --same-road``."""
+    from logger.lab.nuisance import Tolerance
+    from logger.lab.unmeasured import SameRoad
+    from logger.lab.unmeasured_diagnosis import as_json, diagnose_same_road
+    from logger.shipped import vehicle_path
+    from logger.store.effect_file import own_effect, shipped_effects
+    from logger.store.vehicle_file import read_model
+
+    if args.out is not None:
+        raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
+    runs, model = _drives(args.runs), read_model(vehicle_path(args.vehicle))
+    effects = {**shipped_effects(), **{one.effect.name: one.effect for one in model.effects}}
+    effects |= {one.name: one for one in map(own_effect, map(Path, args.effect_file))}
+    try:
+        problem = SameRoad(runs, model.vehicle, Tolerance(numbers=args.tolerance / _BAND_DEVIATIONS))
+        found = diagnose_same_road(problem, effects, model.effects, on_screen())
+    except ValueError as error:
+        raise BadInput(f"{args.vehicle}: {error}") from None
+    finally:
+        wipe()
+    if args.json:
+        print(json.dumps(as_json(found), allow_nan=False))
+    else:
+        print(*_lines(found, [run.name for run in runs], None if args.all else _SHOWN), sep="\n")
+    return EXIT_DONE
+
+
+def _drives(folders: Sequence[Path]) -> list[Run]:
+    """The drives in some folders. BadInput for fewer than two, or one that the others cannot be used with."""
+    import numpy as np
+
+    from logger.lab.prediction import Run
+    from logger.roads.track import Track
+    from logger.store.drive_file import DRIVE, read_drive
+
+    if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
+        raise BadInput("--same-road: expected two runs or more, each once")
+    runs: list[Run] = []
+    for folder in folders:
+        drive = read_drive(folder / DRIVE)
+        if len(drive.time_s) < _LEAST_S * drive.rate_hz:
+            raise BadInput(f"{drive.path}: expected a drive of {_LEAST_S:g} s or longer")
+        if runs and abs(drive.rate_hz / runs[0].rate_hz - 1) > _SAME_RATE:
+            raise BadInput(f"{drive.path}: expected {runs[0].rate_hz:g} samples a second, as in {runs[0].name}, found "
+                           f"{drive.rate_hz:g}")
+        if not drive.accel_z_mps2.any():
+            raise BadInput(f"{drive.path}: expected accelerations, found zeros only")
+        runs.append(Run(str(folder), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps,
+                        Track(1.0, np.zeros(2))))
+    return runs
+
+
+def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
+    """What a person reads."""
+    from logger.lab.quantities import chance, numbers_of
+    from logger.lab.unmeasured_diagnosis import cannot_tell, summary
+
+    rows = [("Effect", "Error", "Chance", "Numbers")]
+    rows += [(one.one.effect.name, "not fitted" if one.error is None else f"{one.error:.3f}", chance(one.p_value),
+              numbers_of(one.one)) for one in found.candidates[:most]]
+    by_run = [("Run", "Error before", "after"),
+              *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
+                zip(runs, found.by_run, strict=True))]
+    return [paragraphs(summary(found)), "", "Each tried by itself, those that are missing first:", *columns(rows), "",
+            *columns(by_run), "", "What these drives cannot tell:", paragraphs(cannot_tell(found), "- ")]
