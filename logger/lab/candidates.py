@@ -8,6 +8,7 @@ out, and the trial that explains most, at the strength at which it explains most
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,12 +27,13 @@ from logger.lab.fitting import (
     moves_of,
     settled,
 )
+from logger.lab.prediction import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 
 Array = npt.NDArray[np.float64]
 
 _STRONGEST, _WEAKEST = 10.0, 0.03
-_STEPS = 5
+_STEPS, _ROUNDS = 5, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +92,13 @@ class Tried:
 class Trial:
     """An effect at one set of values, and what it would do.
 
-    gain    how much of the weighed squares it would explain, with the car's numbers and the wander moved by ``step``
-    step    (count,)
+    gain     how much of the weighed squares it would explain, with the car's numbers and the wander where they then are
+    joined   (count,) these
     """
 
     one: Chosen
     gain: float
-    step: Array
+    joined: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +120,8 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
     for values in effect.trials(seen):
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         trial = _trial(problem, base, chosen(effect, values))
+        if effect.realigns:
+            trial = max(trial, _afresh(problem, base, chosen(effect, values)), key=lambda one: one.gain)
         if choice not in best or trial.gain > best[choice].gain:
             best[choice] = trial
     return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)))
@@ -126,8 +130,9 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
 def as_screened(problem: Problem, base: Base, promise: Screened) -> Tried:
     """The model of ``base`` with an effect at its most promising trial, not fitted further."""
     trial = promise.trials[0]
-    logs, wander = base.weighed.parted(base.weighed.joined(base.state) + trial.step)
-    return _tried(problem, base, problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes))
+    logs, wander = base.weighed.parted(trial.joined)
+    return _tried(problem, base, problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes),
+                  base.slopes)
 
 
 def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
@@ -135,20 +140,24 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
     tries = []
     for trial in promise.trials:
         effects = (*base.state.effects, trial.one)
-        state = problem.predicted(effects, base.state.logs, base.state.wander, base.slopes)
-        tries.append(_tried(problem, base, improved(base.weighed, state, moves_of(effects), _STEPS)))
+        if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
+            start = problem.laid_out(effects, *base.weighed.parted(trial.joined))
+            tries.append(_tried(problem, base, *settled(problem, start, _ROUNDS)))
+            continue
+        state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
+        tries.append(_tried(problem, base, improved(base.weighed, state, moves_of(effects), _STEPS), base.slopes))
     return max(tries, key=lambda one: one.gain)
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
     """The same with slopes of its own."""
-    return _tried(problem, base, settled(problem, one.state, rounds)[0])
+    return _tried(problem, base, *settled(problem, one.state, rounds))
 
 
-def _tried(problem: Problem, base: Base, state: State) -> Tried:
+def _tried(problem: Problem, base: Base, state: State, slopes: Slopes) -> Tried:
     effect = state.effects[-1].effect
     numbers = sum(not parameter.choices for parameter in effect.parameters)
-    seen = located(problem, state, base.slopes)
+    seen = located(problem, state, slopes)
     return Tried(effect, state, base.fitted - problem.deviance(state),
                  base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers)
 
@@ -156,6 +165,7 @@ def _tried(problem: Problem, base: Base, state: State) -> Tried:
 def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     """A trial at the strength at which it explains most."""
     weighed, state = base.weighed, base.state
+    here = weighed.joined(state)
     there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes)
     change = [whitener((new - old)[None]) for whitener, new, old in zip(
         weighed.whiteners, there.predictions, state.predictions, strict=True)]
@@ -163,12 +173,20 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True))
     own = sum(float(c[0] @ c[0]) for c in change) - float(weighed.against(change)[:, 0] @ absorbed)
     if not own > 0:
-        return Trial(one, 0.0, np.zeros_like(absorbed))
+        return Trial(one, 0.0, here)
     strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))
     scaled = _scaled(one, strength)
     if scaled is None:
-        return Trial(one, 2 * along - own, -absorbed)
-    return Trial(scaled, 2 * strength * along - strength**2 * own, -strength * absorbed)
+        return Trial(one, 2 * along - own, here - absorbed)
+    return Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed)
+
+
+def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:
+    """A trial of the car as its file says: where positions are wrong, what was fitted before is worth nothing."""
+    nothing = np.zeros(base.weighed.count)
+    state = problem.laid_out((*base.state.effects, one), *base.weighed.parted(nothing))
+    gain = base.weighed.objective(base.state) - base.weighed.objective(state)
+    return Trial(one, gain, nothing)
 
 
 def _scaled(one: Chosen, strength: float) -> Chosen | None:
@@ -184,41 +202,40 @@ def _scaled(one: Chosen, strength: float) -> Chosen | None:
 
 
 def misalignment(problem: Problem, state: State) -> Misalignment:
-    """By how much windows of the measurement have to be moved against the model to fit it best."""
-    shifts: list[tuple[float, float, float]] = []
+    """How the runs would have to be moved against the model to fit it best: all of them by one factor of their
+    distance, or by one time. Both are looked for in the slow part of the motion, whose waves are long."""
+    pairs: list[tuple[Run, Array, Array]] = []
     for run, predicted in zip(problem.runs.runs, state.predictions, strict=True):
-        shifts += _window_shifts(run.measured_mps2, predicted, run.distance_m, run.speed_mps, run.rate_hz, run.first)
-    if len(shifts) < _FEWEST_WINDOWS:
-        return Misalignment(1.0, 0.0)
-    shift_m, distance_m, speed_mps = np.array(shifts).T
-    far = distance_m > 0.25 * distance_m.max()
-    per_metre = float(np.median(shift_m[far] / distance_m[far])) if far.any() else 0.0
-    return Misalignment(1 / (1 + per_metre), float(np.median(-shift_m / speed_mps)))
+        size = max(1, round(_SMOOTH_S * run.rate_hz))
+        hat = np.hanning(size + 2)[1:-1]
+        slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, predicted)]
+        pairs.append((run, slow[0], slow[1]))
+
+    def alike(scale: float, delay_s: float) -> float:
+        """Products of the measurement and the model, moved, over what they are at most."""
+        both = of = 0.0
+        for run, measured, predicted in pairs:
+            time_s = np.arange(run.count) / run.rate_hz
+            rising = np.maximum.accumulate(run.distance_m) + 1e-9 * time_s
+            at_s = np.interp(run.distance_m / scale, rising, time_s) - delay_s
+            moved_mps2 = np.interp(at_s, time_s, predicted)[run.first:]
+            kept = measured[run.first:]
+            both += float(kept @ moved_mps2)
+            of += float(np.sqrt((kept @ kept) * (moved_mps2 @ moved_mps2)))
+        return both / of if of > 0 else 0.0
+
+    still = alike(1.0, 0.0)
+    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), _WIDEST, _SCALE_STEP)
+    delay_s = _scanned(lambda off: alike(1.0, off), _LATEST_S, _DELAY_STEP_S)
+    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0)
 
 
-_WINDOW_S, _LONGEST_LAG_S, _ALIKE, _FEWEST_WINDOWS = 5.0, 4.0, 0.5, 3
+_SMOOTH_S = 0.2
+_WIDEST, _SCALE_STEP, _LATEST_S, _DELAY_STEP_S = 0.08, 5e-4, 1.5, 0.02
 
 
-def _window_shifts(measured: Array, predicted: Array, distance_m: Array, speed_mps: Array, rate_hz: float,
-                   first: int) -> list[tuple[float, float, float]]:
-    """Of each window that resembles the model somewhere: how much farther the car was [m], its distance and speed."""
-    size, lag = round(_WINDOW_S * rate_hz), round(_LONGEST_LAG_S * rate_hz)
-    found = []
-    for start in range(first, len(measured) - size + 1, size):
-        window = measured[start : start + size]
-        low, high = max(0, start - lag), min(len(predicted), start + size + lag)
-        around = predicted[low:high]
-        products = np.correlate(around, window, "valid")
-        sums = np.concatenate([[0.0], np.cumsum(around**2)])
-        norms = np.sqrt(np.maximum(sums[size:] - sums[:-size], 1e-300) * (window @ window + 1e-300))
-        alike = products / norms
-        top = int(np.argmax(alike))
-        middle = start + size // 2
-        if alike[top] < _ALIKE or speed_mps[middle] < 1.0 or not 0 < top < len(alike) - 1:
-            continue
-        bend = alike[top - 1] - 2 * alike[top] + alike[top + 1]
-        fine = 0.5 * (alike[top - 1] - alike[top + 1]) / bend if bend < 0 else 0.0
-        ahead_s = (low + top + fine - start) / rate_hz
-        found.append((float(ahead_s * speed_mps[middle]), float(distance_m[middle]), float(speed_mps[middle])))
-    return found
-
+def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:
+    """Where something is largest between -reach and reach, looked for in steps and then in tenths of a step."""
+    count = round(reach / step)
+    middle = max((step * k for k in range(-count, count + 1)), key=alike)
+    return max((middle + 0.1 * step * k for k in range(-10, 11)), key=alike)

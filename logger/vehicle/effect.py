@@ -108,6 +108,7 @@ class Effect(ABC):
     source       where the law is from
     signature    what it leaves in a measurement that a model without it is compared with
     shown_by     the drive that would show it best, as an instruction
+    realigns     whether it moves the model against the measurement, so that a search looks at how they lie first
     """
 
     name: str
@@ -116,6 +117,7 @@ class Effect(ABC):
     source: str
     signature: str
     shown_by: str
+    realigns: bool = False
     stage: int = 0
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

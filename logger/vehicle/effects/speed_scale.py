@@ -27,6 +27,7 @@ class SpeedScale(DriveEffect):
     source = "UN Regulation 39: a speedometer may read up to a tenth too much; worn tires change the rest"
     signature = "model and measurement drift apart along the road, the more the farther"
     shown_by = "drive a long stretch with a mark at each end, and measure it"
+    realigns = True
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         if seen is None or abs(seen.scale - 1) < _LEAST:

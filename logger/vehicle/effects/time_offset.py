@@ -24,6 +24,7 @@ class TimeOffset(SensorEffect):
     source = "the shift theorem of the Laplace transform"
     signature = "model and measurement have the same shape, shifted by the same time at every speed"
     shown_by = "drive one bump at two speeds: the distance it seems moved by grows with the speed"
+    realigns = True
     stage = 4
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
