@@ -264,10 +264,12 @@ def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: di
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
     from logger.identification.parameters import free
-    from logger.identification.road_input import expanded, free_input, is_input, run_and_name
+    from logger.identification.road_input import EACH, expanded, free_input, is_input, run_and_name
 
     runs = len(args.runs)
     wanted = [name.strip() for name in args.free.split(",") if name.strip()]
+    if cars := [name for name in wanted if name.startswith(f"{EACH}.") and not is_input(name)]:
+        raise BadInput(f"--free {cars[0]}: expected a number of the road after {EACH}., as all runs have one car")
     names = [one for name in wanted for one in expanded(name, runs)]
     if not names or len(set(names)) < len(names):
         raise BadInput(f"--free {args.free}: expected names with commas between them, each once")

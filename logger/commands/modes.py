@@ -23,6 +23,7 @@ SPECTRUM = "fft"
 DECREMENT = "decrement"
 METHODS = ("era", "ssi", "ssi-cov", "n4sid", "ar", "arx", "armax", SPECTRUM, DECREMENT)
 EXAMPLES = ("five-storey",)
+_SEGMENTS = 8
 _REJECTED_SHOWN = 12
 _IN_STEP = 0.02  # a shape whose parts are nearer to in step than this is shown with signs alone
 
@@ -42,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="decay or random; without it the record is looked at")
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="leave out what is before this t_s [s]")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="leave out what is after this t_s [s]")
-    parser.add_argument("--segments", type=int, default=8, metavar="N", help="even segments for fft (default: 8)")
+    parser.add_argument("--segments", type=int, metavar="N", help="even segments for fft (default: 8)")
     parser.add_argument("--diagram", type=Path, metavar="FILE.csv",
                         help="write the poles of all orders, for a stabilisation diagram")
     parser.add_argument("--example", choices=EXAMPLES, metavar="NAME",
@@ -60,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DONE
     if args.file is None:
         raise BadInput("modes: expected a FILE (try 'ridelog modes --help')")
+    _check_options(args)
     record, inputs = _read(args)
     try:
         result = _find(args, record, inputs)
@@ -74,6 +76,22 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
+def _check_options(args: argparse.Namespace) -> None:
+    """BadInput for an option that the method has no use for."""
+    if args.method in (SPECTRUM, DECREMENT):
+        for option, value in (("--order", args.order), ("--response", args.response), ("--diagram", args.diagram)):
+            if value is not None:
+                raise BadInput(f"{option}: expected a method with poles, not --method {args.method}")
+    if args.segments is not None and args.method != SPECTRUM:
+        raise BadInput(f"--segments: expected --method {SPECTRUM} with it, found {args.method}")
+    if args.response is not None and args.input is not None:
+        raise BadInput("--response: expected no --input, which says what moves the structure")
+    if args.input is not None and args.method not in ("n4sid", "arx", "armax"):
+        raise BadInput(f"--input: expected --method n4sid, arx or armax with it, found {args.method}")
+    if args.method == "arx" and args.input is None:
+        raise BadInput("--method arx: expected --input COLUMN with it")
+
+
 def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
     from dataclasses import replace
@@ -83,10 +101,6 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
     from logger.store.channel_file import read_channels
 
     file = str(args.file)
-    if args.input is not None and args.method not in ("n4sid", "arx", "armax"):
-        raise BadInput(f"--input: expected --method n4sid, arx or armax with it, found {args.method}")
-    if args.method == "arx" and args.input is None:
-        raise BadInput("--method arx: expected --input COLUMN with it")
     wished = tuple(name.strip() for name in args.columns.split(",")) if args.columns else ()
     record = read_channels(args.file, (*wished, args.input) if wished and args.input else wished)
     if args.input is not None and args.input not in record.names:
@@ -112,7 +126,7 @@ def _find(args: argparse.Namespace, record: ChannelRecord, inputs: Any) -> Modal
     from logger.modal.spectrum import peak_modes
 
     if args.method == SPECTRUM:
-        return peak_modes(record.samples, record.rate_hz, args.segments)
+        return peak_modes(record.samples, record.rate_hz, _SEGMENTS if args.segments is None else args.segments)
     if args.method == DECREMENT:
         return _by_decrement(record)
     if args.order is not None and args.order < 2:

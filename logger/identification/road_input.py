@@ -123,5 +123,6 @@ def check_names(names: Sequence[str], runs: int) -> None:
     for name in names:
         only, whole = run_and_name(name)
         if only is not None and (only >= runs or whole in names):
-            what = f"there are {runs} runs" if only >= runs else f"{whole} is free for all runs"
+            there = "there is 1 run" if runs == 1 else f"there are {runs} runs"
+            what = there if only >= runs else f"{whole} is free for all runs"
             raise ValueError(f"{name}: {what}")

@@ -16,7 +16,7 @@ road follows by conjugate gradients, and with u = inv(C) y and z = S A' u the li
 
 The expectation, else a trace of huge matrices, is a mean over ``probes`` simulated drives, always the same ones: the
 estimate is then a root of a smooth function, unbiased however few they are, and its variance grows by one part in
-``probes``. Steps are Fisher's, whose matrix comes from the same probes.
+``last_probes``; the way there takes fewer. Steps are Fisher's, whose matrix comes from the same probes.
 
 Nothing here knows a vehicle: ``LinearCar`` is all that is asked for. Numbers that no such drive can tell (masses, rates
 and dampers all larger by one factor) are refused by ``verdict``.
@@ -88,7 +88,8 @@ class Options:
     free_waviness    find it, one for each road
     place_off_m      how far the places of two drives over one road may be off; 0: they are exact
     scale_off        how far their distances may be off beyond that, as a share; 0: they are exact
-    probes           simulated drives that slopes are compared with
+    probes           simulated drives that slopes are compared with on the way
+    last_probes      and at the end, where what they have in common is an error of the estimate
     seed             of them
     most_steps       of Fisher's
     solved           what is left of a set of equations when it counts as solved, of what it began with
@@ -106,6 +107,7 @@ class Options:
     fisher_probes: int = 2
     refuse: bool = True
     scale_off: float = 0.0
+    last_probes: int = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,18 +152,20 @@ def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options
 
     Raises NotIdentifiable when the drives cannot tell them, ValueError for no drive or no free number.
     """
-    problem = _Problem(car, roads, options or Options())
+    options = options or Options()
+    problem = _Problem(car, roads, options)
     x = problem.start()
     first = problem.look(problem.beside(x), information=True)
     findings = problem.structural(first)
-    if findings and problem.options.refuse:
+    if findings and options.refuse:
         raise NotIdentifiable(findings)
     here = problem.look(x, information=True)
     before = here.error
-    settled, steps = False, 0
-    while not settled and steps < problem.options.most_steps:
-        here, settled = problem.step(here)
-        steps += 1
+    here, settled, steps = problem.descend(here)
+    if options.last_probes > options.probes:
+        problem = _Problem(car, roads, replace(options, probes=options.last_probes))
+        here, settled, more = problem.descend(problem.look(here.x, information=True))
+        steps += more
     here = problem.look(here.x, information=True)
     return problem.result(here, before, findings, settled, steps)
 
@@ -255,6 +259,14 @@ class _Problem:
             left, whole = left + squares[0], whole + squares[1]
         error = float(np.sqrt(left / whole)) if whole > 0 else float("nan")
         return _Look(x, slopes, matrix, error, np.empty((0, 0)))
+
+    def descend(self, here: _Look) -> tuple[_Look, bool, int]:
+        """Steps until they come to rest: the last place, whether they did, and how many."""
+        settled, steps = False, 0
+        while not settled and steps < self.options.most_steps:
+            here, settled = self.step(here)
+            steps += 1
+        return here, settled, steps
 
     def step(self, here: _Look) -> tuple[_Look, bool]:
         """Fisher's step, within bounds and not too long; and whether what was left was nothing to the errors.

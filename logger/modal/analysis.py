@@ -183,6 +183,7 @@ def _regression(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan
         return [autoregressive.poles(moments, which, n, rate_hz) for n in wanted]
 
     def peaks(moments: Moments, found: OrderPoles) -> npt.NDArray[np.bool_]:
-        return autoregressive.stands_out(moments, which, found.order, rate_hz, found)
+        seen = autoregressive.stands_out(moments, which, found.order, rate_hz, found)
+        return seen if inputs else seen & autoregressive.louder_than_beside(data[:, :outputs], rate_hz, found)
 
     return _Plan(data, longest + 1, orders, best, models, peaks)

@@ -17,6 +17,8 @@ from logger.modal.mode import Array, OrderPoles, order_poles
 from logger.modal.moments import Moments
 
 _RIDGE = 1e-11
+_FALSE_ALARM = 1e-3  # chance that a record without modes yields a pole that is louder than what is beside it
+_LEAST_BINS = 3
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,32 @@ def stands_out(
     near = np.abs(frequency[:, None] - frequency) < width[:, None]
     taken = (near & (width < width[:, None])).any(axis=1)
     return np.asarray((power[0] ** 2 > 4 * power[1] * power[2]) & ~taken)
+
+
+def louder_than_beside(samples: Array, rate_hz: float, found: OrderPoles) -> npt.NDArray[np.bool_]:
+    """Which poles (n,) the record (samples, channels) itself has: its power within a half-power width is more than
+    beside it (three to six widths away, the geometric mean of both sides), and by more than chance makes it.
+
+    A long autoregression draws peaks into white noise, and keeps them from order to order.
+    """
+    from scipy.special import chdtri
+
+    taper = np.hanning(len(samples) + 2)[1:-1, None]
+    power = (np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * taper, axis=0)) ** 2).sum(axis=1)
+    sums = np.concatenate([[0.0], np.cumsum(power)])
+    step = 2 * np.pi * rate_hz / len(samples)
+    middle = found.poles.imag / step
+    width = np.maximum(np.abs(found.poles.real) / step, _LEAST_BINS / 2)
+
+    def mean(low: Array, high: Array) -> Array:
+        first = np.clip(np.rint(low), 1, len(power) - 1).astype(int)
+        last = np.clip(np.rint(high), first + 1, len(power)).astype(int)
+        return np.asarray((sums[last] - sums[first]) / (last - first))
+
+    beside = np.sqrt(mean(middle - 6 * width, middle - 3 * width) * mean(middle + 3 * width, middle + 6 * width))
+    freedom = 2 * width  # two for each of as many bins, which the taper makes alike by twos
+    limit = chdtri(freedom, _FALSE_ALARM / max(len(width), 1)) / freedom
+    return np.asarray(mean(middle - width, middle + width) > limit * beside)
 
 
 def errors(samples: Array, moments: Moments, which: Regressors, order: int) -> Array:

@@ -8,8 +8,10 @@ Solution: such a method only proposes poles. What is believed and reported comes
     y_c(t) = sum over modes of exp(sigma t) (a_c cos omega t + b_c sin omega t) + offset_c + noise_c(t),
 
 fitted by least squares, which for white noise attains the Cramer-Rao bound. Proposals are taken in one by one, the one
-that explains most first, as long as it explains more than the largest of a thousand draws of noise would; after each
-the poles of all are refitted, and the poles of each smaller order are tried as a start too. Amplitudes are linear and
+that explains most first, as long as it explains more than the largest of a thousand draws of noise would, noise being
+what is left around its frequency and while it lasts: that of a sensor that errs by a share of what it reads, or of few
+digits, shrinks as the modes do. After each the poles of all are refitted, and the poles of each smaller order are tried
+as a start too. Amplitudes are linear and
 are eliminated (variable projection, Golub and Pereyra, 1973), which leaves two unknowns per mode and makes a step cheap
 however many channels there are. Standard errors follow from the same matrices; noise that is louder around a mode than
 elsewhere enlarges them.
@@ -21,6 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.modal.mode import (
     Array,
@@ -38,10 +41,12 @@ Propose = Callable[[Array, float], tuple[OrderPoles, ...]]
 
 _FALSE_ALARM = 1e-3  # chance that a record of noise yields a mode
 _MOST_MODES = 40
+_AHEAD = 4  # poles that are tried beyond those that are believed
 _MOST_STEPS = 60
 _LOUDNESS_BINS = 60  # of the residual's spectrum on which the noise around a mode is measured
 _ALIKE = 0.005  # relative distance of poles that are tried once only
 _LEAST_DAMPING, _MOST_DAMPING = -0.05, 0.95
+_MOST_GROWTH = 10.0  # in powers of e, from the first sample to the last
 _LARGEST_ERROR = 0.5  # a damping ratio whose standard error is more than this is none
 
 
@@ -136,7 +141,7 @@ def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
         before = fit
         while size > 1e-3:
             poles = before.poles + size * change
-            if (poles.imag > 0).all() and (damping_ratio(poles) > _LEAST_DAMPING).all():
+            if (poles.imag > 0).all() and _bounded(poles, len(samples) / rate_hz).all():
                 trial = _solve(samples, poles, rate_hz)
                 if trial.cost <= before.cost:
                     fit = trial
@@ -148,19 +153,38 @@ def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
 
 
 def _significance(fit: _Fit, rate_hz: float) -> Array:
-    """Chi-squared (m,) that each mode explains, against the noise around its frequency."""
-    loud = _loudness(fit, rate_hz)
+    """Chi-squared (m,) that each mode explains, against the noise around its frequency and while it lasts."""
+    loud, freedom = _loudness(fit, rate_hz), _freedom(fit, fit.poles, rate_hz)
     found = np.empty(len(fit.poles))
     for k in range(len(fit.poles)):
         own = slice(2 * k, 2 * k + 2)
         part = fit.amplitudes[own]
         explained = (part * np.linalg.solve(fit.turned[own, own], part)).sum(axis=0)
-        found[k] = (explained / (fit.noise * loud[k])).sum()
+        # Of noise whose strength is known from few samples chance makes more: the ratio of likelihoods counts that.
+        found[k] = (freedom[k] * np.log1p(explained / (fit.noise * loud[k]) / freedom[k])).sum()
     return found
 
 
+def _freedom(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
+    """How many samples (m,) the squared envelope of each pole counts, those that the fit took for itself left out."""
+    envelope, left = _envelope(fit, poles, rate_hz)
+    return np.asarray(np.maximum((envelope @ left) ** 2 / (envelope**2 @ left + 1e-300), 1.0))
+
+
+def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
+    """Squared envelopes (m, samples), and the share of its noise (samples,) that the fit left in each sample."""
+    fall = np.minimum(poles.real, 0.0)  # what grows lasts all along
+    envelope = np.exp(2 * np.outer(fall, np.arange(len(fit.residual)) / rate_hz))
+    return envelope, np.maximum(1 - (fit.orthonormal**2).sum(axis=1), 0.0)
+
+
 def _loudness(fit: _Fit, rate_hz: float) -> Array:
-    """How much louder the residual is around each mode than on average, (m, channels), 1 or more."""
+    """How much louder the residual is around each mode, or while it lasts, than on average (m, channels), 1 or more."""
+    return np.maximum(np.maximum(1.0, _louder_nearby(fit, rate_hz)), _louder_meanwhile(fit, fit.poles, rate_hz))
+
+
+def _louder_nearby(fit: _Fit, rate_hz: float) -> Array:
+    """In the residual's spectrum around each mode."""
     count = len(fit.residual)
     power = np.abs(np.fft.rfft(fit.residual, axis=0)) ** 2 / (count * fit.noise)
     sums = np.vstack([np.zeros(power.shape[1]), np.cumsum(power, axis=0)])
@@ -168,36 +192,52 @@ def _loudness(fit: _Fit, rate_hz: float) -> Array:
     half = np.maximum(_LOUDNESS_BINS // 2, np.abs(fit.poles.real) / np.pi * count / rate_hz).astype(int)
     first = np.clip(middle - half, 1, max(1, len(power) - 2 * _LOUDNESS_BINS // 2))
     last = np.clip(middle + half, first + 1, len(power))
-    return np.maximum(1.0, (sums[last] - sums[first]) / (last - first)[:, None])
+    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
+
+
+def _louder_meanwhile(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
+    """Under the squared envelope of each pole (m, channels), but for what the fit took of the noise there."""
+    envelope, left = _envelope(fit, poles, rate_hz)
+    kept = np.maximum(envelope @ left, 1e-12 * envelope.sum(axis=1))
+    return np.asarray(envelope @ fit.residual**2 / (kept[:, None] * fit.noise))
 
 
 def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
-    """Add proposed poles, the most telling first, as long as they tell more than noise would."""
-    proposed = _different(np.concatenate([np.empty(0, complex), *(found.poles for found in diagram)]))
-    if not len(proposed):
-        return fit
+    """Add proposed poles, the most telling first, as long as they tell more than noise would.
+
+    While modes are missing the residual is no noise, and a few more poles are tried before those that are no stronger
+    than it are given up.
+    """
+    proposed = _different(np.concatenate([np.empty(0, complex), *(found.poles for found in diagram)]),
+                          len(samples) / rate_hz)
     waves = _basis(proposed, len(samples), rate_hz)
-    while len(fit.poles) < _MOST_MODES:
+    believed = fit
+    while len(proposed) and len(fit.poles) < min(_MOST_MODES, len(believed.poles) + _AHEAD):
         gains = _gains(fit, waves)
-        best = int(gains.argmax())
-        if gains[best] < threshold:
-            return fit
+        fair = (gains / np.maximum(1.0, _louder_meanwhile(fit, proposed, rate_hz))).sum(axis=1)
+        best = int(fair.argmax() if fair.max() >= threshold else gains.sum(axis=1).argmax())
+        if gains[best].sum() < threshold:
+            break
         larger = _refit(_solve(samples, np.append(fit.poles, proposed[best]), rate_hz), samples, rate_hz)
         ratios = damping_ratio(larger.poles)
         if fit.cost - larger.cost < threshold or (ratios > _MOST_DAMPING).any():
             keep = np.arange(len(proposed)) != best
             proposed, waves = proposed[keep], waves.reshape(len(samples), -1, 2)[:, keep].reshape(len(samples), -1)
-            if not len(proposed):
-                return fit
             continue
         fit = larger
-    return fit
+        if (_significance(fit, rate_hz)[len(believed.poles):] >= threshold).all():
+            believed = fit
+    return believed
 
 
-def _different(poles: Complex) -> Complex:
+def _bounded(poles: Complex, duration_s: float) -> npt.NDArray[np.bool_]:
+    """Which poles grow little enough, if at all, to be those of a record of this duration."""
+    return np.asarray((damping_ratio(poles) > _LEAST_DAMPING) & (poles.real * duration_s < _MOST_GROWTH))
+
+
+def _different(poles: Complex, duration_s: float) -> Complex:
     """Poles that could be modes, one of those that are alike within a per cent of damping."""
-    ratios = damping_ratio(poles)
-    poles = poles[(ratios > _LEAST_DAMPING) & (ratios < _MOST_DAMPING)]
+    poles = poles[_bounded(poles, duration_s) & (damping_ratio(poles) < _MOST_DAMPING)]
     cells = np.round(np.log(poles) / _ALIKE)
     return np.asarray(poles[np.unique(cells, return_index=True)[1]])
 
@@ -209,7 +249,7 @@ def _fewer(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: 
     """
     best = fit
     for found in diagram:
-        poles = _different(found.poles)
+        poles = _different(found.poles, len(samples) / rate_hz)
         if not 0 < len(poles) <= len(fit.poles):
             continue
         trial = _refit(_solve(samples, poles, rate_hz), samples, rate_hz)
@@ -224,7 +264,7 @@ def _price(fit: _Fit, threshold: float) -> float:
 
 
 def _gains(fit: _Fit, waves: Array) -> Array:
-    """Chi-squared by which each proposed pole would better the fit."""
+    """Chi-squared by which each proposed pole would better the fit, by channel (m, channels)."""
     new = waves - fit.orthonormal @ (fit.orthonormal.T @ waves)
     cos, sin = new[:, ::2], new[:, 1::2]
     cc, ss, cs = (cos**2).sum(axis=0), (sin**2).sum(axis=0), (cos * sin).sum(axis=0)
@@ -232,7 +272,7 @@ def _gains(fit: _Fit, waves: Array) -> Array:
     size = cc * ss - cs**2
     size = np.where(size > 1e-9 * (waves[:, ::2] ** 2).sum(axis=0) ** 2, size, np.inf)[:, None]
     explained = (ss[:, None] * seen_cos**2 + cc[:, None] * seen_sin**2 - 2 * cs[:, None] * seen_cos * seen_sin) / size
-    return np.asarray((explained / fit.noise).sum(axis=1))
+    return np.asarray(explained / fit.noise)
 
 
 def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[list[FoundMode], list[Rejected]]:

@@ -38,7 +38,7 @@ class SummedSpectrum:
 
 def summed_spectrum(samples: Array, rate_hz: float, segments: int) -> SummedSpectrum:
     """Power spectra of equal segments of a record (samples, channels)."""
-    length = len(samples) // segments
+    length = len(samples) // max(segments, 1)
     if segments < FEWEST_SEGMENTS or length < _SHORTEST_SEGMENT:
         raise ValueError(f"expected {FEWEST_SEGMENTS} segments or more of {_SHORTEST_SEGMENT} samples or more, found "
                          f"{segments} of {length}")

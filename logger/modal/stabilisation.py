@@ -30,7 +30,7 @@ _SAME_SD, _SAME_SHARE = 3.0, 0.01
 _MOST_DAMPING = 0.9
 _LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
 _LARGEST_DAMPING_ERROR = 0.15
-_HUM_DAMPING = 5e-4
+_HUM_DAMPING, _NO_DAMPING = 5e-4, 1e-6
 
 
 def best_size(misfit: Array, count: int, parameters_per_step: int) -> int:
@@ -78,7 +78,7 @@ def _why_not(frequency_hz: float, ratio: float, frequency_std_hz: float, damping
         return "it grows instead of decaying"
     if ratio > _MOST_DAMPING:
         return "damped so heavily that it hardly swings"
-    if ratio < _HUM_DAMPING and ratio < 2 * damping_std:
+    if ratio < _NO_DAMPING or ratio < min(_HUM_DAMPING, 2 * damping_std):
         return "no damping to be seen: a hum, not a mode"
     if frequency_std_hz > _LARGEST_FREQUENCY_ERROR * frequency_hz:
         return f"its frequency is uncertain by {frequency_std_hz / frequency_hz:.0%}"

@@ -216,6 +216,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     (MASS, ("--step", "start_m=5,height_m=0"), "expected a height other than 0"),
     ("bump.height_m", (), "give it a bump or a step first"),
     ("run3.speed_scale", (), "there are 2 runs"),
+    (f"each.{MASS}", (), "expected a number of the road after each."),
     ("mass", (), "no parameter 'mass'; expected one of sprung_mass_kg"),
     ("", (), "expected names with commas"),
     ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every number once"),

@@ -108,6 +108,11 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
     (["FILE", "--to", "0.5"], "expected at least 100 samples, found 51"),
     (["FILE", "--method", "decrement"], "expected one column"),
     (["FILE", "--method", "fft", "--segments", "100"], "found 100 of 10"),
+    (["FILE", "--method", "fft", "--segments", "0"], "expected 4 segments or more"),
+    (["FILE", "--method", "fft", "--order", "4"], "--order: expected a method with poles, not --method fft"),
+    (["FILE", "--method", "decrement", "--response", "decay"], "--response: expected a method with poles"),
+    (["FILE", "--segments", "4"], "--segments: expected --method fft with it, found ssi"),
+    (["FILE", "--method", "n4sid", "--input", "top", "--response", "random"], "--response: expected no --input"),
     (["FILE", "--order", "0"], "expected an order of 2 or more"),
     (["FILE", "--example", "five-storey"], "expected no FILE"),
 ])

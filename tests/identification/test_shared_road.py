@@ -44,7 +44,7 @@ def response(car: Vehicle, *names: str, start: float = 1.0) -> AxleResponse:
 
 
 def found(car: Vehicle, roads: list[list[Drive]], *names: str, start: float = 1.1, **options: float) -> RoadFit:
-    return fit_roads(response(car, *names, start=start), roads, Options(**{"probes": 6, **options}))
+    return fit_roads(response(car, *names, start=start), roads, Options(**{"probes": 6, "last_probes": 6, **options}))
 
 
 @pytest.mark.parametrize("car", [HALF, AWAY, FULL, QUARTER], ids=["half", "away", "full", "quarter"])
@@ -134,6 +134,14 @@ def test_one_drive_over_a_road_of_which_only_the_kind_is_known() -> None:
         assert 0.02 * truth < fitted.standard_errors[name] < 0.2 * truth
     assert fitted.roads[f"road1.{GD_N0}"] == pytest.approx(GD, abs=3.5 * fitted.road_errors[f"road1.{GD_N0}"])
     assert fitted.roads[NOISE] == pytest.approx(NOISE_MPS2, rel=0.1)
+
+
+def test_what_probes_have_in_common_is_small_at_the_end() -> None:
+    """Estimates that differ by nothing but the probes: their scatter is the standard error over the root of so many."""
+    drives = [[driven(HALF, track(60.0, 3), 14.0, 50.0, 3)]]
+    few, many = ([found(HALF, drives, MASS, seed=seed, probes=4, last_probes=count, refuse=False).parameters[MASS]
+                  for seed in range(5)] for count in (4, 64))
+    assert np.std(np.log(many)) < 0.5 * np.std(np.log(few))
 
 
 def test_two_drives_over_one_road_at_different_speeds() -> None:

@@ -200,7 +200,7 @@ def test_names_and_bounds() -> None:
 
 
 @pytest.mark.parametrize(("names", "message"), [
-    (("run2.bump.start_m",), "there are 1 runs"), (("run1.bump.start_m", START), "is free for all runs"),
+    (("run2.bump.start_m",), "there is 1 run"), (("run1.bump.start_m", START), "is free for all runs"),
     ((SPEED, SPEED), "found speed_scale twice"),
 ])
 def test_names_that_do_not_fit(names: tuple[str, ...], message: str) -> None:

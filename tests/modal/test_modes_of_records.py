@@ -65,6 +65,43 @@ def test_the_truth_lies_within_two_errors_as_often_as_it_should() -> None:
     assert np.mean(inside) > 0.88  # of 120
 
 
+@pytest.mark.parametrize("digits", [3, 6, 10])
+def test_noise_that_shrinks_with_the_signal_has_no_modes(digits: int) -> None:
+    clean = free_decay(five([0.01] * 5), np.eye(5)[0], RATE_HZ, 2000)
+    rounded = np.array([[float(f"{one:.{digits}g}") for one in row] for row in clean])
+    check(find_modes(rounded, RATE_HZ, "era").modes, [0.01] * 5, 6.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_sensor_that_errs_by_a_share_of_what_it_reads(seed: int) -> None:
+    clean = free_decay(five([0.01] * 5), np.eye(5)[0], RATE_HZ, 2000)
+    share = 0.02 * np.random.default_rng(seed).standard_normal(clean.shape)
+    check(find_modes(clean * (1 + share), RATE_HZ, "era").modes, [0.01] * 5, 4.0)
+
+
+def test_heavy_modes_in_a_decay_are_taken_in_together() -> None:
+    ratios = [0.35, 0.10, 0.05, 0.30, 0.03]
+    record = noisy(free_decay(five(ratios), np.eye(5)[4], RATE_HZ, 1000), 0.01, 3)
+    found = find_modes(record, RATE_HZ, "era").modes
+    assert len(found) == 5
+    np.testing.assert_allclose([mode.damping_ratio for mode in found], ratios, rtol=0.3)
+
+
+def pair(seconds: float) -> np.ndarray:
+    """Two light modes 2 % apart, in two channels."""
+    t_s = np.arange(round(100 * seconds)) / 100
+    first, second = (np.exp(-r * 2 * np.pi * f * t_s) * np.cos(2 * np.pi * f * t_s) for f, r in ((3.0, 0.01),
+                                                                                              (3.06, 0.012)))
+    noise = 0.02 * np.random.default_rng(0).standard_normal((2, len(t_s)))
+    return np.stack([first + second + noise[0], first - 0.8 * second + noise[1]], axis=1)
+
+
+@pytest.mark.parametrize("method", ["era", "ar", "armax"])
+def test_poles_that_grow_do_no_harm_in_a_long_decay(method: str) -> None:
+    found = find_modes(pair(60.0), RATE_HZ, method, decay=True).modes
+    np.testing.assert_allclose([mode.frequency_hz for mode in found], [3.0, 3.06], rtol=2e-3)
+
+
 def test_heavy_and_light_damping_under_random_forces() -> None:
     ratios = [0.35, 0.10, 0.05, 0.30, 0.03]
     result = find_modes(random_record(five(ratios), 200.0, 1), RATE_HZ, "ssi")
@@ -99,6 +136,15 @@ def test_a_measured_input(method: str, atol: float) -> None:
 def test_white_noise_has_no_modes(method: str) -> None:
     for seed in range(3):
         assert find_modes(np.random.default_rng(seed).standard_normal((3000, 2)), RATE_HZ, method).modes == ()
+
+
+@pytest.mark.parametrize("method", ["ssi", "ssi-cov", "ar", "armax"])
+def test_a_hum_has_no_modes(method: str) -> None:
+    hum = np.sin(2 * np.pi * 5 * np.arange(3000) / 100)
+    for noise in (0.1, 0.0):
+        for seed in range(3 if noise else 1):
+            record = hum + noise * np.random.default_rng(seed).standard_normal(3000)
+            assert find_modes(record[:, None], RATE_HZ, method, decay=False).modes == ()
 
 
 def test_a_decay_of_noise_has_no_modes() -> None:
