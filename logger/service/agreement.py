@@ -20,6 +20,7 @@ from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from math import cos, hypot, inf, nan, radians
 from pathlib import Path
 
@@ -183,6 +184,8 @@ def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridg
     moved_m = _median([found.distance_start_m - wanted.distance_start_m for wanted, found in pairs
                        if found.distance_start_m is not None and wanted.distance_start_m is not None])
     matched = _pairs(expected, rows, shift_us)
+    if session.is_open:
+        matched = _before_utc(matched)
     aligned = _aligned(matched, shift_us)
     differences = tuple(_difference(tolerance, _MEASURES[tolerance.quantity], aligned) for tolerance in TOLERANCES)
     held = {wanted.segment for wanted, _ in matched}
@@ -252,6 +255,13 @@ def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift
             taken.add(found.segment)
             pairs.append((wanted, found))
     return pairs
+
+
+def _before_utc(pairs: Sequence[Pair]) -> list[Pair]:
+    """The pairs of an open log; the expected rows that come before the service had learnt UTC are without it too.
+    Such rows get it when their file is finished. How many they are is chance: a fix may come as a row is written."""
+    undated = list(takewhile(lambda pair: pair[1].utc_us is None, pairs))
+    return [(replace(wanted, utc_us=None), found) for wanted, found in undated] + list(pairs[len(undated):])
 
 
 def _aligned(pairs: Sequence[Pair], shift_us: int) -> list[Pair]:

@@ -250,6 +250,16 @@ def test_other_flags_count_but_not_that_utc_was_still_unknown(rows: list[WindowR
     assert not compare(rows, [gaps], BRIDGE_S).ok
 
 
+def test_rows_written_before_utc_was_known_have_none_only_while_the_log_is_open(rows: list[WindowRecord]) -> None:
+    def undated(first: int, last: int, is_open: bool) -> Session:
+        return logged(rows, lambda n, row: replace(row, utc_us=None, flags=(*row.flags, "time_unset"))
+                      if first <= n < last else row, is_open=is_open)
+
+    assert compare(rows, [undated(0, 5, is_open=True)], BRIDGE_S).ok
+    assert not compare(rows, [undated(0, 5, is_open=False)], BRIDGE_S).ok
+    assert not compare(rows, [undated(10, 15, is_open=True)], BRIDGE_S).ok
+
+
 def test_of_a_drive_sent_twice_the_second_time_counts(rows: list[WindowRecord]) -> None:
     first = logged(rows).rows
     travelled_m = max(row.distance_end_m or 0.0 for row in rows)
