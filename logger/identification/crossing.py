@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.road_in_time import smooth_length
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

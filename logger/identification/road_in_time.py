@@ -16,6 +16,7 @@ from logger.identification.obstacles import ObstaclePath
 from logger.identification.record import Record
 from logger.identification.road_input import SPEED_SCALE, RoadInput
 from logger.roads.track import TirePath
+from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure
 
@@ -49,7 +50,7 @@ class RoadInTime:
         ahead_m = distance[-1] - distance[-2]
         way = np.concatenate([distance[0] + pace_m * np.arange(-lead, 0), distance,
                               distance[-1] + ahead_m * np.arange(1, 2 * half)])
-        self._way_m = _finer(way, self._steps)
+        self._way_m = finer(way, self._steps)
         self._count = smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
         self._kept = slice(lead + record.first, lead + len(distance))
         damping = -np.log(_ROUND_THE_END) * rate_hz / self._count
@@ -124,24 +125,3 @@ class RoadInTime:
         rest = len(back) - len(rise)
         back[len(rise):] = rise[-1] * 0.5 * (1 + np.cos(np.pi * np.arange(rest) / rest))
         return np.fft.rfft(back * self._fading)[: len(self.s)] * self._filter
-
-
-def _finer(distance: Array, steps: int) -> Array:
-    """Distances ``steps`` times as dense: cubics with the slopes that the neighbours give."""
-    slope = np.gradient(distance)
-    along = np.arange(steps) / steps
-    rise = np.diff(distance)[:, None]
-    first, last = slope[:-1, None], slope[1:, None]
-    curve = distance[:-1, None] + along * (first + along * (3 * rise - 2 * first - last
-                                                            + along * (first + last - 2 * rise)))
-    return np.append(curve.ravel(), distance[-1])
-
-
-def smooth_length(least: int) -> int:
-    """An even number from ``least`` on that has no prime factor above 5, so that transforms are quick."""
-    best = 2 ** int(np.ceil(np.log2(least)))
-    for fives in range(4):
-        for threes in range(6):
-            odd = 5**fives * 3**threes
-            best = min(best, odd * 2 ** max(1, int(np.ceil(np.log2(least / odd)))))
-    return best

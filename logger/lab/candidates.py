@@ -73,6 +73,7 @@ class Tried:
     gain, judged_gain    how much smaller minus twice the log-likelihood is, of the fitted stretches and of the others
     judged_error         of the stretches that no fit saw
     numbers              how many numbers of the effect were fitted
+    starts               at how many values it was tried
     """
 
     effect: Effect
@@ -81,6 +82,7 @@ class Tried:
     judged_gain: float
     judged_error: float
     numbers: int
+    starts: int
 
     @property
     def whole_gain(self) -> float:
@@ -103,10 +105,12 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves."""
+    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves, of
+    ``count`` that were made."""
 
     effect: Effect
     trials: tuple[Trial, ...]
+    count: int
 
     @property
     def gain(self) -> float:
@@ -117,14 +121,15 @@ class Screened:
 def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -> Screened:
     """Trials of an effect on a model."""
     best: dict[tuple[float, ...], Trial] = {}
-    for values in effect.trials(seen):
+    trials = effect.trials(seen)
+    for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         trial = _trial(problem, base, chosen(effect, values))
         if effect.realigns:
             trial = max(trial, _afresh(problem, base, chosen(effect, values)), key=lambda one: one.gain)
         if choice not in best or trial.gain > best[choice].gain:
             best[choice] = trial
-    return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)))
+    return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)), len(trials))
 
 
 def as_screened(problem: Problem, base: Base, promise: Screened) -> Tried:
@@ -132,7 +137,7 @@ def as_screened(problem: Problem, base: Base, promise: Screened) -> Tried:
     trial = promise.trials[0]
     logs, wander = base.weighed.parted(trial.joined)
     return _tried(problem, base, problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes),
-                  base.slopes)
+                  base.slopes, promise.count)
 
 
 def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
@@ -142,24 +147,25 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
         effects = (*base.state.effects, trial.one)
         if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
             start = problem.laid_out(effects, *base.weighed.parted(trial.joined))
-            tries.append(_tried(problem, base, *settled(problem, start, _ROUNDS)))
+            tries.append(_tried(problem, base, *settled(problem, start, _ROUNDS), promise.count))
             continue
         state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
-        tries.append(_tried(problem, base, improved(base.weighed, state, moves_of(effects), _STEPS), base.slopes))
+        better = improved(base.weighed, state, moves_of(effects), _STEPS)
+        tries.append(_tried(problem, base, better, base.slopes, promise.count))
     return max(tries, key=lambda one: one.gain)
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
     """The same with slopes of its own."""
-    return _tried(problem, base, *settled(problem, one.state, rounds))
+    return _tried(problem, base, *settled(problem, one.state, rounds), one.starts)
 
 
-def _tried(problem: Problem, base: Base, state: State, slopes: Slopes) -> Tried:
+def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:
     effect = state.effects[-1].effect
     numbers = sum(not parameter.choices for parameter in effect.parameters)
     seen = located(problem, state, slopes)
     return Tried(effect, state, base.fitted - problem.deviance(state),
-                 base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers)
+                 base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers, starts)
 
 
 def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:

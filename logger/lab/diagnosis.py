@@ -50,7 +50,7 @@ class Candidate:
     """An effect that was tried on the model of its round.
 
     error              on what no fit saw
-    p_value            how often noise alone would gain as much, times the number of candidates
+    p_value            how often noise alone would gain as much in any of the trials of all candidates
     gain, judged_gain  of minus twice the log-likelihood, of all stretches and of those that no fit saw
     confused_with      effects that explain the same as well
     """
@@ -79,6 +79,7 @@ class Diagnosis:
     candidates     of the first round, with those of later rounds in place of theirs where they were taken; best first
     obstacles      effects that could not be tried, and why
     verdict        effects that the model lacks, the most certain first
+    judged         some stretches were kept from the fits
     """
 
     baseline_error: float
@@ -93,11 +94,17 @@ class Diagnosis:
     before: State
     after: State
     problem: Problem
+    judged: bool
+
+    @property
+    def judged_on(self) -> str:
+        """What the errors of steps and candidates are errors of."""
+        return "stretches that no fit saw" if self.judged else "all samples (too short runs to keep any from the fits)"
 
 
 @dataclass(frozen=True, eq=False)
 class _Taken:
-    """An effect that was taken, as it was tried in its round."""
+    """An effect that was taken, as it was tried in its round, which had so many trials."""
 
     tried: Tried
     rivals: tuple[str, ...]
@@ -123,10 +130,10 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
         tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
         first = first or tried
-        best = next((one for one in tried if _accepted(problem, one, len(left), explained)), None)
+        best = next((one for one in tried if _accepted(problem, one, _starts(tried), explained)), None)
         if best is None:
             break
-        taken.append(_Taken(best, _rivals(best, tried, problem), len(left)))
+        taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         now = Base.of(problem, *settled(problem, best.state))
         explained = before.fitted + before.judged - now.fitted - now.judged
@@ -143,7 +150,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
         unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=after,
-        problem=whole,
+        problem=whole, judged=any(one.judges for one in problem.stretches),
     )
 
 
@@ -193,10 +200,16 @@ def _merit(one: Tried) -> float:
 
 
 def _p_value(gain: float, numbers: int, count: int) -> float:
-    """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction)."""
+    """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction). Shapes
+    that have no meaning without a strength (a knee, a frequency) count by the values that they were tried at."""
     from scipy.special import gammaincc
 
     return float(min(1.0, count * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
+
+
+def _starts(tried: Sequence[Tried]) -> int:
+    """How many trials a round had."""
+    return sum(one.starts for one in tried)
 
 
 def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
@@ -210,7 +223,7 @@ def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
 
 def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
     """Effects that explain as well what this one explains; none for one that explains nothing."""
-    worthy = [other for other in tried if _accepted(problem, other, len(tried), 0.0)]
+    worthy = [other for other in tried if _accepted(problem, other, _starts(tried), 0.0)]
     if one not in worthy:
         return ()
     near = max(_ALIKE, _ALIKE_SHARE * one.whole_gain)
@@ -260,7 +273,7 @@ def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Seque
     for name in verdict:
         one = own[name]
         found.append(_candidate(one.tried, one.count, one.rivals, values[name]))
-    found += [_candidate(tried, len(first), _rivals(tried, first, problem), None)
+    found += [_candidate(tried, _starts(first), _rivals(tried, first, problem), None)
               for tried in first if tried.effect.name not in verdict]
     return tuple(found)
 

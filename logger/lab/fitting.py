@@ -34,6 +34,7 @@ _FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e6
 # A step that gains less than this share of a degree of freedom ends a fit.
 _SMALL_GAIN = 0.05
 _SETTLING_STEPS, _SETTLED = 5, 2.0
+_RIDGE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,14 +259,14 @@ def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
 
 
 def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
-    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,)."""
+    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound."""
     steps = []
     for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
         usual = abs(parameter.coordinate(parameter.start))
         step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
-        forward = parameter.coordinate(parameter.value(here + step)) - here
-        steps.append(step if abs(forward) > 0.5 * step else -step)
+        forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
+        steps.append(forward if abs(forward) > 0.5 * step else back)
     return np.array(steps)
 
 
@@ -320,7 +321,9 @@ def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tupl
     alone = np.sum([one @ one.T for one in own], axis=0)
     information = np.block([[weighed.information, mixed], [mixed.T, alone]])
     pulled = np.sum([one @ rest for one, rest in zip(own, left, strict=True)], axis=0)
-    return information + 1e-12 * np.eye(len(information)), np.concatenate([gradient, pulled])
+    sizes = np.diag(information)
+    ridge = _RIDGE * np.where(sizes > 0, sizes, 1.0)  # a number that does nothing stays where it is
+    return information + np.diag(ridge), np.concatenate([gradient, pulled])
 
 
 def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
@@ -333,16 +336,19 @@ def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
 def settled(problem: Problem, state: State, rounds: int = 6) -> tuple[State, Slopes]:
     """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
 
-    Returns the state, laid out, and slopes taken near it.
+    Returns the most likely state that was met, laid out, and slopes taken near it.
     """
     moves = moves_of(state.effects)
     state = problem.laid_out(state.effects, state.logs, state.wander)
-    last, slopes = problem.deviance(state), problem.slopes(state)
+    least, slopes = problem.deviance(state), problem.slopes(state)
     for done in range(1, rounds + 1):
         weighed = Weighed(problem, slopes, problem.whiteners(state))
-        state = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)
-        now = problem.deviance(state)
-        if now > last - _SETTLED or done == rounds:
+        trial = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)
+        now = problem.deviance(trial)
+        if now >= least:  # by the weights of before it was better
             break
-        last, slopes = now, problem.slopes(state)
+        gained, least, state = least - now, now, trial
+        if gained < _SETTLED or done == rounds:
+            break
+        slopes = problem.slopes(state)
     return state, slopes

@@ -118,7 +118,7 @@ def _errors(found: Verdict) -> str:
     by_step = [f"{step.error:.3f} {_STEP_WORDS.get(step.words, step.words)}" for step in diagnosis.steps]
     floor = diagnosis.noise_floor_error
     noise = "" if floor is None else f" The sensor's noise alone makes about {floor:.3f} of all samples."
-    return f"Error on stretches that no fit saw: {', '.join(by_step)}.{noise}"
+    return f"Error on {diagnosis.judged_on}: {', '.join(by_step)}.{noise}"
 
 
 _STEP_WORDS = {

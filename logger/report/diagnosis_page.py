@@ -69,7 +69,7 @@ def _tiles(found: Verdict) -> str:
 
 
 def _steps(diagnosis: Diagnosis) -> str:
-    drawn = falling("Error on stretches that no fit saw", [(step.words, step.error) for step in diagnosis.steps],
+    drawn = falling(f"Error on {diagnosis.judged_on}", [(step.words, step.error) for step in diagnosis.steps],
                     diagnosis.noise_floor_error)
     rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(diagnosis.steps)]
     return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
@@ -83,7 +83,7 @@ def falling(title: str, steps: Sequence[tuple[str, float]], floor: float | None)
 def _candidates(found: Verdict) -> str:
     return (grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
             + '<p class="hint">Each tried alone on the model of its round, those of the verdict first. The error is on '
-            "stretches that no fit saw; the chance holds for all candidates together.</p>")
+            f"{found.diagnosis.judged_on}; the chance holds for all candidates together.</p>")
 
 
 def _where(shape: Shape) -> str:

@@ -29,6 +29,9 @@ Parameters = dict[str, float]
 KINDS = ("none", "one", "two", "outsider", "two_outsider")
 SKIPPED_S = 2.0  # at the start of every run, left out of every error
 VISIBLE = 2.0
+NUMBERS_OFF = 0.04
+LENGTHS_OFF = (0.005, 0.02, 0.04)
+"""By what shares a data sheet may be wrong, drawn evenly up to them; a case has one of those for its lengths."""
 _SEARCH_STEP_S = 1 / 1000
 _TRIES = 8
 
@@ -113,16 +116,18 @@ def draw_car(rng: np.random.Generator, model: str) -> Car:
 
 
 def mistaken(rng: np.random.Generator, car: Car) -> Car:
-    """The car as its data sheet has it: every number off a little, geometry less."""
-    def off(value: float, share: float = 0.04) -> float:
+    """The car as its data sheet has it: every number off by up to 4 %, geometry by as much or by less."""
+    lengths = float(rng.choice(LENGTHS_OFF))
+
+    def off(value: float, share: float = NUMBERS_OFF) -> float:
         return float(f"{value * (1 + rng.uniform(-share, share)):.5g}")
 
     def axle(one: Axle) -> Axle:
-        return Axle(off(one.cg_distance_m, 0.005), off(one.unsprung_mass_kg), off(one.suspension_stiffness_n_per_m),
+        return Axle(off(one.cg_distance_m, lengths), off(one.unsprung_mass_kg), off(one.suspension_stiffness_n_per_m),
                     off(one.suspension_damping_n_s_per_m), off(one.tire_stiffness_n_per_m))
 
     return Car(car.model, off(car.sprung_mass_kg), off(car.pitch_inertia_kg_m2), axle(car.front),
-               axle(car.rear) if car.rear else None, off(car.contact_patch_m, 0.005))
+               axle(car.rear) if car.rear else None, off(car.contact_patch_m, lengths))
 
 
 _FASTEST_MPS = {"A": 30.0, "B": 30.0, "C": 22.0, "D": 14.0}
@@ -157,7 +162,7 @@ def draw_drives(rng: np.random.Generator, rough: int) -> tuple[Drive, ...]:
 def draw_noise(rng: np.random.Generator) -> Noise:
     if rng.random() < 0.3:
         return Noise(0.01, HUNDREDTH_G_MPS2)
-    return Noise(float(np.exp(rng.uniform(*np.log([0.02, 0.1])))), 0.0)
+    return Noise(float(np.exp(rng.uniform(*np.log([0.02, 0.1])))), 0.0, bool(rng.random() < 0.3))
 
 
 def _noise_rms(noise: Noise) -> float:

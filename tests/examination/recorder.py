@@ -23,6 +23,7 @@ RATE_HZ = 100
 HUNDREDTH_G_MPS2 = 0.0980665
 REACH_S = 0.19  # half the length of the anti-alias filter
 _CUTOFF_HZ = 44.0
+_FINER = 5
 _KAISER_BETA = 6.76  # 70 dB (Kaiser, 1974)
 
 
@@ -46,14 +47,25 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Noise:
-    """White noise and rounding; ``step_mps2`` 0 rounds only as the file does."""
+    """White noise and rounding; ``step_mps2`` 0 rounds only as the file does. ``filtered``: the noise arises before the
+    anti-alias filter, and goes through it."""
 
     white_mps2: float
     step_mps2: float
+    filtered: bool = False
 
     def add(self, clean: Array, rng: np.random.Generator) -> Array:
-        noisy = clean + self.white_mps2 * rng.standard_normal(clean.size)
+        noisy = clean + self.white_mps2 * self._unit(clean.size, rng)
         return self.step_mps2 * np.round(noisy / self.step_mps2) if self.step_mps2 else noisy
+
+    def _unit(self, count: int, rng: np.random.Generator) -> Array:
+        """Noise whose density in the band is that of white noise of deviation 1."""
+        if not self.filtered:
+            return rng.standard_normal(count)
+        step_s = 1 / (_FINER * RATE_HZ)
+        reach = int(np.ceil(REACH_S / step_s))
+        fine = np.sqrt(_FINER) * rng.standard_normal(_FINER * count + 2 * reach)
+        return band_limited(fine, -reach * step_s, step_s, np.arange(count) / RATE_HZ)
 
 
 @njit(cache=True, error_model="numpy")

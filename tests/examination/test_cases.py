@@ -84,6 +84,7 @@ def test_steps_are_fine_enough_for_the_sharpest_laws(name: str) -> None:
 
 def test_cars_lie_where_they_should_and_data_sheets_are_off_a_little() -> None:
     rng = RNG(0)
+    lengths = []
     for _ in range(300):
         car = draw_car(rng, "half_car")
         assert 400 <= car.sprung_mass_kg <= 1200
@@ -98,7 +99,9 @@ def test_cars_lie_where_they_should_and_data_sheets_are_off_a_little() -> None:
             assert 1.0 <= axle.cg_distance_m <= 1.8
         sheet = mistaken(rng, car)
         assert 0 < abs(sheet.sprung_mass_kg / car.sprung_mass_kg - 1) < 0.0401
-        assert abs(sheet.wheelbase_m / car.wheelbase_m - 1) < 0.0051
+        lengths.append(abs(sheet.wheelbase_m / car.wheelbase_m - 1))
+    assert max(lengths) < 0.0401
+    assert np.mean(np.array(lengths) < 0.0051) > 0.33
 
 
 def test_the_same_seed_makes_the_same_case_and_another_another() -> None:

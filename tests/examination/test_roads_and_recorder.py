@@ -102,10 +102,13 @@ def test_clipping_drift_and_engine() -> None:
     assert grown == pytest.approx((1 + 0.5 * at / at[-1]) * np.sin(4 * np.pi * at), abs=3e-3)
 
 
-def test_noise_is_white_or_rounded() -> None:
+def test_noise_is_white_or_filtered_or_rounded() -> None:
     rng = np.random.default_rng(0)
     clean = rng.standard_normal(20_000)
     assert (Noise(0.05, 0.0).add(clean, rng) - clean).std() == pytest.approx(0.05, rel=0.03)
+    filtered = Noise(0.05, 0.0, filtered=True).add(clean, rng) - clean
+    assert welch(filtered, 100, nperseg=400)[1][20:150].mean() == pytest.approx(0.05**2 / 50, rel=0.05)
+    assert welch(filtered, 100, nperseg=400)[1][-4:].mean() < 0.01 * 0.05**2 / 50
     stepped = Noise(0.01, HUNDREDTH_G_MPS2).add(clean, rng)
     assert stepped / HUNDREDTH_G_MPS2 == pytest.approx(np.round(stepped / HUNDREDTH_G_MPS2))
     assert (stepped - clean).std() == pytest.approx(np.hypot(0.01, HUNDREDTH_G_MPS2 / np.sqrt(12)), rel=0.03)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cars import STEP_S, Car, Physics
-from cases import SKIPPED_S, Case, without
+from cases import LENGTHS_OFF, NUMBERS_OFF, SKIPPED_S, Case, without
 from recorder import RATE_HZ, Sensor
 from scene import Scene, measured
 
@@ -27,7 +27,8 @@ UNSEEN = np.sqrt(1.01**2 - 1)
 """A remainder below this, in units of the noise, raises the error by less than 1 %."""
 
 _STEP = 0.01
-_NUMBER, _LENGTH = 0.04 / np.sqrt(3), 0.005 / np.sqrt(3)  # deviations of what is drawn evenly up to these shares
+# Deviations of what is drawn evenly up to these shares.
+_NUMBER, _LENGTH = NUMBERS_OFF / np.sqrt(3), np.sqrt(np.mean(np.square(LENGTHS_OFF)) / 3)
 _START_M, _SCALE = 0.02, 0.001
 
 

@@ -17,10 +17,14 @@ def test_two_thirds_of_the_time_are_fitted_and_the_rest_judges() -> None:
     stretches = Stretches(run_of(200 + 36 * 100))
     assert stretches.judges
     assert stretches.fit.sum() == pytest.approx(36 * 100 * FIT_S / (FIT_S + JUDGE_S))
+    shorter = Stretches(run_of(200 + 12 * 100))
+    assert shorter.judges
+    assert shorter.fit.sum() == pytest.approx(8 * 100, abs=1)
 
 
 def test_a_run_too_short_to_judge_is_fitted_whole() -> None:
-    stretches = Stretches(run_of(200 + 1300))
+    assert Stretches(run_of(200 + 1300)).judges
+    stretches = Stretches(run_of(200 + 800))
     assert not stretches.judges
     assert stretches.fit.all()
 
