@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.passage import smooth_length
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
