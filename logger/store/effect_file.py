@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from logger.store.yaml_lines import Node
 from logger.vehicle.effect import Chosen, Effect, Parameter, chosen
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.watched_effect import watched
 
 
 @cache
@@ -29,13 +30,14 @@ def shipped_effects() -> Mapping[str, Effect]:
 
 
 def own_effect(path: Path) -> Effect:
-    """The effect that a user's own Python file offers. Raises BadInput that names the file and what it lacks."""
+    """The effect that a user's own Python file offers. Raises BadInput that names the file and what it lacks; so does
+    the effect, whenever it is asked and fails or gives no answer."""
     effect = offered_by(path, "EFFECT")
     with blamed_on(path):
         effect = look_through(effect)
     if effect.name in shipped_effects():
         raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}")
-    return effect
+    return watched(effect, partial(blamed_on, path))
 
 
 def effect_named(text: str) -> tuple[Effect, str | None]:
@@ -53,15 +55,11 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
 
 def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool) -> None:
     """Raise BadInput if the effect cannot be there in this car on this road; a user's own is tried on the car."""
-    if one.file is None:
-        obstacle = one.effect.obstacle(vehicle, two_tracks)
-    else:
-        with blamed_on(Path(one.file)):
-            obstacle = one.effect.obstacle(vehicle, two_tracks)
-            if obstacle is None:
-                try_out(one.effect, one.p, vehicle)
+    obstacle = one.effect.obstacle(vehicle, two_tracks)
     if obstacle is not None:
         raise BadInput(f"{one.effect.name}: {obstacle}")
+    if one.file is not None:
+        try_out(one.effect, one.p, vehicle)
 
 
 # --- in a vehicle's file ---

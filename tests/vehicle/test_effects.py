@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import permutations, product
 from pathlib import Path
@@ -22,6 +23,7 @@ from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.passage import Passage
 from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.watched_effect import watched
 
 EFFECTS = shipped_effects()
 UNITS = ("_m", "_kg", "_hz", "_s", "_n", "_n_per_m", "_n_per_m3", "_n_s_per_m", "_m_per_s", "_kg_m2")
@@ -161,7 +163,7 @@ def test_a_car_that_is_let_be_never_shakes_more(name: str) -> None:
 def test_it_answers_in_the_shape_it_is_asked(name: str) -> None:
     for car in CARS.values():
         if can(EFFECTS[name], car):
-            try_out(EFFECTS[name], usual(EFFECTS[name]).p, car)
+            try_out(watched(EFFECTS[name], nullcontext), usual(EFFECTS[name]).p, car)
 
 
 def test_the_order_in_which_effects_are_named_does_not_matter() -> None:

@@ -1,0 +1,197 @@
+"""A user's own effect, watched wherever it is asked.
+
+Problem: whatever a user's effect answers is used far from it, in the middle of a fit that asks at values nobody tried:
+an exception, an array of another shape or one number that is none end there in a complaint about something else.
+Solution: an effect that asks the user's own and looks at every answer, those of the laws that it gives too. What is
+wrong is raised where the user's file can be blamed for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import fields, is_dataclass, replace
+from numbers import Real
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import (
+    BodyEffect,
+    DriveEffect,
+    Effect,
+    ForceEffect,
+    Misalignment,
+    SensorEffect,
+    VehicleEffect,
+)
+from logger.vehicle.laws import CornerLaws
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import Structure
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Blame = Callable[[], AbstractContextManager[object]]
+"""Something to ask the effect in, which turns what is raised there into a complaint about its file."""
+
+
+def watched(effect: Effect, blame: Blame) -> Effect:
+    """The effect, every answer of which is looked at. ValueError, raised in ``blame``, for one that is no answer; what
+    the effect itself raises is raised there too."""
+    kind = next(watched for kind, watched in _WATCHED.items() if isinstance(effect, kind))
+    return kind(effect, blame)
+
+
+class _Watched(Effect):
+    """What all kinds are asked."""
+
+    def __init__(self, own: Any, blame: Blame) -> None:
+        self._own, self._blame = own, blame
+        self.name, self.title, self.parameters = own.name, own.title, own.parameters
+        self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
+        self.realigns, self.stage = own.realigns, own.stage
+
+    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
+        with self._blame():
+            why = self._own.obstacle(vehicle, two_tracks)
+            if why is not None and not (isinstance(why, str) and why.strip()):
+                raise ValueError(f"expected obstacle to answer with words or None, found {why!r}")
+        return why
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        with self._blame():
+            found = self._own.trials(seen)
+            if not isinstance(found, list) or not found or not all(isinstance(one, Mapping) for one in found):
+                raise ValueError("expected trials to answer with a list of values by the names of the parameters, as "
+                                 f"in [{{...}}], found {found!r}")
+            for name, value in (pair for one in found for pair in one.items()):
+                if not isinstance(value, Real):
+                    raise ValueError(f"expected trials to answer with a number as {name}, found {value!r}")
+            return [self.checked(one) for one in found]
+
+
+class _WatchedDrive(_Watched, DriveEffect):
+    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
+        with self._blame(), np.errstate(all="ignore"):
+            return _numbers("driven", self._own.driven(p, distance_m.copy()), distance_m)
+
+
+class _WatchedVehicle(_Watched, VehicleEffect):
+    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+        with self._blame():
+            found: Vehicle = _kept("vehicle", self._own.vehicle(p, vehicle), Vehicle)
+            for name, value in _plain_numbers(found):
+                if not np.isfinite(value):
+                    raise ValueError(f"expected vehicle to answer with finite numbers, found {name} {value}")
+            _check_stands(structure_of(found), "vehicle")
+        return found
+
+
+class _WatchedBody(_Watched, BodyEffect):
+    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+        with self._blame():
+            found: Structure = _kept("structure", self._own.structure(p, structure), Structure)
+            n, w = len(found.mass), len(structure.wheels)
+            shapes = {"mass": (n, n), "damping": (n, n), "stiffness": (n, n), "road": (n, w), "behind_m": (w,),
+                      "left_m": (w,), "contact_patch_m": (), "body": (n, 3), "wheels": (w, n), "travel": (w, n),
+                      "springs": (w,), "dampers": (w,), "tires": (w,)}
+            for name, shape in shapes.items():
+                _numbers(f"structure, in {name},", getattr(found, name), np.zeros(shape))
+            _check_stands(found, "structure")
+        return found
+
+
+class _WatchedForce(_Watched, ForceEffect):
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        with self._blame():
+            found: CornerLaws = _kept("laws", self._own.laws(p, laws), CornerLaws)
+            _check_numbers(found, laws)
+        known = {id(law) for law in (laws.damper, *laws.springs, *laws.others, *laws.tires)}
+
+        def own(name: str, law: Callable[..., Array]) -> Callable[..., Array]:
+            return law if id(law) in known else self._watched_law(name, law)
+
+        return replace(
+            found, damper=own("the damper", found.damper), springs=tuple(own("a spring", law) for law in found.springs),
+            others=tuple(own("a force", law) for law in found.others),
+            tires=tuple(own("a tire", law) for law in found.tires),
+        )
+
+    def _watched_law(self, name: str, law: Callable[..., Array]) -> Callable[..., Array]:
+        def asked(*at: Array) -> Array:
+            with self._blame(), np.errstate(all="ignore"):
+                return _numbers(name, law(*(one.copy() for one in at)), at[0])
+
+        return asked
+
+
+class _WatchedSensor(_Watched, SensorEffect):
+    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+        with self._blame(), np.errstate(all="ignore"):
+            return _numbers("factor", self._own.factor(p, s.copy()), s)
+
+
+_WATCHED: dict[type[Effect], type[_Watched]] = {
+    DriveEffect: _WatchedDrive, VehicleEffect: _WatchedVehicle, BodyEffect: _WatchedBody, ForceEffect: _WatchedForce,
+    SensorEffect: _WatchedSensor,
+}
+
+
+# --- what an answer has to be ---
+
+
+def _kept(name: str, found: Any, kind: type) -> Any:
+    if not isinstance(found, kind):
+        raise ValueError(f"expected {name} to answer with a {kind.__name__}, found {type(found).__name__}")
+    return found
+
+
+def _numbers(name: str, found: npt.ArrayLike, like: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """An answer as numbers of the kind and shape of ``like``."""
+    numbers = np.asarray(found)
+    if numbers.shape != like.shape:
+        raise ValueError(f"expected {name} to answer with an array of shape {like.shape}, as it was asked, found one "
+                         f"of shape {numbers.shape}")
+    if not np.can_cast(numbers.dtype, like.dtype, "same_kind"):
+        raise ValueError(f"expected {name} to answer with {like.dtype} numbers, found {numbers.dtype}")
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"expected {name} to answer with finite numbers")
+    return np.asarray(numbers, like.dtype)
+
+
+def _plain_numbers(vehicle: Any) -> Iterator[tuple[str, float]]:
+    """All numbers of a vehicle, with those of its axles and its sensor."""
+    for field in fields(vehicle):
+        value = getattr(vehicle, field.name)
+        if is_dataclass(value):
+            yield from ((f"{field.name}.{name}", number) for name, number in _plain_numbers(value))
+        elif value is not None and not isinstance(value, str):
+            yield field.name, value
+
+
+def _check_stands(structure: Structure, name: str) -> None:
+    """ValueError for a car that has no weight, or does not stand on its springs."""
+    for what, matrix in (("masses", structure.mass), ("springs", structure.stiffness)):
+        if not np.linalg.eigvalsh(matrix)[0] > 0:
+            raise ValueError(f"expected {name} to answer with a car whose {what} are all above 0")
+
+
+def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
+    """ValueError for numbers that no corner has."""
+    for name in ("dry_friction_n", "tire_damping_n_s_per_m", "mount_n_per_m"):
+        value = getattr(laws, name)
+        infinite = name == "mount_n_per_m" and value == np.inf
+        if not (infinite or (np.ndim(value) == 0 and np.isfinite(value) and value >= 0)):
+            raise ValueError(f"expected laws to answer with {name} of 0 or more, found {value}")
+    if laws.damping_n_s_per_m != before.damping_n_s_per_m:
+        raise ValueError("expected laws to leave damping_n_s_per_m as it was: another damper is "
+                         "replace(laws, damper=...)")
+    for name in ("springs", "others", "tires"):
+        some = getattr(laws, name)
+        if not isinstance(some, tuple) or not all(map(callable, some)):
+            raise ValueError(f"expected laws to answer with a tuple of functions as {name}, found {some!r}")
+    if not callable(laws.damper):
+        raise ValueError(f"expected laws to answer with a function as damper, found {laws.damper!r}")
