@@ -132,16 +132,17 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
     return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)), len(trials))
 
 
-def as_screened(problem: Problem, base: Base, promise: Screened) -> Tried:
+def as_screened(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
     """The model of ``base`` with an effect at its most promising trial, not fitted further."""
     trial = promise.trials[0]
     logs, wander = base.weighed.parted(trial.joined)
-    return _tried(problem, base, problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes),
-                  base.slopes, promise.count)
+    state = problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes)
+    return [_tried(problem, base, state, base.slopes, promise.count)]
 
 
-def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
-    """The model of ``base`` with an effect, fitted with all the others, on the slopes of ``base``."""
+def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
+    """The model of ``base`` with an effect, fitted with all the others, on the slopes of ``base``: one for each choice
+    that no fit moves."""
     tries = []
     for trial in promise.trials:
         effects = (*base.state.effects, trial.one)
@@ -152,7 +153,7 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> Tried:
         state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
         better = improved(base.weighed, state, moves_of(effects), _STEPS)
         tries.append(_tried(problem, base, better, base.slopes, promise.count))
-    return max(tries, key=lambda one: one.gain)
+    return tries
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:

@@ -184,14 +184,24 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
         deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
         progress(f"fitting {len(deep)} of them")
-        tried = sorted(pool.map(
+        tried = [one for some in pool.map(
             lambda one: (fitted if one.effect.name in deep else as_screened)(problem, now, one), promises,
-        ), key=_merit)
-        finalists = [one for one in tried[:_MOST_FINALISTS] if one.effect.name in deep
-                     and one.whole_gain > _FINALIST_SHARE * tried[0].whole_gain]
+        ) for one in some]
+        best = _best_of_each(tried)
+        finalists = {one.effect.name for one in best[:_MOST_FINALISTS] if one.effect.name in deep
+                     and one.whole_gain > _FINALIST_SHARE * best[0].whole_gain}
         progress(f"settling {len(finalists)} of them")
-        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
-    return sorted([*further, *(one for one in tried if one not in finalists)], key=_merit)
+        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS),
+                                [one for one in tried if one.effect.name in finalists]))
+    return _best_of_each([*further, *(one for one in tried if one.effect.name not in finalists)])
+
+
+def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
+    """Of every effect the model that is best, best first."""
+    found: dict[str, Tried] = {}
+    for one in sorted(tried, key=_merit):
+        found.setdefault(one.effect.name, one)
+    return list(found.values())
 
 
 def _merit(one: Tried) -> float:

@@ -224,7 +224,7 @@ def test_a_drive_of_a_car_with_effects(folder: Path, capsys: pytest.CaptureFixtu
         {"effect": "dry_friction", "parameters": {"friction_force_n": 90.0}},
         {"effect": "wheel_lift", "parameters": {}},
         {"effect": "body_bending",
-         "parameters": {"frequency_hz": 22.0, "damping_ratio": 0.04, "participation": -0.3}},
+         "parameters": {"frequency_hz": 22.0, "damping_ratio": 0.04, "participation": -0.3, "ends_move": 0.0}},
     ]
     car = car_with(**{one["effect"]: one["parameters"] for one in made["effects"]})
     assert run.accel_z_mps2 == pytest.approx(recorded(car, Passage(run.track, 100.0, run.distance_m)), abs=1e-6)

@@ -71,7 +71,7 @@ def test_an_effect_is_found_with_its_number_and_its_error() -> None:
     problem = Problem(runs, vehicle, Tolerance(), whole=True)
     base = Base.of(problem, *settled(problem, problem.start()))
     seen = misalignment(problem, base.state)
-    found = fitted(problem, base, screened(problem, base, EFFECTS["damper_asymmetry"], seen))
+    (found,) = fitted(problem, base, screened(problem, base, EFFECTS["damper_asymmetry"], seen))
     assert found.gain > 100
     added = add(problem, [], found.state.effects)
     ratio, true = added.effects[0].values["rebound_to_bump_ratio"], truth["effects"][0]["parameters"]
