@@ -109,10 +109,11 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         nominal = problem.start(given.model.effects)
         base = Base.of(problem, *settled(problem, nominal))
         tell(f"searching for {effect.name}")
-        tried = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
+        tries = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
-    return chosen(effect, {**tried.state.effects[-1].values, **values})
+    best = max(tries, key=lambda one: one.gain)
+    return chosen(effect, {**best.state.effects[-1].values, **values})
 
 
 def added(given: Bench, start: Chosen) -> Gained:

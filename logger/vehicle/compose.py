@@ -19,7 +19,7 @@ from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.passage import Passage
 from logger.vehicle.state_space import driven_outputs, straight_step
-from logger.vehicle.stepping import force_input, march
+from logger.vehicle.stepping import Motion, force_input, march
 from logger.vehicle.structure import Structure, body_point
 from logger.vehicle.vehicle import Axle, Vehicle
 
@@ -109,16 +109,20 @@ def recorded(car: Car, passage: Passage) -> Array:
     The passage is over where the car truly was: ``car.driven`` of what was recorded.
     """
     if car.bends_laws:
-        return passage.recorded(_nonlinear(car, passage)[0], car.factor)
-    return passage.recorded(_linear(car, passage), car.factor)
+        fine = _accelerations(car, moved(car, passage), passage.under_wheels(car.structure)[0])
+    else:
+        fine = _linear(car, passage)
+    return passage.recorded(fine, car.factor)
 
 
 def respond(car: Car, passage: Passage) -> Response:
     """The record with the motions behind it."""
     structure = car.structure
-    accel, states, elevation = _nonlinear(car, passage)
+    motion = moved(car, passage)
+    elevation, _ = passage.under_wheels(structure)
+    accel = _accelerations(car, motion, elevation)
     n = len(structure.mass)
-    states, elevation = passage.sampled(states), passage.sampled(elevation)
+    states, elevation = passage.sampled(motion.states), passage.sampled(elevation)
     coordinates, velocities = states[:, :n], states[:, n:]
     road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
     return Response(
@@ -127,38 +131,47 @@ def respond(car: Car, passage: Passage) -> Response:
     )
 
 
+def moved(car: Car, passage: Passage) -> Motion:
+    """How the car moved at the fine instants, the front left wheel's first place its level."""
+    if car.bends_laws:
+        return march(car.structure, car.laws, *passage.under_wheels(car.structure), passage.step_s)
+    states = _in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
+    return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
+
+
 def _axles(vehicle: Vehicle) -> list[Axle]:
     """The axle of each wheel, in the order of the structure's wheels."""
     axles = [vehicle.front] if vehicle.rear is None else [vehicle.front, vehicle.rear]
     return [axle for axle in axles for _ in range(2)] if vehicle.model == "full_car" else axles
 
 
+def _accelerations(car: Car, motion: Motion, elevation: Array) -> Array:
+    """Of the sensor at the fine instants (M,) [m/s2]."""
+    structure = car.structure
+    n = len(structure.mass)
+    a, b = structure.state_space()
+    accel = motion.states @ (car.row @ a[n:]) + elevation @ (car.row @ b[n:])
+    return np.asarray(accel + motion.forces @ (car.row @ force_input(structure)[n:]))
+
+
 def _linear(car: Car, passage: Passage) -> Array:
     """The sensor's acceleration at the fine instants (M,), of a car without laws of its own."""
-    structure = car.structure
+    n = len(car.structure.mass)
+    a, b = car.structure.state_space()
+    seen = _in_blocks(car.structure, passage, (car.row @ a[n:])[None])[:, 0]
+    return np.asarray(seen + passage.under_wheels(car.structure)[0] @ (car.row @ b[n:]))
+
+
+def _in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
+    """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car from rest."""
     elevation, mean = passage.under_wheels(structure)
     a, b = structure.state_space()
     around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
     transition, at_start, at_end = straight_step(a, b, passage.step_s)
     gain = np.hstack([at_start + at_end, at_end - at_start])
-    n = len(structure.mass)
-    rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
-    inputs = np.hstack([mean, (around[2:] - around[:-2]) / 4])
-    observe = (car.row @ a[n:])[None]
-    seen = driven_outputs(transition, gain, observe, inputs, rest)[:, 0]
-    return np.asarray(seen + elevation @ (car.row @ b[n:]))
-
-
-def _nonlinear(car: Car, passage: Passage) -> tuple[Array, Array, Array]:
-    """The sensor's acceleration (M,), the states (M, 2 n) and the elevations (M, w) at the fine instants."""
-    structure = car.structure
-    elevation, mean = passage.under_wheels(structure)
-    motion = march(structure, car.laws, elevation, mean, passage.step_s)
-    a, b = structure.state_space()
-    n = len(structure.mass)
-    accel = motion.states @ (car.row @ a[n:]) + elevation @ (car.row @ b[n:])
-    accel += motion.forces @ (car.row @ force_input(structure)[n:])
-    return accel, motion.states, elevation
+    rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]),
+                           np.zeros(len(structure.mass))])
+    return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]), rest)
 
 
 def with_effect(effects: Sequence[Chosen], one: Chosen) -> tuple[Chosen, ...]:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.compose import Car
+from logger.vehicle.compose import Car, moved
 from logger.vehicle.passage import Passage
-from logger.vehicle.stepping import force_input, march
+from logger.vehicle.stepping import force_input
 from logger.vehicle.structure import Output
 
 Array = npt.NDArray[np.float64]
@@ -23,8 +23,8 @@ def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
     in them. Heights count from where the front left wheel begins."""
     structure = car.structure
     n = len(structure.mass)
-    elevation, mean = passage.under_wheels(structure)
-    motion = march(structure, car.laws, elevation, mean, passage.step_s)
+    motion = moved(car, passage)
+    elevation, _ = passage.under_wheels(structure)
     observe, direct = structure.output_matrices(outputs)
     onto = force_input(structure)[n:]
     pushed = np.array([one.row @ onto if one.order == 2 else np.zeros(onto.shape[1]) for one in outputs])

@@ -21,9 +21,11 @@ from logger.vehicle.structure import Structure
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-# The car comes to the first sample over so much road, at the speed it has there, and drives on after the last one.
+# The car comes to the first sample over so much road, at the speed it has there, and drives on after the last one. Both
+# are as long as the acceleration may be late against the position or early, the latter with the half of the recorder's
+# filter that looks ahead, down to 50 samples a second.
 APPROACH_S = 2.0
-_TAIL_S = 1.0
+_TAIL_S = 2.5
 # What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
 _REST_S = 1.0
 _KEPT_PLACES = 3

@@ -244,6 +244,19 @@ def test_a_late_clock_and_a_gain_shift_and_stretch_the_record() -> None:
     assert record(HALF, usual(EFFECTS["sensor_gain"], gain=1.07)) == pytest.approx(1.07 * plain, abs=1e-12)
 
 
+@pytest.mark.parametrize("delay_s", [-2.0, -1.5, 2.0])
+def test_a_clock_as_wrong_as_may_be_shifts_the_record_too(delay_s: float) -> None:
+    """The record of a car that drove on as it did at the end, and came as it did at the beginning."""
+    shift, steps = round(100 * delay_s), np.arange(-400, 650)
+    longer = recorded(compose(HALF), Passage(ROAD, 100.0, 20.0 + 8.0 * steps / 100))
+    late = recorded(compose(HALF, [usual(EFFECTS["time_offset"], delay_s=delay_s)]),
+                    Passage(ROAD, 100.0, 20.0 + 8.0 * np.arange(250) / 100))
+    first = 400 - shift
+    counted = slice(max(0, shift), 250)  # before, the car comes to the road
+    assert np.abs(late[-50:]).max() > 0.01
+    assert late[counted] == pytest.approx(longer[first : first + 250][counted], abs=0.02)
+
+
 def test_a_recorded_distance_is_longer_than_the_way_by_the_scale() -> None:
     car = compose(HALF, [usual(EFFECTS["speed_scale"], scale=1.02)])
     assert car.driven(np.array([102.0])) == pytest.approx([100.0])

@@ -22,9 +22,11 @@ from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import structure_of
+from logger.vehicle.observe import observed
 from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import recorder_taps
 from logger.vehicle.stepping import march, static_tire_loads_n
+from logger.vehicle.structure import suspension_travel, wheel
 from logger.vehicle.vehicle import Axle, Vehicle
 
 from newton import road_under
@@ -303,3 +305,19 @@ def test_a_linear_car_is_stepped_as_in_blocks() -> None:
         car = compose(read_vehicle(vehicle_file(name)))
         passage = Passage(BUMP, 100.0, SPEED_MPS * np.arange(200) / 100)
         assert recorded(replace(car, bends_laws=True), passage) == pytest.approx(recorded(car, passage), abs=1e-9)
+
+
+def test_motions_of_a_linear_car_are_stepped_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    passage = Passage(BUMP, 100.0, SPEED_MPS * np.arange(200) / 100)
+    for name in ("rav4-2009", "rav4-2009-full", "golden-car"):
+        car = compose(read_vehicle(vehicle_file(name)), [effect("sensor_gain", gain=1.1)])
+        outputs = [suspension_travel(car.structure, 0), wheel(car.structure, 0)]
+        expected = respond(replace(car, bends_laws=True), passage)
+        also = observed(replace(car, bends_laws=True), passage, outputs)
+        with monkeypatch.context() as without:
+            without.setattr("logger.vehicle.compose.march", None)
+            found = respond(car, passage)
+            assert observed(car, passage, outputs) == pytest.approx(also, abs=1e-9)
+        for motion in ("accel_z_mps2", "travel_m", "rate_mps", "deflection_m", "deflection_mps"):
+            assert np.abs(getattr(expected, motion)).max() > 1e-4
+            assert getattr(found, motion) == pytest.approx(getattr(expected, motion), abs=1e-9)
