@@ -99,7 +99,7 @@ class _Said:
         kind = fields[0][2:]
         at = {"RMC": 3, "GGA": 2}.get(kind)
         for text in fields[1:]:
-            if re.fullmatch(r"-?[0-9]*\.?[0-9]*", text) and re.search("[0-9]", text):
+            if re.fullmatch(r"-?[0-9]*(\.[0-9]*)?", text) and re.search("[0-9]", text):
                 self.numbers.add(round(float(text), 9))
         if at is not None and len(fields) > at + 3:
             self.clocks.add(_clock_us(fields[1]))
