@@ -18,7 +18,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import Bench, add_bench_arguments, bench, columns, on_screen, paragraphs, wipe
+from logger.commands.lab_model import (
+    Bench,
+    add_bench_arguments,
+    bench,
+    check_out,
+    columns,
+    on_screen,
+    paragraphs,
+    tell_slow,
+    wipe,
+)
 from logger.commands.simulate import named_numbers
 from logger.errors import EXIT_DONE, BadInput
 
@@ -44,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     check_out(args.out, args.runs)
     given = bench(args)
     effect, file, values = asked_for(args.effect, given)
+    check_out(args.out, args.runs, map(Path, [*given.files.values(), *([] if file is None else [file])]))
     given = replace(given, effects={**given.effects, effect.name: effect},
                     files={**given.files, effect.name: file} if file is not None else given.files)
     try:
@@ -59,20 +70,10 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def check_out(out: Path, runs: list[Path]) -> None:
-    """Raise BadInput where the file to write is one of a run, or its folder is none."""
-    from logger.store.drive_file import DRIVE, PROFILE
-
-    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
-        raise BadInput(f"--out {out}: expected a file that is none of a run's")
-    if not out.parent.is_dir() or out.is_dir():
-        raise BadInput(f"--out {out}: expected a file in a folder that there is")
-
-
 def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, float]]:
     """An effect as it was asked for, the file it is from, and what was said of its numbers. BadInput where it is not
     known, is in the model already, or cannot be there."""
-    from logger.store.effect_file import check_on, effect_named
+    from logger.store.effect_file import effect_named
     from logger.vehicle.effect import chosen
 
     name, values = named_numbers(text, "add-effect")
@@ -86,7 +87,8 @@ def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, fl
         whole = effect.checked(_usual(effect) | values)
     except ValueError as error:
         raise BadInput(f"{text}: {error}") from None
-    check_on(given.model.vehicle, chosen(effect, whole, file=file), given.two_tracks)
+    given.try_out(chosen(effect, whole, file=file))
+    tell_slow([effect])
     return effect, file, values
 
 

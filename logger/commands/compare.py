@@ -17,6 +17,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.commands.lab_model import check_model, check_out
 from logger.commands.lab_runs import lab_runs
 from logger.errors import EXIT_DONE, BadInput
 
@@ -42,8 +43,12 @@ def run(args: argparse.Namespace) -> int:
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_model
 
-    model = read_model(vehicle_path(args.vehicle))
+    path = vehicle_path(args.vehicle)
+    model = read_model(path)
+    if args.out is not None:
+        check_out(args.out, args.runs, [path, *(Path(one.file) for one in model.effects if one.file is not None)])
     runs = lab_runs(args.runs)
+    check_model(args.vehicle, model, runs)
     try:
         found = compare(runs, model.vehicle, model.effects)
     except ValueError as error:

@@ -14,10 +14,20 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import Bench, add_bench_arguments, bench, columns, on_screen, paragraphs, wipe
+from logger.commands.lab_model import (
+    Bench,
+    add_bench_arguments,
+    bench,
+    check_out,
+    columns,
+    on_screen,
+    paragraphs,
+    wipe,
+)
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -45,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
 
         return run_same_road(args)
     given = bench(args)
+    if args.out is not None:
+        check_out(args.out, args.runs, given.files_read)
     found = diagnosed(given)
     if args.out is not None:
         from logger.report.diagnosis_page import page
@@ -69,7 +81,9 @@ def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
     tell = on_screen()
     effects = {name: effect for name, effect in given.effects.items() if name not in left_out}
     try:
-        return told(diagnose(given.problem(whole=False), effects, given.model.effects, tell), effects, tell)
+        found = diagnose(given.problem(whole=False), effects, given.model.effects, tell)
+        finely = found.problem.start(given.model.effects)  # a search simulates less finely
+        return told(replace(found, baseline_error=found.problem.error(finely)), effects, tell)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     finally:

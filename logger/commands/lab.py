@@ -21,7 +21,7 @@ from logger.commands.add_effect import added, asked_for, model_of, searched
 from logger.commands.add_effect import lines as added_lines
 from logger.commands.diagnose import diagnosed
 from logger.commands.diagnose import lines as diagnosis_lines
-from logger.commands.lab_model import Bench, add_bench_arguments, bench, on_screen, paragraphs, wipe
+from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -74,6 +74,8 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise BadInput(f"--out {out}: expected a folder") from None
+    for file in (out / STORY, *(_vehicle_file(out, number + 1) for number in range(_MOST_ROUNDS))):
+        check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read)
     tell(_chapter("Compare", why.get("compare")))
     first = _compared(given)
     tell(_comparison_lines(first))
@@ -119,9 +121,13 @@ def _round(given: Bench, start: Chosen, out: Path, number: int) -> Round:
     finally:
         wipe()
     model = model_of(given, gained)
-    file = out / f"vehicle-{number}.yaml"
+    file = _vehicle_file(out, number)
     write_model(file, model)
     return Round(gained, _compared(replace(given, model=model)), str(file))
+
+
+def _vehicle_file(out: Path, number: int) -> Path:
+    return out / f"vehicle-{number}.yaml"
 
 
 def _searched(given: Bench, name: str) -> Chosen:

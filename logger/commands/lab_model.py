@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
@@ -24,6 +25,7 @@ WIDTH = 100
 TOLERANCE = 0.04
 _TOLERANCES = (0.001, 0.5)
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
+_SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
 
 
@@ -55,6 +57,21 @@ class Bench:
 
         runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
         return Problem(runs, self.model.vehicle, Tolerance(numbers=self.numbers), whole=whole)
+
+    def try_out(self, one: Chosen) -> None:
+        """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
+        from logger.store.effect_file import check_on
+
+        check_on(self.model.vehicle, one, self.two_tracks)
+        if one.file is not None and not slow([one.effect]):
+            _check_bounded(one.file, self.model, self.runs, [one])
+
+    @property
+    def files_read(self) -> list[Path]:
+        """Files of the vehicle and of the user's own effects."""
+        from logger.shipped import vehicle_path
+
+        return [vehicle_path(self.word), *map(Path, self.files.values())]
 
     def filed(self, one: Chosen) -> Chosen:
         """An effect that knows which file it is from, where it is the user's own."""
@@ -104,19 +121,85 @@ def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str],
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
         effects[effect.name], files[effect.name] = effect, file
     found = Bench(vehicle, model, lab_runs(folders), effects, files, tolerance / _BAND_DEVIATIONS)
+    check_model(vehicle, model, found.runs)
     _try_own(found, effect_files)
     return found
 
 
+def check_model(word: str, model: Model, runs: Runs) -> None:
+    """Raise BadInput where an effect of the model cannot be on one of the runs, or the model's motion grows without
+    bound; say so first where it takes long.
+
+    word    by which the vehicle was named on the command line
+    """
+    for run in runs.runs:
+        for one in model.effects:
+            why = one.effect.obstacle(model.vehicle, run.two_tracks)
+            if why is not None:
+                raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
+    tell_slow([one.effect for one in model.effects])
+    if model.effects:
+        _check_bounded(word, model, runs, model.effects)
+
+
+def _check_bounded(word: str, model: Model, runs: Runs, effects: Sequence[Chosen]) -> None:
+    """Raise BadInput where the car with these effects shakes itself to pieces on the runs."""
+    from logger.lab.prediction import bounded
+    from logger.vehicle.compose import compose
+
+    try:
+        predictions = runs.predict(compose(model.vehicle, effects))
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None
+    if not bounded(predictions):
+        names = " and ".join(one.effect.name for one in effects)
+        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+
+
+def slow(effects: Iterable[Effect]) -> list[str]:
+    """Names of those that are simulated in plain Python, where there is no compiler."""
+    from logger.vehicle.effect import ForceEffect
+
+    names = [one.name for one in effects if isinstance(one, ForceEffect)]
+    if names:
+        from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
+        return [] if COMPILED else names
+    return []
+
+
+def tell_slow(effects: Iterable[Effect]) -> None:
+    """Say on stderr that simulations with these effects take long, if they do."""
+    if names := slow(effects):
+        print(f"Without the lab extra (pip install '.[lab]') simulations with {' and '.join(names)} take some hundred "
+              f"times longer: {_SLOW}.", file=sys.stderr, flush=True)
+
+
 def _try_own(found: Bench, files: Sequence[str]) -> None:
     """Try the effects of these files on the car, at the values that a search begins at."""
-    from logger.store.effect_file import check_on
     from logger.vehicle.effect import chosen
 
     for name, effect in found.effects.items():
         if found.files.get(name) in files and effect.obstacle(found.model.vehicle, found.two_tracks) is None:
             for values in effect.trials():
-                check_on(found.model.vehicle, chosen(effect, values, file=found.files[name]), found.two_tracks)
+                found.try_out(chosen(effect, values, file=found.files[name]))
+
+
+def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option: str = "--out") -> None:
+    """Raise BadInput where a file to write is one of a run or another that is read, or cannot be written.
+
+    runs    their folders
+    """
+    from logger.store.drive_file import DRIVE, PROFILE
+
+    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
+        raise BadInput(f"{option} {out}: expected a file that is none of a run's")
+    if out.resolve() in {path.resolve() for path in read}:
+        raise BadInput(f"{option} {out}: expected another file than those that are read")
+    if not out.parent.is_dir() or out.is_dir():
+        raise BadInput(f"{option} {out}: expected a file in a folder that there is")
+    if not os.access(out if out.exists() else out.parent, os.W_OK):
+        raise BadInput(f"{option} {out}: expected a file that may be written")
 
 
 def on_screen() -> Callable[[str], None]:

@@ -19,10 +19,12 @@ from __future__ import annotations
 import argparse
 import inspect
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.lab_model import check_out
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -104,9 +106,12 @@ def _simulate(args: argparse.Namespace) -> None:
 
     _check_given(args)
     _check_numbers(args)
-    vehicle, effects = _model(args.vehicle, args.effect)
+    check_out(args.out, ())
+    if args.profile_out is not None:
+        check_out(args.profile_out, (), option="--profile-out")
+    vehicle, effects, said = _model(args.vehicle, args.effect)
     track = _with_obstacles(_road(args), args.obstacle)
-    car = _car(vehicle, effects, track)
+    car = _car(vehicle, effects, said, track)
     outputs = _outputs(args.output, car.vehicle, car.structure)
     motion = _motion(args, track, float(car.structure.behind_m.max()))
     if effects:
@@ -177,8 +182,8 @@ def _check_range(name: str, value: float, lowest: float, highest: float, unit: s
         raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}")
 
 
-def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...]]:
-    """The vehicle and its effects, those of its file and those asked for."""
+def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
+    """The vehicle and its effects, those of its file and those asked for, and where each was said, by name."""
     from logger.shipped import vehicle_path
     from logger.store.effect_file import effect_named
     from logger.store.vehicle_file import read_model
@@ -186,28 +191,31 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...]]:
     from logger.vehicle.effect import chosen
 
     model = read_model(vehicle_path(name))
-    effects, asked = model.effects, set()
+    effects, asked = model.effects, dict[str, str]()
     for text in wanted:
         effect_name, values = named_numbers(text, "--effect")
         effect, file = effect_named(effect_name)
         if effect.name in asked:
             raise BadInput(f"--effect {text}: expected each effect once")
-        asked.add(effect.name)
+        asked[effect.name] = f"--effect {text}"
         usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
         try:
             effects = with_effect(effects, chosen(effect, usual | values, file=file))
         except ValueError as error:
             raise BadInput(f"--effect {text}: {error}") from None
-    return model.vehicle, effects
+    return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked
 
 
-def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], track: Track) -> Car:
-    """The vehicle with its effects, which are possible on this road."""
+def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], said: Mapping[str, str], track: Track) -> Car:
+    """The vehicle with its effects, which are possible on this road; ``said`` where, by name."""
     from logger.store.effect_file import check_on
     from logger.vehicle.compose import compose
 
     for one in effects:
-        check_on(vehicle, one, track.elevation_m.ndim == 2)
+        try:
+            check_on(vehicle, one, track.elevation_m.ndim == 2)
+        except BadInput as error:
+            raise BadInput(f"{said[one.effect.name]}: {error}") from None
     try:
         return compose(vehicle, effects)
     except ValueError as error:
@@ -377,6 +385,7 @@ def _respond_with_effects(
     """The columns of a car with effects, and the motion as it is recorded."""
     import numpy as np
 
+    from logger.lab.prediction import bounded
     from logger.vehicle.compose import recorded
     from logger.vehicle.observe import observed, recorded_distance
     from logger.vehicle.passage import Passage
@@ -392,6 +401,8 @@ def _respond_with_effects(
             if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
                 raise BadInput(f"{car.vehicle.name}: its effects are too strong for its masses: they would need steps "
                                f"shorter than {1000 / FINE_RATE_HZ:g} ms")
+    if not bounded([accel]):
+        raise BadInput(f"{car.vehicle.name}: with its effects the car's motion grows without bound")
     columns = {"accel_z_mps2": accel}
     if more:
         columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))

@@ -24,6 +24,8 @@ from logger.vehicle.simulate import FINE_RATE_HZ
 Array = npt.NDArray[np.float64]
 
 SKIP_S = 2.0
+MOST_MPS2 = 1e6
+"""Predictions end here: those of a car whose motion grows without bound, which effects may make."""
 _KEPT_PASSAGES = 3
 
 
@@ -80,7 +82,9 @@ class Runs:
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         """
-        return [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
+        return [np.clip(np.nan_to_num(one, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2) for one in found]
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
@@ -99,6 +103,11 @@ class Runs:
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)
         return found
+
+
+def bounded(predictions: Sequence[Array]) -> bool:
+    """Whether the car that they are of moves as cars do, and does not shake itself to pieces."""
+    return all(float(np.abs(one).max()) < MOST_MPS2 for one in predictions)
 
 
 def error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:

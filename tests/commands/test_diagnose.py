@@ -47,6 +47,8 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
     assert told["not_tried"].keys() == {"roll"}
     assert {one["effect"] for one in told["candidates"]} == set(FEW) - {"roll"}
     assert told["unexplained_shape"] is None
+    assert main(["compare", "--vehicle", "rav4-2009", *offset_runs, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["error"] == told["baseline_error"]
     html = page.read_text("utf-8")
     assert "sensor_offset is missing" in html and html.count("<svg") == 1
 

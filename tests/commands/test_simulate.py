@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -314,11 +315,33 @@ def test_an_effect_of_ones_own(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
     ("dry_friction:force=3", "--effect dry_friction:force=3: dry_friction has no parameter 'force'; expected friction"),
     ("dry_friction:friction_force_n=-3", "--effect dry_friction:friction_force_n=-3: dry_friction: expected friction_"),
     ("dry_friction:friction_force_n", "--effect dry_friction:friction_force_n: expected PARAM=NUMBER, found 'friction"),
-    ("roll", "roll: the profile has one track; it needs elevation_right_m"),
+    ("roll", "--effect roll: roll: the profile has one track; it needs elevation_right_m"),
     ("mine.py:x=3", "mine.py: expected a readable file (No such file or directory)"),
 ])
 def test_effects_that_will_not_do(folder: Path, effect: str, complaint: str) -> None:
     assert refusal(folder, "--speed", "20", "--effect", effect).startswith(complaint)
+
+
+@pytest.mark.parametrize(("effect", "words"), [
+    ("{name: roll, track_width_m: 1.5, roll_inertia_kg_m2: 500}", "car.yaml: roll: the profile has one track"),
+    ("{name: shakes, file: shakes.py}", "rav4-2009: with its effects the car's motion grows without bound"),
+])
+def test_effects_of_the_vehicles_file_that_will_not_do(folder: Path, effect: str, words: str) -> None:
+    (folder / "shakes.py").write_text(
+        "from dataclasses import replace\nfrom logger.vehicle.effect import BodyEffect\n\nclass Shakes(BodyEffect):\n"
+        "    name = title = source = signature = shown_by = 'shakes'\n    def structure(self, p, structure):\n"
+        "        return replace(structure, damping=-9 * structure.damping)\nEFFECT = Shakes()\n")
+    car = folder / "car.yaml"
+    car.write_text(vehicle_file("rav4-2009").read_text().replace("effects: []", f"effects: [{effect}]"))
+    with pytest.raises(BadInput, match=words):
+        simulated(folder, "--speed", "20", vehicle=str(car))
+    assert not (folder / "drive.csv").exists()
+
+
+def test_where_nothing_can_be_written(folder: Path) -> None:
+    for arguments, words in ((("--out", str(folder / "none" / "drive.csv")), "--out .*in a folder that there is"),
+                             (("--profile-out", str(folder)), "--profile-out .*in a folder that there is")):
+        assert re.match(words, refusal(folder, "--speed", "20", *arguments))
 
 
 def test_an_effect_twice_is_refused(folder: Path) -> None:
