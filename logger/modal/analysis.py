@@ -39,6 +39,7 @@ SHORTEST = 100  # samples
 
 _SEGMENTS = 30
 _MOST_LAGGED = 200  # lagged samples in one regression
+_LEAST_PAST, _MOST_PAST = 20, 300  # lags of the past that a state is made of, at most so many samples in all
 _MOST_STATES = 40
 _BEYOND = 8  # states beyond the chosen order, for the stabilisation diagram
 _DECAY_RATIO = 3.0
@@ -84,7 +85,7 @@ def find_modes(
     scale = samples.std(axis=0)
     whole = samples if inputs is None else np.hstack([samples, inputs])
     spread = whole.std(axis=0)
-    plan = _plan(method, (whole - whole.mean(axis=0)) / spread, samples.shape[1], rate_hz)
+    plan = _plan(method, (whole - whole.mean(axis=0)) / spread, samples.shape[1], rate_hz, order or 0)
     segments = segment_products(plan.data, plan.lags, min(_SEGMENTS, len(samples) // (2 * plan.lags)))
     moments = segments.whole()
     if order is not None and order not in plan.orders:
@@ -119,7 +120,7 @@ def _proposer(method: str, order: int | None) -> Callable[[Array, float], tuple[
     def propose(samples: Array, rate_hz: float) -> tuple[OrderPoles, ...]:
         if method == "era":
             return proposals(samples, rate_hz) if order is None else proposals(samples, rate_hz, order)
-        plan = _plan(method, samples - samples.mean(axis=0), samples.shape[1], rate_hz)
+        plan = _plan(method, samples - samples.mean(axis=0), samples.shape[1], rate_hz, order or 0)
         moments = segment_products(plan.data, plan.lags, 1).whole()
         tried = [n for n in plan.orders if order is None or n <= order]
         return tuple(plan.models(moments, tried[len(tried) - 1::-(len(tried) // _PROPOSED_ORDERS + 1)][::-1]))
@@ -127,13 +128,18 @@ def _proposer(method: str, order: int | None) -> Callable[[Array, float], tuple[
     return propose
 
 
-def _plan(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan:
+def _plan(method: str, data: Array, outputs: int, rate_hz: float, least: int) -> _Plan:
+    """``least`` is an order that has to be possible, as far as the record is long enough for it."""
     if method in ("ar", "arx", "armax"):
         return _regression(method, data, outputs, rate_hz)
     channels = data.shape[1]
-    horizon = min(max(_MOST_LAGGED // channels, 30), len(data) // (12 * channels))
-    if horizon < 2:
+    longest = len(data) // (12 * channels)
+    if longest < 2:
         raise ValueError(f"expected at least {24 * channels} samples for {channels} channels, found {len(data)}")
+    horizon = min(max(_MOST_LAGGED // channels, 30), longest)
+    if method in ("ssi", "n4sid"):
+        needed = max(_memory(data, outputs, longest), _LEAST_PAST, least // outputs + 2)
+        horizon = min(needed, longest, max(_MOST_PAST // channels, 30))
     most = min(_MOST_STATES + _BEYOND, (horizon - 1) * outputs) // 2 * 2
     orders = list(range(2, most + 1, 2))
 
@@ -160,6 +166,17 @@ def _plan(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan:
                 for model in subspace.covariance_driven(correlations, wanted)]
 
     return _Plan(data, 2 * horizon, orders, best, models)
+
+
+def _memory(data: Array, outputs: int, longest: int) -> int:
+    """How many lags of the past tell something of the present: twice those that a regression takes (Bauer, 2005).
+
+    Fewer would leave the slowest vibrations too damped; with more, chance enters the state.
+    """
+    most = min(longest, max(_MOST_PAST // data.shape[1], 30))
+    moments = segment_products(data, most + 1, 1).whole()
+    misfit = autoregressive.misfits(moments, Regressors(outputs, data.shape[1] - outputs), most)
+    return 2 * generous_size(misfit, moments.count, outputs * data.shape[1])
 
 
 def _regression(method: str, data: Array, outputs: int, rate_hz: float) -> _Plan:

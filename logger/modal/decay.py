@@ -43,6 +43,7 @@ _FALSE_ALARM = 1e-3  # chance that a record of noise yields a mode
 _MOST_MODES = 40
 _AHEAD = 4  # poles that are tried beyond those that are believed
 _MOST_STEPS = 60
+_FEWEST_TO_TELL = 25  # samples from which the noise is known while a mode lasts
 _LOUDNESS_BINS = 60  # of the residual's spectrum on which the noise around a mode is measured
 _ALIKE = 0.005  # relative distance of poles that are tried once only
 _LEAST_DAMPING, _MOST_DAMPING = -0.05, 0.95
@@ -166,14 +167,18 @@ def _significance(fit: _Fit, rate_hz: float) -> Array:
 
 
 def _freedom(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
-    """How many samples (m,) the squared envelope of each pole counts, those that the fit took for itself left out."""
+    """How many samples (m,) the envelope of each pole counts, those that the fit took for itself left out."""
     envelope, left = _envelope(fit, poles, rate_hz)
     return np.asarray(np.maximum((envelope @ left) ** 2 / (envelope**2 @ left + 1e-300), 1.0))
 
 
 def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
-    """Squared envelopes (m, samples), and the share of its noise (samples,) that the fit left in each sample."""
-    fall = np.minimum(poles.real, 0.0)  # what grows lasts all along
+    """Squared envelopes (m, samples), and the share of its noise (samples,) that the fit left in each sample.
+
+    What grows lasts all along. What is over in a few samples, most of whose noise the fit took, is given some more: too
+    few tell nothing of the noise, and heavily damped modes would drown in what is not known of it.
+    """
+    fall = np.clip(poles.real, -rate_hz / _FEWEST_TO_TELL, 0.0)
     envelope = np.exp(2 * np.outer(fall, np.arange(len(fit.residual)) / rate_hz))
     return envelope, np.maximum(1 - (fit.orthonormal**2).sum(axis=1), 0.0)
 
@@ -196,7 +201,7 @@ def _louder_nearby(fit: _Fit, rate_hz: float) -> Array:
 
 
 def _louder_meanwhile(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
-    """Under the squared envelope of each pole (m, channels), but for what the fit took of the noise there."""
+    """Under the envelope of each pole (m, channels), but for what the fit took of the noise there."""
     envelope, left = _envelope(fit, poles, rate_hz)
     kept = np.maximum(envelope @ left, 1e-12 * envelope.sum(axis=1))
     return np.asarray(envelope @ fit.residual**2 / (kept[:, None] * fit.noise))

@@ -6,7 +6,8 @@ all orders and pick by eye the ones that stay.
 Solution, in words that are printed with the result: the order is where a further state stops paying for itself
 (Schwarz's criterion on the one-step errors). A pole of that order is a mode when it swings, when its frequency and
 damping come with errors small enough to mean something, and when models of the next orders have it too, within those
-errors.
+errors or a third of half its width. Where the damping is known to a sixth of itself it needs no such witness: larger
+models split what is heavily damped, and a pole that chance made has no damping that is known so well.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from logger.modal.mode import (
 )
 
 _NEIGHBOURS, _MUST_HAVE_IT = 4, 3
-_SAME_SD, _SAME_SHARE = 3.0, 0.01
+_SAME_SD, _SAME_SHARE, _SAME_WIDTH = 3.0, 0.01, 0.3  # standard deviations; of its frequency; of half its width
+_KNOWN_WELL = 6.0
 _MOST_DAMPING = 0.9
 _LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
 _LARGEST_DAMPING_ERROR = 0.15
@@ -62,7 +64,8 @@ def judge(
         frequency_std, damping_std = errors_of(complex(pole), covariance[k])
         reason = "" if peaks[k] else "no peak of its own: it shapes the floor between the peaks"
         reason = reason or _why_not(frequency, ratio, frequency_std, damping_std)
-        reason = reason or _comes_and_goes(found, k, covariance, larger)
+        if ratio < _KNOWN_WELL * damping_std:
+            reason = reason or _comes_and_goes(found, k, covariance, larger)
         if reason:
             rejected.append(Rejected(frequency, ratio, reason))
         else:
@@ -90,7 +93,7 @@ def _why_not(frequency_hz: float, ratio: float, frequency_std_hz: float, damping
 def _comes_and_goes(found: OrderPoles, k: int, covariance: Array, larger: list[OrderPoles]) -> str:
     near = larger[:_NEIGHBOURS]
     pole = found.poles[k]
-    reach = max(_SAME_SD * float(np.sqrt(np.trace(covariance[k]))), _SAME_SHARE * abs(pole))
+    reach = max(_SAME_SD * float(np.sqrt(np.trace(covariance[k]))), _SAME_SHARE * abs(pole), _SAME_WIDTH * -pole.real)
     having = sum(bool(len(model.poles)) and bool(np.abs(model.poles - pole).min() <= reach) for model in near)
     if having >= min(_MUST_HAVE_IT, len(near)):
         return ""
