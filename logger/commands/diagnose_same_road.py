@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.commands.lab_model import columns, on_screen, paragraphs, wipe
+from logger.commands.lab_runs import check_record
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.lab.prediction import Run
     from logger.lab.unmeasured_diagnosis import Found
+    from logger.store.drive_file import Drive
 
 _SHOWN = 8
-_LEAST_S = 5.0
-_SAME_RATE = 1e-6
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 
 
@@ -38,6 +38,10 @@ def run_same_road(args: argparse.Namespace) -> int:
     if args.out is not None:
         raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
     runs, model = _drives(args.runs), read_model(vehicle_path(args.vehicle))
+    for one in model.effects:
+        if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
+            raise BadInput(f"{args.vehicle}: its effect {one.effect.name} needs a road that is known under the right "
+                           "wheels too")
     effects = {**shipped_effects(), **{one.effect.name: one.effect for one in model.effects}}
     effects |= {one.name: one for one in map(own_effect, map(Path, args.effect_file))}
     try:
@@ -64,19 +68,13 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")
-    runs: list[Run] = []
+    drives: list[Drive] = []
     for folder in folders:
         drive = read_drive(folder / DRIVE)
-        if len(drive.time_s) < _LEAST_S * drive.rate_hz:
-            raise BadInput(f"{drive.path}: expected a drive of {_LEAST_S:g} s or longer")
-        if runs and abs(drive.rate_hz / runs[0].rate_hz - 1) > _SAME_RATE:
-            raise BadInput(f"{drive.path}: expected {runs[0].rate_hz:g} samples a second, as in {runs[0].name}, found "
-                           f"{drive.rate_hz:g}")
-        if not drive.accel_z_mps2.any():
-            raise BadInput(f"{drive.path}: expected accelerations, found zeros only")
-        runs.append(Run(str(folder), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps,
-                        Track(1.0, np.zeros(2))))
-    return runs
+        check_record(drive, drive.path, drives)
+        drives.append(drive)
+    return [Run(str(folder), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, Track(1.0, np.zeros(2)))
+            for folder, one in zip(folders, drives, strict=True)]
 
 
 def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:

@@ -17,7 +17,7 @@ from logger.errors import BadInput
 
 if TYPE_CHECKING:
     from logger.lab.fitting import Problem
-    from logger.lab.prediction import Runs
+    from logger.lab.prediction import Array, Runs
     from logger.store.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
@@ -25,6 +25,9 @@ WIDTH = 100
 TOLERANCE = 0.04
 _TOLERANCES = (0.001, 0.5)
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
+_LEAST_MPS2 = 1e-4
+_ALIKE, _NEAR = 0.8, 0.3
+_UNITS_MPS2 = {"g": 9.80665, "thousandths of g": 0.00980665, "mm/s2": 0.001}
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
 
@@ -64,7 +67,7 @@ class Bench:
 
         check_on(self.model.vehicle, one, self.two_tracks)
         if one.file is not None and not slow([one.effect]):
-            _check_bounded(one.file, self.model, self.runs, [one])
+            _predicted(one.file, self.model, self.runs, [one])
 
     @property
     def files_read(self) -> list[Path]:
@@ -127,8 +130,8 @@ def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str],
 
 
 def check_model(word: str, model: Model, runs: Runs) -> None:
-    """Raise BadInput where an effect of the model cannot be on one of the runs, or the model's motion grows without
-    bound; say so first where it takes long.
+    """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
+    the road moves no car, or the sensor was upside down or reads in another unit; say so first where it takes long.
 
     word    by which the vehicle was named on the command line
     """
@@ -138,12 +141,37 @@ def check_model(word: str, model: Model, runs: Runs) -> None:
             if why is not None:
                 raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
     tell_slow([one.effect for one in model.effects])
-    if model.effects:
-        _check_bounded(word, model, runs, model.effects)
+    _check_sensor(runs, _predicted(word, model, runs, model.effects))
 
 
-def _check_bounded(word: str, model: Model, runs: Runs, effects: Sequence[Chosen]) -> None:
-    """Raise BadInput where the car with these effects shakes itself to pieces on the runs."""
+def _check_sensor(runs: Runs, predictions: Sequence[Array]) -> None:
+    """Raise BadInput where no road moves the car, or what was measured is the model upside down or in another unit."""
+    import numpy as np
+
+    moves = False
+    for run, prediction in zip(runs.runs, predictions, strict=True):
+        measured, model = run.measured_mps2[run.first:], prediction[run.first:]
+        power = float(model @ model)
+        if power < _LEAST_MPS2**2 * len(model):
+            continue
+        moves = True
+        both = float(measured @ model)
+        alike = both / float(np.sqrt((measured @ measured) * power))
+        if alike < -_ALIKE:
+            raise BadInput(f"{run.name}: expected accelerations up positive, found them upside down: turned over, they "
+                           f"go with the model (correlation {-alike:.2f})")
+        if alike > _ALIKE:
+            unit = next((unit for unit, size in _UNITS_MPS2.items() if abs(both / power * size - 1) < _NEAR), None)
+            if unit is not None:
+                raise BadInput(f"{run.name}: expected accelerations in m/s2, found {both / power:.3g} times what the "
+                               f"model says: they seem to be in {unit}")
+    if not moves:
+        raise BadInput(f"{runs.runs[0].name}: expected a drive over a road that moves the car; where it was the "
+                       "profile is flat, or it stood still")
+
+
+def _predicted(word: str, model: Model, runs: Runs, effects: Sequence[Chosen]) -> list[Array]:
+    """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
     from logger.lab.prediction import bounded
     from logger.vehicle.compose import compose
 
@@ -154,6 +182,7 @@ def _check_bounded(word: str, model: Model, runs: Runs, effects: Sequence[Chosen
     if not bounded(predictions):
         names = " and ".join(one.effect.name for one in effects)
         raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+    return predictions
 
 
 def slow(effects: Iterable[Effect]) -> list[str]:

@@ -10,48 +10,73 @@ from logger.errors import BadInput
 
 if TYPE_CHECKING:
     from logger.lab.prediction import Runs
-    from logger.store.drive_file import Run as Drive
+    from logger.store.drive_file import Drive
+    from logger.store.drive_file import Run as DriveOnRoad
 
 _SAME_RATE = 1e-6
 LEAST_S = 5.0
 _SKIP_S = 2.0  # what the lab leaves out of each run
 _MOST_MEAN_MPS2 = 2.0
+_LEAST_MPS2 = 1e-5  # no sensor is so quiet
+_BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
+_DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
 def lab_runs(folders: Sequence[Path]) -> Runs:
     """The runs in some folders, of one sample rate.
 
-    Raises BadInput for one that cannot be read, is there twice, is shorter than 5 s, has another rate than the first,
-    stands nowhere on its own profile, or recorded nothing.
+    Raises BadInput for one that cannot be read, is there twice, is not what ``check_record`` asks for, or stands
+    nowhere on its own profile.
     """
     from logger.lab.prediction import Run, Runs
-    from logger.store.drive_file import read_run
+    from logger.store.drive_file import DRIVE, read_run
 
-    drives: list[Drive] = []
+    drives: list[DriveOnRoad] = []
     for folder in folders:
         if folder.resolve() in [one.path.resolve() for one in drives]:
             raise BadInput(f"{folder}: expected each run once")
-        drives.append(_checked(read_run(folder), drives))
+        drive = read_run(folder)
+        first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
+        if last_m < drive.track.start_m or first_m > drive.track.end_m:
+            raise BadInput(f"{folder / DRIVE}: expected distances on the profile, {drive.track.start_m:g} to "
+                           f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
+        check_record(drive, folder / DRIVE, drives)
+        drives.append(drive)
     return Runs([Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
                  for one in drives])
 
 
-def _checked(drive: Drive, others: Sequence[Drive]) -> Drive:
-    """A drive that the lab can use beside the others."""
-    file = drive.path / "drive.csv"
+def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
+    """Raise BadInput for a drive that is shorter than 5 s, has another rate than the others, recorded nothing, or whose
+    distances are none: they fall, leap, or have nothing to do with the speed."""
+    import numpy as np
+
+    from logger.store.drive_file import MAX_SPEED_MPS
+
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < LEAST_S:
         raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
-    first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
-    if last_m < drive.track.start_m or first_m > drive.track.end_m:
-        raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to {drive.track.end_m:g} "
-                       f"m, found {first_m:g} to {last_m:g} m")
     counted = drive.accel_z_mps2[int(_SKIP_S * drive.rate_hz):]
-    if not counted.any():
-        raise BadInput(f"{file}: expected accelerations after the first {_SKIP_S:g} s, found zeros only")
+    if np.ptp(counted) == 0:
+        found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"
+        raise BadInput(f"{file}: expected accelerations after the first {_SKIP_S:g} s, found {found}")
+    if counted.std() < _LEAST_MPS2:
+        raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     if abs(counted.mean()) > _MOST_MEAN_MPS2:
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
-    return drive
+    distance_m = drive.distance_m
+    for wrong, words in (
+        (np.diff(distance_m) > MAX_SPEED_MPS / drive.rate_hz + _BACK_M, "that grow steadily"),
+        (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > _BACK_M, "that grow, as the car drives forward"),
+    ):
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise BadInput(f"{file}:{at + 3}: expected distances {words}, found {distance_m[at + 1]:.6g} m after "
+                           f"{distance_m[:at + 1].max():.6g} m")
+    way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
+    if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
+        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m of way "
+                       f"by the one and {way_m:.4g} m by the other")

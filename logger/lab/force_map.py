@@ -31,6 +31,7 @@ _USED = tuple(int(index) for index in np.flatnonzero(_KNOTS))
 _ORDER = 12
 _HIGHEST_OF_RATE = 0.4
 _RANK = 1e-9
+_NOTHING = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +155,8 @@ class _Without:
 
     def fit(self, columns: Array) -> tuple[Array, Array, int, float, float]:
         """Coefficients (k,), (X'X)^-1, the rank, and the squares of the target before and after."""
-        size = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300)
+        size = np.sqrt((columns**2).sum(axis=0))
+        size = np.where(size > _NOTHING, size, 1.0)
         gram = self._removed(columns / size)
         product = gram.T @ gram
         values, vectors = np.linalg.eigh(product)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.roads.track import Track
 from logger.shipped import vehicle_file
+from logger.store.drive_file import read_run, write_drive, write_profile
 
 from lacking import named, write_runs
 
@@ -109,3 +113,58 @@ def test_what_takes_long_without_a_compiler_is_said_before(
     told = capsys.readouterr().err
     assert "Without the lab extra (pip install '.[lab]') simulations with wheel_lift take" in told
     assert told.count("\n") == 1
+
+
+def changed(run: str, folder: Path, **columns: Callable[[npt.NDArray[np.float64]], object]) -> str:
+    """The run with other columns."""
+    given = read_run(run)
+    names = {"accel": "accel_z_mps2", "speed": "speed_mps", "distance": "distance_m"}
+    kept = {name: getattr(given, name) for name in names.values()}
+    new = {names[name]: np.broadcast_to(np.asarray(make(kept[names[name]])), len(given.time_s))
+           for name, make in columns.items()}
+    write_drive(folder / "drive.csv", {"t_s": given.time_s, **kept, **new})
+    write_profile(folder / "profile.csv", given.track)
+    return str(folder)
+
+
+CHANGES = {
+    "zeros": ({"accel": lambda a: 0.0}, "drive.csv: expected accelerations after the first 2 s, found zeros only"),
+    "constant": ({"accel": lambda a: 1.5}, "drive.csv: .* found 1.5 m/s2 all along"),
+    "tiny": ({"accel": lambda a: 1e-9 * a}, "drive.csv: expected accelerations in m/s2, found none above"),
+    "NaN": ({"accel": lambda a: np.where(a == a[500], np.nan, a)}, "drive.csv:502: expected a number for accel_z_mps2"),
+    "gravity": ({"accel": lambda a: a + 9.81}, "drive.csv: expected gravity to be removed"),
+    "upside down": ({"accel": lambda a: -a}, "upside down: turned over, they go with the model"),
+    "in g": ({"accel": lambda a: a / 9.80665}, "expected accelerations in m/s2, .* they seem to be in g"),
+    "in mg": ({"accel": lambda a: a / 0.00980665 - np.mean(a / 0.00980665)}, "they seem to be in thousandths of g"),
+    "backwards": ({"distance": lambda d: d[::-1]}, r"drive.csv:\d+: expected distances that grow, as the car drives"),
+    "a leap": ({"distance": lambda d: d + 20.0 * (np.arange(len(d)) > 300)}, "drive.csv:303: .* that grow steadily"),
+    "km/h": ({"speed": lambda v: 3.6 * v}, "drive.csv: expected speed_mps .* to agree"),
+    "no speed": ({"speed": lambda v: 0.0}, "drive.csv: expected speed_mps .* to agree"),
+    "standing": ({"speed": lambda v: 0.0, "distance": lambda d: 20.0}, "a drive over a road that moves the car"),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_record_of_nothing(name: str, runs: list[str], tmp_path: Path) -> None:
+    change, words = CHANGES[name]
+    wrong = changed(runs[0], tmp_path, **change)
+    for command in ("compare", "add-effect"):
+        with pytest.raises(BadInput, match=words) as caught:
+            main([*COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", wrong])
+        assert str(caught.value).startswith(wrong)
+    if "drive.csv" in words:
+        with pytest.raises(BadInput, match=words):
+            main(["diagnose", "--same-road", "--vehicle", "rav4-2009", wrong, runs[1]])
+
+
+def test_a_road_that_is_flat(runs: list[str], tmp_path: Path) -> None:
+    wrong = changed(runs[0], tmp_path)
+    write_profile(tmp_path / "profile.csv", Track(0.5, np.full(300, 2.0)))
+    with pytest.raises(BadInput, match="expected a drive over a road that moves the car; where it was the profile is"):
+        main(["compare", "--vehicle", "rav4-2009", wrong])
+
+
+def test_two_tracks_are_asked_for_where_no_profile_is_known(runs: list[str], tmp_path: Path) -> None:
+    car = car_with(tmp_path, "{name: roll, track_width_m: 1.5, roll_inertia_kg_m2: 500}")
+    with pytest.raises(BadInput, match=r"car\.yaml: its effect roll needs a road that is known under the right wheels"):
+        main(["diagnose", "--same-road", "--vehicle", car, *runs])
