@@ -148,7 +148,9 @@ def lines(found: Gained) -> list[str]:
     """What a person reads."""
     from logger.lab.gained import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 
+    rows = [(f"Error {which}:" if which else "", f"{error:.4f}", what) for which, error, what in errors(found)]
     return [
-        paragraphs(judgement(found)), "", *errors(found), "", paragraphs([bias(found.names, found.moved)]), "",
+        paragraphs(judgement(found)), "", *columns(rows), "",
+        paragraphs([bias(found.names, found.moved)]), "",
         *columns([MOVED_HEADS, *moved_rows(found.moved)]), "", paragraphs([MOVED_HINT]),
     ]

@@ -107,15 +107,16 @@ def moved_between(first: Added, last: Added) -> list[Moved]:
 # --- in words ---
 
 
-def errors(found: Gained) -> list[str]:
-    """The error, before and after."""
+def errors(found: Gained) -> list[tuple[str, float, str]]:
+    """The error before, after and of the noise: which of them, the error, and what it is of."""
     added = found.added
-    return [f"Error before: {added.error_before:.4f}, as the file says",
-            f"              {added.error_refitted:.4f}, with the car's numbers and the distance refitted within what "
-            "they are usually off",
-            f"Error after:  {added.error_after:.4f}, with the effect, fitted in the same way",
-            f"              {added.error_as_written:.4f}, as written, on the distance as it was recorded",
-            f"Noise alone:  {found.floor:.4f}, about"]
+    return [
+        ("before", added.error_before, "as the file says, distances as recorded: where ridelog compare begins"),
+        ("", added.error_refitted, "the car's numbers and distances refitted within what they are usually off"),
+        ("after", added.error_after, f"with {' and '.join(found.names)}, all refitted in the same way"),
+        ("", added.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
+        ("of noise", found.floor, "about, from the sensor's noise alone"),
+    ]
 
 
 def judgement(found: Gained) -> list[str]:

@@ -68,8 +68,9 @@ def ending(story: Story) -> list[str]:
     verdict, steps = story.verdicts[-1], story.steps
     lines = []
     if story.added:
-        lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f}, with the car's numbers "
-                     f"refitted, to {steps[-1][1]:.3f}.")
+        lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f} to {steps[-1][1]:.3f}, "
+                     "before and after with the car's numbers and the distances refitted within what they are usually "
+                     f"off. As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
     if story.floor is not None:
         lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:

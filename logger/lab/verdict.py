@@ -12,10 +12,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from logger.lab.blind import Blind, blind
 from logger.lab.diagnosis import Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
+from logger.lab.stretches import Stretches
 from logger.lab.unexplained import Shape, sentences, shape_of
 from logger.vehicle.effect import Chosen, Effect
 
@@ -113,12 +116,25 @@ def _missing(found: Verdict, one: Chosen) -> str:
             f"candidates together: {chance(candidate.p_value)}.")
 
 
+def floor_where_judged(diagnosis: Diagnosis) -> float | None:
+    """The error that the sensor's noise alone makes of the samples that the errors of steps and candidates are of; None
+    where it is not known."""
+    if diagnosis.noise is None or not diagnosis.judged:
+        return diagnosis.noise_floor_error
+    measured = np.concatenate([
+        run.measured_mps2[run.first:][~cut.fit if cut.judges else cut.fit]
+        for run, cut in ((run, Stretches(run)) for run in diagnosis.problem.runs.runs)])
+    return float(diagnosis.noise.deviation_mps2 / np.sqrt((measured**2).mean()))
+
+
 def _errors(found: Verdict) -> str:
     diagnosis = found.diagnosis
     by_step = [f"{step.error:.3f} {_STEP_WORDS.get(step.words, step.words)}" for step in diagnosis.steps]
-    floor = diagnosis.noise_floor_error
-    noise = "" if floor is None else f" The sensor's noise alone makes about {floor:.3f} of all samples."
-    return f"Error on {diagnosis.judged_on}: {', '.join(by_step)}.{noise}"
+    there, floor = floor_where_judged(diagnosis), diagnosis.noise_floor_error
+    noise = f" The sensor's noise alone makes about {there:.3f}" if there is not None else ""
+    if noise and diagnosis.judged:
+        noise += f" there, and {floor:.3f} of all samples"
+    return f"Error on {diagnosis.judged_on}: {', '.join(by_step)}.{noise}{'.' * bool(noise)}"
 
 
 _STEP_WORDS = {
@@ -157,6 +173,7 @@ def as_json(found: Verdict) -> dict[str, Any]:
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     return {
         "baseline_error": diagnosis.baseline_error, "noise_floor_error": diagnosis.noise_floor_error,
+        "unseen_noise_floor_error": floor_where_judged(diagnosis),
         "candidates": [
             {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
              "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),

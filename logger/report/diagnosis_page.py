@@ -7,7 +7,7 @@ from html import escape
 
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.unexplained import Shape
-from logger.lab.verdict import Verdict, looks_like, summary, table, untested
+from logger.lab.verdict import Verdict, floor_where_judged, looks_like, summary, table, untested
 from logger.report.document import bullets, document, grid, paragraphs, section, tiles
 from logger.report.lab_page import forces_section, spectra_section
 from logger.report.steps_figure import Steps, steps_figure
@@ -60,9 +60,9 @@ def _tiles(found: Verdict) -> str:
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
     return tiles([
-        ("Error of the model as it stands", f"{diagnosis.baseline_error:.3f}", ""),
+        ("Error of the model as it stands", f"{diagnosis.baseline_error:.3f}", "distances as recorded"),
         ("With what is missing" if missing else "With its numbers refitted",
-         f"{diagnosis.problem.error(diagnosis.after):.3f}", ""),
+         f"{diagnosis.problem.error(diagnosis.after):.3f}", "numbers and distances refitted"),
         ("The sensor's noise alone", "not known" if floor is None else f"{floor:.3f}", ""),
         ("Missing", unknown if diagnosis.unexplained else count, ""),
     ])
@@ -70,7 +70,7 @@ def _tiles(found: Verdict) -> str:
 
 def _steps(diagnosis: Diagnosis) -> str:
     drawn = falling(f"Error on {diagnosis.judged_on}", [(step.words, step.error) for step in diagnosis.steps],
-                    diagnosis.noise_floor_error)
+                    floor_where_judged(diagnosis))
     rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(diagnosis.steps)]
     return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
 

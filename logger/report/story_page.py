@@ -8,7 +8,7 @@ import numpy as np
 
 from logger.lab.beside import Beside, frequencies, segments, short_names
 from logger.lab.compare import evidence, headline
-from logger.lab.gained import MOVED_HEADS, MOVED_HINT, judgement, moved_rows
+from logger.lab.gained import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
 from logger.lab.marks import worst_places
 from logger.lab.story import Round, Story, ending
 from logger.lab.verdict import summary, untested
@@ -17,6 +17,8 @@ from logger.report.document import bullets, document, grid, paragraphs, section,
 from logger.studies.pictures import picture
 from logger.studies.study import Curves, Line
 
+STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within what they are usually off; as "
+              "the files are written, and on the distances as recorded, errors are larger.")
 _AROUND_S = 1.5
 _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
@@ -45,8 +47,8 @@ def page(story: Story) -> str:
 
 def _tiles(story: Story) -> str:
     return tiles([
-        ("Error as the file says", f"{story.steps[0][1]:.3f}", ""),
-        ("Error at last", f"{story.steps[-1][1]:.3f}", "numbers refitted"),
+        ("Error as the file says", f"{story.steps[0][1]:.3f}", "distances as recorded"),
+        ("Error at last", f"{story.steps[-1][1]:.3f}", "numbers and distances refitted"),
         ("The sensor's noise alone", "not known" if story.floor is None else f"{story.floor:.3f}", ""),
         ("Effects added", f"{len(story.added)}", ""),
     ])
@@ -55,13 +57,14 @@ def _tiles(story: Story) -> str:
 def _steps(story: Story) -> str:
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(story.steps)]
     return (falling("Error of each model, on all samples", story.steps, story.floor)
-            + grid(("Step", "Model", "Error"), rows, words=(0, 1)))
+            + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + f'<p class="hint">{escape(STEPS_HINT)}</p>')
 
 
 def _added(one: Round) -> str:
     effects = [f"It leaves: {new.effect.signature}." for new in one.gained.new]
+    rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.gained)]
     return section(f"Added: {' and '.join(one.gained.names)}", paragraphs(
-        [*judgement(one.gained), *effects, f"Written to {one.file}."]))
+        [*judgement(one.gained), *effects, f"Written to {one.file}."]) + grid(("Error", "", "of"), rows, words=(0, 2)))
 
 
 def _moved(story: Story) -> str:

@@ -35,6 +35,10 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert told["noise_floor_error"] == pytest.approx(told["error_after"], rel=0.1)
     assert told["error_after"] < told["error_refitted"] <= told["error_before"]
     assert told["helps"] is True
+    assert main(["compare", "--vehicle", str(first), "--json", *runs]) == 0
+    compared = json.loads(capsys.readouterr().out)
+    assert compared["error"] == pytest.approx(told["error_as_written"], rel=1e-6)
+    assert compared["refitted"]["error"] == pytest.approx(told["error_after"], rel=0.02)
     assert {one["name"] for one in told["numbers"]} >= {"sprung_mass_kg", "rear.suspension_stiffness_n_per_m"}
 
     model = read_model(first)
@@ -63,7 +67,8 @@ def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest
     assert add(str(own), out, out, *runs) == 0  # over the old file, as it was asked for
     told = capsys.readouterr().out
     assert told.startswith("long_bracket: offset_m 0.")
-    for words in ("It helps", "Error before: ", "Error after: ", "sprung_mass_kg", "Shift", f"Vehicle: {out}"):
+    for words in ("It helps", "Error before: ", "Error after: ", "distances as recorded: where compare begins with it",
+                  "sprung_mass_kg", "Shift", f"Vehicle: {out}"):
         assert words in told
     model = read_model(out)
     assert model.effects[0].file == str(own)

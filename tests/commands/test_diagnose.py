@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.store.drive_file import read_run
 from logger.store.effect_file import shipped_effects
 
 from lacking import FEW, OWN, named, out_of_balance, write_runs
@@ -37,6 +39,8 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
     assert told["verdict"] == ["sensor_offset"]
     assert told["unexplained"] is False
     assert told["noise_floor_error"] < told["baseline_error"]
+    unseen = np.concatenate([one.accel_z_mps2[1400:] for one in map(read_run, offset_runs)])  # a third, after 2 s
+    assert told["unseen_noise_floor_error"] == pytest.approx(0.03 / np.sqrt(np.mean(unseen**2)), rel=0.1)
     best, *others = told["candidates"]
     assert best["effect"] == "sensor_offset"
     assert 0 < best["standard_errors"]["offset_m"] < 0.02
