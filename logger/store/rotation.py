@@ -361,7 +361,10 @@ def _repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockM
     tally = take_tally(part, limit)
     finished = _finished_path(part)
     if finished.exists() and take_tally(finished).rows >= tally.rows:
-        files.remove(part)  # the cut came between the rename and this
+        # The cut came between the rename and the removal. After a mere kill the rename may not be on the disk yet, and
+        # the removal must not come there before it.
+        files.sync_directory(part.parent)
+        files.remove(part)
         files.sync_directory(part.parent)
     elif tally.rows:
         _finish_copy(files, part, _sidecar_or_nothing(part), tally, clock, limit)

@@ -389,6 +389,27 @@ def test_better_of_part_and_finished_file_is_kept(tmp_path: Path) -> None:
         assert not (folder / "00001-001.csv.part").exists()
 
 
+def test_a_part_goes_only_after_the_finished_name_is_on_the_disk(tmp_path: Path) -> None:
+    """A repair that was killed after its rename leaves both, and the rename may not have reached the disk."""
+    class Told(FileSystem):
+        def __init__(self) -> None:
+            self.done: list[str] = []
+
+        def sync_directory(self, directory: Path) -> None:
+            self.done.append("synced")
+            super().sync_directory(directory)
+
+        def remove(self, path: Path) -> None:
+            self.done.append(path.name)
+            super().remove(path)
+
+    for end in ("csv", "csv.part"):
+        (tmp_path / f"00001-001.{end}").write_text(f"{HEADER}\n{format_row(row(1))}\n")
+    files = Told()
+    repair(tmp_path, files)
+    assert files.done[:2] == ["synced", "00001-001.csv.part"]
+
+
 def test_repair_leaves_other_files_alone(tmp_path: Path) -> None:
     for name in ("notes.tmp", "notes.csv.part", "00001.dump.gz"):
         (tmp_path / name).write_text("mine")
