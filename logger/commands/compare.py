@@ -80,7 +80,7 @@ def _lines(found: Comparison) -> list[str]:
 
 def _tables(found: Comparison) -> list[str]:
     """Where what is left sits, as the model stands and refitted."""
-    from logger.lab.beside import short_names
+    from logger.lab.beside import paired, short_names
     from logger.lab.marks import worst_places
 
     lines = [f"{'Where':46}{'share of the rest':>13}{'error':>12}", f"{'':44}{'stands':>8}{'refit':>7}{'stands':>8}"
@@ -89,7 +89,7 @@ def _tables(found: Comparison) -> list[str]:
     for title, unit, one, other in (
         ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
     ):
-        lines += [title, *(_row(a, b, unit) for a, b in zip(one, other, strict=True))]
+        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))]
     lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
     names = short_names(found.plain.beside.runs)
     lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]

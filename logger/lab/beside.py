@@ -134,6 +134,13 @@ def located(beside: Beside) -> Located:
     return Located(_by_frequency(beside), _by_speed(beside), _by_amplitude(beside), _by_place(beside))
 
 
+def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
+    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
+    numbers; others by their ends. None where there is no such part."""
+    known = {one.name or (one.low, one.high): one for one in before}
+    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
+
+
 # --- tools that the marks share ---
 
 

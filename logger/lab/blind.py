@@ -45,10 +45,12 @@ class _Sight:
         self._uncertainty = np.linalg.inv(self._weighed.information)
 
     def of(self, effect: Effect) -> float:
-        """At its usual strength."""
+        """At its usual strength; where it has none, or the vehicle has just that, at the most telling values that a
+        search begins at."""
         usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
         found = self._deviations(chosen(effect, usual))
-        if found < _NOTHING and isinstance(effect, VehicleEffect):  # what is usual may be what this vehicle has
+        strengthless = all(one.null is None for one in effect.parameters)
+        if isinstance(effect, VehicleEffect) and (strengthless or found < _NOTHING):
             found = max(self._deviations(chosen(effect, values)) for values in effect.trials())
         return found
 

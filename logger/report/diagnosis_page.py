@@ -60,9 +60,9 @@ def _tiles(found: Verdict) -> str:
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
     return tiles([
-        ("Error of the model as it stands", f"{diagnosis.baseline_error:.3f}", "distances as recorded"),
+        ("Error of the model as it stands", f"{diagnosis.baseline_error:.3f}", "as recorded"),
         ("With what is missing" if missing else "With its numbers refitted",
-         f"{diagnosis.problem.error(diagnosis.after):.3f}", "numbers and distances refitted"),
+         f"{diagnosis.problem.error(diagnosis.after):.3f}", "refitted"),
         ("The sensor's noise alone", "not known" if floor is None else f"{floor:.3f}", ""),
         ("Missing", unknown if diagnosis.unexplained else count, ""),
     ])

@@ -11,7 +11,7 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.beside import Beside, Part, frequencies, segments, short_names
+from logger.lab.beside import Beside, Part, frequencies, paired, segments, short_names
 from logger.lab.compare import Comparison, Standing, conclusion, evidence, headline
 from logger.lab.force_map import Curve, ForceMap
 from logger.lab.marks import Mark, worst_places
@@ -142,17 +142,20 @@ def _tables(found: Comparison) -> str:
 
 def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> str:
     """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
-    same = [part.low for part in plain] == [part.low for part in refitted]
-    stands: list[Part | None] = list(plain) if same else [None] * len(refitted)
+    pairs = paired(plain, refitted)
+    stands = any(one is not None for one, _ in pairs)
+
+    def before(one: Part | None) -> str:
+        return f"<td class=n>{f'{one.error:.3f}' if one else ''}</td>" if stands else ""
+
     rows = "".join(
-        f"<tr>{f'<td>{escape(part.name)}</td>' if part.name else ''}<td>{part.low:.3g} to {part.high:.3g}</td>"
+        f"<tr>{f'<td>{escape(part.name)}</td>' if part.name else ''}<td class=n>{part.low:.3g} to {part.high:.3g}</td>"
         f'<td class="bar"><span class="f0" style="width:{part.share:.1%}"></span></td><td class=n>{part.share:.1%}</td>'
-        f"<td class=n>{part.error:.3f}</td><td class=n>{f'{one.error:.3f}' if one else ''}</td></tr>"
-        for one, part in zip(stands, refitted, strict=True))
+        f"<td class=n>{part.error:.3f}</td>{before(one)}</tr>" for one, part in pairs)
     first = "<th>Band</th>" if refitted[0].name else ""
-    return (f'<section><h2>{title}</h2><div class="scroll"><table><tr>{first}<th>From, to [{unit}]</th>'
-            "<th>Share of what is left</th><th></th><th class=n>Error</th><th class=n>Before the refit</th></tr>"
-            f"{rows}</table></div></section>")
+    return (f'<section><h2>{title}</h2><div class="scroll"><table><tr>{first}<th class=n>From, to [{unit}]</th>'
+            "<th>Share of what is left</th><th></th><th class=n>Error</th>"
+            f"{'<th class=n>Before the refit</th>' if stands else ''}</tr>{rows}</table></div></section>")
 
 
 def _marks(marks: Sequence[Mark]) -> str:

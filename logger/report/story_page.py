@@ -47,8 +47,8 @@ def page(story: Story) -> str:
 
 def _tiles(story: Story) -> str:
     return tiles([
-        ("Error as the file says", f"{story.steps[0][1]:.3f}", "distances as recorded"),
-        ("Error at last", f"{story.steps[-1][1]:.3f}", "numbers and distances refitted"),
+        ("Error as the file says", f"{story.steps[0][1]:.3f}", "as recorded"),
+        ("Error at last", f"{story.steps[-1][1]:.3f}", "refitted"),
         ("The sensor's noise alone", "not known" if story.floor is None else f"{story.floor:.3f}", ""),
         ("Effects added", f"{len(story.added)}", ""),
     ])

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.beside import located, short_names
+from logger.lab.beside import Part, located, paired, short_names
 from logger.lab.prediction import Run
 
 from compared import CAR, RATE_HZ, a_run, beside_with
@@ -56,3 +56,13 @@ def test_runs_are_called_by_their_folders_while_those_differ() -> None:
     one, other, third = a_run("a/run1", 8.0, 5.0, 1), a_run("a/run2", 8.0, 5.0, 1), a_run("b/run2", 8.0, 5.0, 1)
     assert short_names([one, other]) == {"a/run1": "run1", "a/run2": "run2"}
     assert short_names([other, third]) == {"a/run2": "a/run2", "b/run2": "b/run2"}
+
+
+def test_parts_are_paired_by_band_or_by_ends_whatever_else_there_is() -> None:
+    def part(low: float, high: float, name: str = "") -> Part:
+        return Part(low, high, 0.1, 0.2, 0.3, 4, name)
+
+    before = [part(0, 1, "below body bounce"), part(1, 2, "body bounce"), part(2, 8, "between")]
+    after = [part(0, 1.1, "below body bounce"), part(1.1, 2.1, "body bounce"), part(8, 12, "wheel hop")]
+    assert paired(before, after) == [(before[0], after[0]), (before[1], after[1]), (None, after[2])]
+    assert paired([part(0, 2), part(2, 4)], [part(2, 4), part(4, 6)]) == [(part(2, 4), part(2, 4)), (None, part(4, 6))]

@@ -64,3 +64,13 @@ def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -
     assert html.count("<svg") == 7
     drawn = re.findall(r'<path class="thick[^"]*" d="M([^"]*)"', html)
     assert drawn and all(len(one.split()) >= 2 for one in drawn)
+
+
+def test_no_column_of_a_table_is_empty(found: Comparison) -> None:
+    """Bands are told before and after the refit, though it moves their ends."""
+    html = page(found)
+    bands, speeds, amplitudes = (html.split(f"<h2>{title}</h2>")[1].split("</table>")[0] for title in
+                                 ("By band", "By speed", "By how strongly the road moves the car"))
+    for table in (bands, speeds):
+        assert "Before the refit" in table and "<td class=n></td>" not in table
+    assert "Before the refit" not in amplitudes or "<td class=n></td>" not in amplitudes
