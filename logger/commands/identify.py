@@ -107,7 +107,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(args: argparse.Namespace) -> int:
     """A fit over roads that are known, but for a few numbers."""
-    from logger.identification.report import as_json, lines, tests
+    from logger.identification.common_roughness import with_common_roughness
+    from logger.identification.report import as_json, common_words, lines, tests
     from logger.identification.verdict import NotIdentifiable
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
@@ -128,14 +129,18 @@ def _measured(args: argparse.Namespace) -> int:
             return EXIT_CHECK_FAILED
         raise
     checks = tests(model, found)
+    common = with_common_roughness(model, found)
+    found = common.fit
     if args.out is not None:
         _write(args.out, model, found)
     if args.json:
-        print(json.dumps({**as_json(found, *checks), "runs": [str(folder) for folder in args.runs]}, allow_nan=False))
+        print(json.dumps({**as_json(found, *checks), "common_roughness": common.share,
+                          "runs": [str(folder) for folder in args.runs]}, allow_nan=False))
     else:
         low = "" if found.low_pass.cutoff_hz is None else f", below {found.low_pass.cutoff_hz:g} Hz"
         print("\n".join([_head(vehicle, len(found.free), [len(one.kept_mps2) for one in records], records[0].rate_hz,
-                               f"{low}; the first {args.skip:g} s of a run left out"), *lines(found, *checks)]))
+                               f"{low}; the first {args.skip:g} s of a run left out"),
+                         *lines(found, *checks), *common_words(model, common)]))
         if args.out is not None:
             print(f"Vehicle: {args.out}")
     return EXIT_DONE if found.converged else EXIT_CHECK_FAILED

@@ -28,6 +28,7 @@ Array = npt.NDArray[np.float64]
 LEAST_SHARE = 1e-5
 """Noise is never taken for less than this share of the measurement: predictions are not more accurate themselves, and
 what they leave of a record without noise is no process at all."""
+ROAD_LEVEL = "gd_n0_cm3"
 _MOST_ORDER = 60
 _SAMPLES_PER_ORDER = 20
 _MEMORY_S, _FILTER_MEMORY_S = 4.0, 1.0
@@ -167,7 +168,7 @@ class RoadNoise:
         deviation = float(np.sqrt(sensor_power))
         return _whitening("road", whiteners, residuals, 2,
                           f"a road of Gd(n0) {road_power:.3g} cm3 that the profile does not contain, and white noise "
-                          f"of {deviation:.3g} m/s2", {"gd_n0_cm3": road_power, "deviation_mps2": deviation})
+                          f"of {deviation:.3g} m/s2", {ROAD_LEVEL: road_power, "deviation_mps2": deviation})
 
 
 def _grid(rate_hz: float) -> Array:

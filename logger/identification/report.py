@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from logger.identification.common_roughness import CommonRoughness, may_have_common
 from logger.identification.fit import Fit
 from logger.identification.noise import LEAST_SHARE
 from logger.identification.prediction import VehicleModel
@@ -90,6 +91,18 @@ def lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield from _correlations(fit)
     yield from _checks(white, free_of_road)
     yield from _limits(fit, sound=not any(doubts(fit, white, free_of_road)))
+
+
+def common_words(model: VehicleModel, common: CommonRoughness) -> Iterator[str]:
+    """Whether drives over one obstacle, or one profile, were over one road, and what that means for the errors."""
+    runs = len(model.records)
+    if common.share:
+        yield (f"These {runs} runs are over one road: they share {common.share:.0%} of the roughness that the profile "
+               f"does not contain. The standard errors count that; they are up to {common.growth:.2f} times those of "
+               "runs over roads of their own.")
+    elif may_have_common(model) and common.fit.noise.name != "road":
+        yield (f"If these {runs} runs are over one and the same place, what the road's shape there is off by is the "
+               f"same in all of them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
 
 
 def _ends(fit: Fit) -> str:

@@ -73,8 +73,10 @@ def bridge(start_m: float, height_m: float = STEP_M) -> Shape:
     return lambda place_m: step(place_m, start_m, height_m)
 
 
-def record_of(obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions) -> Record:
-    """A drive over an obstacle at a steady speed, with the obstacle as its known profile."""
+def record_of(
+    obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None
+) -> Record:
+    """A drive over an obstacle at a steady speed, with the obstacle as its known profile. None: that of Table 4.2."""
     time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     distance_m = speed_mps * time_s
     place_m = np.arange(-_BEFORE_M, distance_m[-1] + _BEHIND_M, SPACING_M)
@@ -84,8 +86,8 @@ def record_of(obstacle: Shape, speed_mps: float, seconds: float, conditions: Con
         length_m = SPACING_M * (len(place_m) + 1)
         road = known + generate(gd_n0_from_iri(conditions.iri_m_per_km), length_m, SPACING_M,
                                 conditions.seed)[: len(place_m)]
-    clean = _driven(rav4(), Track(SPACING_M, road, float(place_m[0])), distance_m)
-    sensed = clean + conditions.noise_mps2 * np.random.default_rng(conditions.seed).standard_normal(len(clean))
+    sensed = recorded(vehicle or rav4(), Track(SPACING_M, road, float(place_m[0])), distance_m, conditions.noise_mps2,
+                      conditions.seed)
     if conditions.step_mps2:
         sensed = conditions.step_mps2 * np.round(sensed / conditions.step_mps2)
     track = Track(SPACING_M, known, float(place_m[0]))
@@ -105,10 +107,11 @@ def until(record: Record, distance_m: float) -> Record:
                    distance_m=record.distance_m[kept], speed_mps=record.speed_mps[kept])
 
 
-def _driven(vehicle: Vehicle, track: Track, distance_m: Array) -> Array:
-    """What the sensor would record; the car has come to the start as fast as it goes there."""
+def recorded(vehicle: Vehicle, track: Track, distance_m: Array, noise_mps2: float, seed: int) -> Array:
+    """What the sensor records; the car has come to the start as fast as it goes there."""
     lead = np.arange(-_LEAD_S * RATE_HZ, 0)
     way_m = np.concatenate([distance_m[0] + (distance_m[1] - distance_m[0]) * lead, distance_m])
     structure = structure_of(vehicle)
     sensor = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    return np.asarray(drive(structure, [sensor], track, np.arange(len(way_m)) / RATE_HZ, way_m)[len(lead):, 0])
+    clean = drive(structure, [sensor], track, np.arange(len(way_m)) / RATE_HZ, way_m)[len(lead):, 0]
+    return np.asarray(clean + noise_mps2 * np.random.default_rng(seed).standard_normal(len(clean)))

@@ -31,12 +31,13 @@ from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
-from bump_drives import BUMP_MPS, RATE_HZ, SPACING_M, bump_record, recorded, road_record
+from bump_drives import bump_record, road_record
 from figures import Figures
 
 Array = npt.NDArray[np.float64]

@@ -15,8 +15,9 @@ from logger.identification.prediction import VehicleModel
 from logger.identification.verdict import UNEXPLAINED, NotIdentifiable
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.studies.drives import recorded
 
-from bump_drives import bump_record, recorded, road_record
+from bump_drives import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

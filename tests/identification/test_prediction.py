@@ -13,9 +13,10 @@ from logger.identification.prediction import Record, VehicleModel
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.studies.drives import recorded
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-from bump_drives import bump_record, recorded, road_record
+from bump_drives import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

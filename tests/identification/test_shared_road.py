@@ -17,9 +17,8 @@ from logger.roads.iso8608 import generate
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.studies.drives import recorded
 from logger.vehicle.vehicle import SensorPlace, Vehicle
-
-from bump_drives import recorded
 
 Array = npt.NDArray[np.float64]
 

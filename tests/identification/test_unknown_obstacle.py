@@ -30,9 +30,10 @@ from logger.roads.iso8608 import generate
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.studies.drives import recorded
 from logger.vehicle.vehicle import Vehicle
 
-from bump_drives import bump_record, recorded
+from bump_drives import bump_record
 
 Array = npt.NDArray[np.float64]
 

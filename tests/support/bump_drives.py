@@ -1,35 +1,14 @@
-"""Drives over a speed bump and over roads, made by the time-stepping simulation, which the fits know nothing of."""
+"""Drives over a speed bump and over roads of any car, by the studies' simulation, which the fits know nothing of."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.identification.prediction import Record
-from logger.roads.bumps import speed_bump
-from logger.roads.iso8608 import gd_n0_from_iri, generate
+from logger.identification.record import Record
+from logger.roads.iso8608 import generate
 from logger.roads.track import Track
-from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import drive
-from logger.vehicle.structure import body_point
+from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, Conditions, bump, record_of, recorded
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
-
-RATE_HZ = 100
-BUMP_MPS = 16.1 / 3.6
-SPACING_M = 0.05
-_LEAD_S = 3
-
-
-def recorded(vehicle: Vehicle, track: Track, distance_m: Array, noise_mps2: float, seed: int) -> Array:
-    """What the sensor records at 100 Hz; the car has come to the start as fast as it goes there."""
-    structure = structure_of(vehicle)
-    lead = np.arange(-_LEAD_S * RATE_HZ, 0)
-    way = np.concatenate([distance_m[0] + (distance_m[1] - distance_m[0]) * lead, distance_m])
-    output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    clean = drive(structure, [output], track, np.arange(len(way)) / RATE_HZ, way)[len(lead):, 0]
-    return np.asarray(clean + noise_mps2 * np.random.default_rng(seed).standard_normal(len(clean)))
 
 
 def bump_record(
@@ -37,17 +16,8 @@ def bump_record(
     height_m: float = 0.15, speed_mps: float = BUMP_MPS, start_m: float = 2.0,
 ) -> Record:
     """A drive over a bump 2.60 m wide, which is all the record's track has; a road of ``iri_outside`` lay under it."""
-    time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
-    distance_m = speed_mps * time_s
-    place = np.arange(-20.0, distance_m[-1] + 20, SPACING_M)
-    bump = speed_bump(place, start_m, height_m, 2.6)
-    road = bump
-    if iri_outside:
-        length_m = SPACING_M * (len(place) + 1)
-        road = bump + generate(gd_n0_from_iri(iri_outside), length_m, SPACING_M, seed)[: len(place)]
-    measured = recorded(vehicle, Track(SPACING_M, road, place[0]), distance_m, noise_mps2, seed)
-    speed = np.full(len(time_s), speed_mps)
-    return Record(time_s, measured, distance_m, speed, Track(SPACING_M, bump, place[0]), skip_s=0.0)
+    conditions = Conditions(noise_mps2, iri_m_per_km=iri_outside, seed=seed)
+    return record_of(bump(start_m, height_m), speed_mps, seconds, conditions, vehicle)
 
 
 def road_record(
