@@ -9,7 +9,7 @@ driven on. What is free is named as in the vehicle's file; both.NAME is the fron
 
 What is not known of the road can be free as well: a bump (Eq 4.41) or a step of which only the kind is known, and the
 scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle, and its start is
-looked for where none is given. run2.NAME is that of one run, each.NAME one for every run.
+looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a single run, NAME).
 
   ridelog identify drive.csv --vehicle rav4-2009 --bump height_m=0.15,width_m=2.6 --free sprung_mass_kg,bump.height_m
   ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
@@ -102,6 +102,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog identify``."""
+    places = [path.resolve() for path in args.runs]
+    if again := next((path for path, place in zip(args.runs, places, strict=True) if places.count(place) > 1), None):
+        raise BadInput(f"{again}: expected every run once, found it twice")
     return _unmeasured(args) if args.unmeasured_road or args.same_road else _measured(args)
 
 
@@ -239,6 +242,8 @@ def _road_options(args: argparse.Namespace) -> Any:
               "--tries": args.tries, "--noise": args.noise != "auto"}
     if given := [option for option, value in unused.items() if value]:
         raise BadInput(f"{given[0]}: expected a road whose profile is known, not --unmeasured-road or --same-road")
+    if args.unmeasured_road and args.same_road:
+        raise BadInput("--unmeasured-road: expected no --same-road beside it: runs have roads of their own, or one")
     if args.same_road and len(args.runs) < 2:
         raise BadInput("--same-road: expected two runs or more")
     waviness = _WAVINESS if args.waviness is None else args.waviness

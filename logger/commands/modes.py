@@ -23,14 +23,14 @@ SPECTRUM = "fft"
 DECREMENT = "decrement"
 METHODS = ("era", "ssi", "ssi-cov", "n4sid", "ar", "arx", "armax", SPECTRUM, DECREMENT)
 EXAMPLES = ("five-storey",)
-_SEGMENTS = 8
+_METHOD, _SEGMENTS = "ssi", 8
 _REJECTED_SHOWN = 12
 _IN_STEP = 0.02  # a shape whose parts are nearer to in step than this is shown with signs alone
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="CSV with t_s and one column per sensor")
-    parser.add_argument("--method", choices=METHODS, default="ssi", metavar="NAME",
+    parser.add_argument("--method", choices=METHODS, metavar="NAME",
                         help=f"{', '.join(METHODS)} (default: ssi). era suits a free decay, ssi a random response, "
                              "n4sid a measured input; decrement is Eq 5.2, for one mode")
     parser.add_argument("--columns", metavar="A,B,...",
@@ -54,13 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog modes``."""
     if args.example is not None:
-        if args.file is not None:
-            raise BadInput(f"--example {args.example}: expected no FILE beside it, found {args.file}")
+        _check_example(args)
         example = _five_storey()
         print(json.dumps(example) if args.json else "\n".join(_example_lines(example)))
         return EXIT_DONE
     if args.file is None:
         raise BadInput("modes: expected a FILE (try 'ridelog modes --help')")
+    args.method = args.method or _METHOD
     _check_options(args)
     record, inputs = _read(args)
     try:
@@ -74,6 +74,17 @@ def run(args: argparse.Namespace) -> int:
     else:
         print("\n".join(screen(result, record, args.file.name)))
     return EXIT_DONE
+
+
+def _check_example(args: argparse.Namespace) -> None:
+    """BadInput for anything beside an example but --json."""
+    if args.file is not None:
+        raise BadInput(f"--example {args.example}: expected no FILE beside it, found {args.file}")
+    given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
+             "--response": args.response, "--from": args.from_s, "--to": args.to_s, "--segments": args.segments,
+             "--diagram": args.diagram}
+    if options := [option for option, value in given.items() if value is not None]:
+        raise BadInput(f"{options[0]}: expected a FILE with it, not --example {args.example}")
 
 
 def _check_options(args: argparse.Namespace) -> None:
@@ -101,7 +112,10 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
     from logger.store.channel_file import read_channels
 
     file = str(args.file)
-    wished = tuple(name.strip() for name in args.columns.split(",")) if args.columns else ()
+    wished = () if args.columns is None else tuple(name.strip() for name in args.columns.split(","))
+    if not all(wished) or len(set(wished)) < len(wished) or args.input in wished:
+        raise BadInput(f"--columns {args.columns}: expected names with commas between them, each once, the input not "
+                       "among them")
     record = read_channels(args.file, (*wished, args.input) if wished and args.input else wished)
     if args.input is not None and args.input not in record.names:
         raise BadInput(f"{file}:1: expected a column {args.input}, found {','.join(record.names)[:80]}")
@@ -109,7 +123,7 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
     inside = (t_s >= (t_s[0] if args.from_s is None else args.from_s)) & (
         t_s <= (t_s[-1] if args.to_s is None else args.to_s))
     if not inside.any():
-        raise BadInput(f"{file}: expected --from and --to within {t_s[0]:g} to {t_s[-1]:g} s")
+        raise BadInput(f"{file}: expected --from before --to, within {t_s[0]:g} to {t_s[-1]:g} s")
     samples = record.samples[inside]
     outputs = [place for place, name in enumerate(record.names) if name != args.input]
     if not outputs:

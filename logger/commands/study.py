@@ -44,6 +44,9 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         if args.name is not None:
             raise BadInput(f"study --list: expected no NAME beside it, found {args.name}")
+        for option, value in (("--quick", args.quick), ("--out", args.out)):
+            if value:
+                raise BadInput(f"study {option}: expected a NAME with it, not --list")
         _list(list(known.values()), args.json)
         return EXIT_DONE
     if args.name is None:

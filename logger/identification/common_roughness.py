@@ -131,9 +131,9 @@ def _common(one: _Drive, other: _Drive) -> Array:
     index = cell.astype(int) % len(by_distance)
     following = (index + 1) % len(by_distance)
     plain = (1 - part) * by_distance[index] + part * by_distance[following]
-    return np.asarray(other.whitener(one.whitener(plain).T).T, dtype=np.float64)
+    return other.whitener(one.whitener(plain).T).T
 
 
 def _waves_cpm() -> Array:
     """Wave numbers up to what the grid holds [1/m]."""
-    return np.fft.rfftfreq(_GRID_SAMPLES, _GRID_STEP_M)
+    return np.asarray(np.fft.rfftfreq(_GRID_SAMPLES, _GRID_STEP_M), dtype=np.float64)

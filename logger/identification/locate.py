@@ -30,7 +30,7 @@ def located(vehicle: Vehicle, record: Record, road: RoadInput, part: str) -> flo
     """Where the ``part`` ("bump" or "step") of a road begins in a record, as true distance [m].
 
     Everything else is as ``vehicle`` and ``road`` have it; the height only has to have the right sign. ValueError for a
-    record whose way is so long that there are too many places to try.
+    record whose way is so long that there are too many places to try, or that has none.
     """
     obstacle = road.obstacles[part]
     way_m = record.distance_m[record.first:] / road.speed_scale
@@ -38,8 +38,10 @@ def located(vehicle: Vehicle, record: Record, road: RoadInput, part: str) -> flo
     apart_m = min(pace_m, _OF_WIDTH * obstacle.length_m) if obstacle.length_m else pace_m
     first_m, last_m = float(way_m.min()) - obstacle.length_m, float(way_m.max())
     count = int((last_m - first_m) / max(apart_m, 1e-6)) + 1
+    if not np.ptp(way_m) > 0:
+        raise ValueError(f"{part}: expected a drive over it, found a car that stands")
     if count > _MOST_PLACES:
-        raise ValueError(f"{part}: expected a start_m, for it to be looked for over {last_m - first_m:g} m")
+        raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too many to look for it on")
     place = f"{part}.start_m"
     model = VehicleModel(vehicle, [Free(place, first_m, first_m - 1, last_m + 1, place=True)], [record], road)
     without = replace(road, bump=None) if part == "bump" else replace(road, step=None)

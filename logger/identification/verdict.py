@@ -129,7 +129,7 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
         return []
     return [Finding(TURNED, {}, f"the acceleration is upside down: turned over, what was measured is explained but for "
                     f"an error of {turned_error:.2f}, and as it is of {error:.2f}. Up is positive; a step has the "
-                    "other sign then, or the sensor does.")]
+                    "other sign then, or the sensor does, or it lies elsewhere than was said.")]
 
 
 def _together(names: Sequence[str], direction: Array) -> Finding:

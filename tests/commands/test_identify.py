@@ -207,6 +207,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(("free", "more", "message"), [
     (MASS, ("--unmeasured-road", "--bump", "height_m=0.1,width_m=2"), "--bump: expected a road whose profile is known"),
     (MASS, ("--same-road", "--noise", "ar"), "--noise: expected a road whose profile is known"),
+    (MASS, ("--same-road", "--unmeasured-road"), "--unmeasured-road: expected no --same-road beside it"),
     (MASS, ("--same-road", "--waviness", "9"), "--waviness 9: expected 1 to 3.5"),
     (MASS, ("--waviness", "2"), "expected --unmeasured-road or --same-road with it"),
     ("contact_patch_m", ("--unmeasured-road",), "cannot be found where the road is not known"),
@@ -233,6 +234,19 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_wrong_use_is_one_line(runs: list[str], free: str, more: tuple[str, ...], message: str) -> None:
     with pytest.raises(BadInput, match=message):
         identify(runs, free, *more)
+
+
+def test_a_run_that_was_given_twice(runs: list[str]) -> None:
+    with pytest.raises(BadInput, match="expected every run once, found it twice"):
+        identify([runs[0], runs[1], f"{runs[0]}/."], MASS)
+
+
+def test_a_car_that_stands(runs: list[str], tmp_path: Path) -> None:
+    t_s = np.arange(800) / 100
+    write_drive(tmp_path / "still.csv", {"t_s": t_s, "accel_z_mps2": np.sin(t_s), "speed_mps": 0 * t_s,
+                                         "distance_m": 0 * t_s})
+    with pytest.raises(BadInput, match="--bump: expected a drive over it, found a car that stands"):
+        identify([str(tmp_path / "still.csv")], MASS, "--bump", "height_m=0.1,width_m=2")
 
 
 def test_a_run_too_short_for_the_low_pass_is_the_one_named(runs: list[str], tmp_path: Path) -> None:

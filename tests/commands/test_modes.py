@@ -103,8 +103,11 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
     (["FILE", "--input", "top"], "expected --method n4sid, arx or armax with it, found ssi"),
     (["FILE", "--method", "n4sid", "--input", "none"], "expected a column none, found top,middle"),
     (["FILE", "--columns", "top,side"], "csv:1: expected a header with t_s,top,side"),
-    (["FILE", "--columns", "top", "--method", "n4sid", "--input", "top"], "expected a header|beside t_s"),
-    (["FILE", "--from", "20"], "expected --from and --to within 0 to 9.99 s"),
+    (["FILE", "--columns", "top", "--method", "n4sid", "--input", "top"], "the input not among them"),
+    (["FILE", "--columns", "top,top"], "--columns top,top: expected names with commas between them, each once"),
+    (["FILE", "--columns", ""], "expected names with commas"),
+    (["FILE", "--from", "20"], "expected --from before --to, within 0 to 9.99 s"),
+    (["FILE", "--from", "8", "--to", "2"], "expected --from before --to"),
     (["FILE", "--to", "0.5"], "expected at least 100 samples, found 51"),
     (["FILE", "--method", "decrement"], "expected one column"),
     (["FILE", "--method", "fft", "--segments", "100"], "found 100 of 10"),
@@ -115,6 +118,8 @@ def test_the_five_storeys(capsys: pytest.CaptureFixture[str]) -> None:
     (["FILE", "--method", "n4sid", "--input", "top", "--response", "random"], "--response: expected no --input"),
     (["FILE", "--order", "0"], "expected an order of 2 or more"),
     (["FILE", "--example", "five-storey"], "expected no FILE"),
+    (["--example", "five-storey", "--method", "ar"], "--method: expected a FILE with it, not --example five-storey"),
+    (["--example", "five-storey", "--from", "0"], "--from: expected a FILE with it"),
 ])
 def test_wrong_use(decay: Path, arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):
