@@ -26,7 +26,14 @@ else:
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function) if COMPILED else function
+    """What runs in the loop and makes no arrays: it need not count who holds which, which would take most of its time.
+    """
+    lean: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
+    return numba.njit(**lean)(function) if COMPILED else function
+
+
+def _compiled_with_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function) if COMPILED else function
 
 
 TRAVEL_M, RATE_MPS = 0.4, 8.0
@@ -170,32 +177,14 @@ def _settle(
 
 
 @_compiled
-def steps(
-    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, start: Array,
-    around: Array, elevation: Array,
-) -> tuple[Array, Array]:
-    """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
-
-    The motion (R,) of the linear car is its state, what is seen (4 w: travels, rates, heights of the wheels, rates of
-    these), and 0 up to the next number of whole ``LANES``.
-
-    by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
-                 the road's mean and how far it rises from the middle of the step to its end
-    by_force     (3 w, R) the same by the laws' forces at the end, then by dry friction
-    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 13)
-    start        (2 n,) the first state
-    around       (M + 1, w) means of the road before, in and after the steps
-    elevation    (M, w) of the road at the instants
-    """
-    count, m, w = len(elevation), len(start), len(numbers)
-    states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
-    states[0] = start
-    known, forces, road, mounts = np.zeros(m + 4 * w), np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3))
-    known[:m] = start
-    earlier = np.zeros(w)
-    rubs = numbers[:, FRICTION_N].max() > 0.0
-    size = by_known.shape[1]
-    nothing, before, motion = np.zeros(size), np.zeros(size), np.zeros(size)
+def _walk(
+    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, around: Array,
+    elevation: Array, states: Array, recorded: Array, known: Array, before: Array, nothing: Array, motion: Array,
+    forces: Array, road: Array, mounts: Array, earlier: Array, rubs: bool,
+) -> None:
+    """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
+    step needs."""
+    count, m, w = len(elevation), states.shape[1], len(numbers)
     for k in range(count - 1):
         for i in range(w):
             known[m + 2 * w + i] = around[k + 1, i]
@@ -216,4 +205,32 @@ def steps(
             recorded[k + 1, w + i] = forces[w + i]
             # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
             recorded[k, i] += 0.5 * forces[2 * w + i]
+
+
+@_compiled_with_arrays
+def steps(
+    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, start: Array,
+    around: Array, elevation: Array,
+) -> tuple[Array, Array]:
+    """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
+
+    The motion (R,) of the linear car is its state, what is seen (4 w: travels, rates, heights of the wheels, rates of
+    these), and 0 up to the next number of whole ``LANES``.
+
+    by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
+                 the road's mean and how far it rises from the middle of the step to its end
+    by_force     (3 w, R) the same by the laws' forces at the end, then by dry friction
+    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 13)
+    start        (2 n,) the first state
+    around       (M + 1, w) means of the road before, in and after the steps
+    elevation    (M, w) of the road at the instants
+    """
+    count, m, w = len(elevation), len(start), len(numbers)
+    states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
+    states[0] = start
+    known, before, motion = np.zeros(m + 4 * w), np.zeros(by_known.shape[1]), np.zeros(by_known.shape[1])
+    known[:m] = start
+    _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,
+          np.zeros_like(before), motion, np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3)), np.zeros(w),
+          numbers[:, FRICTION_N].max() > 0.0)
     return states, recorded
