@@ -65,6 +65,10 @@ class Base:
         return Base(state, slopes, weighed, weighed.residual(state), uncertainty, problem.deviance(state),
                     problem.deviance(seen, fitted=False), problem.judged_error(seen))
 
+    def left_by(self, better: Base) -> float:
+        """What it leaves more than a better model does, of all stretches."""
+        return self.fitted + self.judged - better.fitted - better.judged
+
 
 @dataclass(frozen=True, eq=False)
 class Tried:
@@ -74,6 +78,7 @@ class Tried:
     judged_error         of the stretches that no fit saw
     numbers              how many numbers of the effect were fitted
     starts               at how many values it was tried
+    slopes               taken near the state, or before the effect
     """
 
     effect: Effect
@@ -83,6 +88,7 @@ class Tried:
     judged_error: float
     numbers: int
     starts: int
+    slopes: Slopes
 
     @property
     def whole_gain(self) -> float:
@@ -157,16 +163,18 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
-    """The same with slopes of its own."""
-    return _tried(problem, base, *settled(problem, one.state, rounds), one.starts)
+    """The same with slopes of its own; until it gains by them, those that it was fitted with serve."""
+    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes), one.starts)
 
 
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:
     effect = state.effects[-1].effect
     numbers = sum(not parameter.choices for parameter in effect.parameters)
     seen = located(problem, state, slopes)
-    return Tried(effect, state, base.fitted - problem.deviance(state),
-                 base.judged - problem.deviance(seen, fitted=False), problem.judged_error(seen), numbers, starts)
+    return Tried(
+        effect, state, base.fitted - problem.deviance(state), base.judged - problem.deviance(seen, fitted=False),
+        problem.judged_error(seen), numbers, starts, slopes,
+    )
 
 
 def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:

@@ -135,14 +135,14 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
             break
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        now = Base.of(problem, *settled(problem, best.state))
-        explained = before.fitted + before.judged - now.fitted - now.judged
+        now = Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
+        explained = before.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
-    now, needed = _needed(problem, before, now, taken, len(present), progress)
+    now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
     progress("fitting all stretches")
     whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
-    after, _ = settled(whole, now.state)
+    after, _ = settled(whole, now.state, _FINAL_ROUNDS)
     noise = noise_of(whole, after)
     excess = _excess(whole, after, noise)
     verdict = tuple(needed)
@@ -242,27 +242,27 @@ def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, 
 
 
 def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], present: int,
-            progress: Progress) -> tuple[Base, dict[str, float]]:
+            progress: Progress, workers: int) -> tuple[Base, dict[str, float]]:
     """The model without those that were taken and are not needed by the side of the others, and what each of the
     others is worth."""
     worth = {taken[0].tried.effect.name: taken[0].tried.whole_gain} if len(taken) == 1 else {}
+
+    def without(place: int) -> Base:
+        rest = now.state.effects[:place] + now.state.effects[place + 1:]
+        start = problem.laid_out(rest, now.state.logs, now.state.wander)
+        return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes))
+
     while len(now.state.effects) - present > 1:
-        worth = {}
-        without: dict[str, Base] = {}
-        for place in range(present, len(now.state.effects)):
-            name = now.state.effects[place].effect.name
-            progress(f"is {name} still needed?")
-            rest = now.state.effects[:place] + now.state.effects[place + 1:]
-            start = problem.laid_out(rest, now.state.logs, now.state.wander)
-            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS))
-            worth[name] = other.fitted + other.judged - now.fitted - now.judged
-            without[name] = other
+        names = [one.effect.name for one in now.state.effects[present:]]
+        progress(f"are all of {', '.join(names)} still needed?")
+        with ThreadPoolExecutor(workers) as pool:
+            others = dict(zip(names, pool.map(without, range(present, len(now.state.effects))), strict=True))
+        worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
         freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
-        others = before.fitted + before.judged - without[least].fitted - without[least].judged
-        if worth[least] > max(WORTH * freedom, SHARE * others):
+        if worth[least] > max(WORTH * freedom, SHARE * before.left_by(others[least])):
             break
-        now = without[least]
+        now = others[least]
         worth.pop(least)
     return now, dict(sorted(worth.items(), key=lambda pair: -pair[1]))
 

@@ -30,9 +30,10 @@ Array = npt.NDArray[np.float64]
 _LOG_STEP = 0.01
 _SHARE_STEP = 0.02
 _LEAST_SHARE = 0.1
-_FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e6
+_FIRST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 100.0, 30.0
 # A step that gains less than this share of a degree of freedom ends a fit.
 _SMALL_GAIN = 0.05
+_KEPT_PROMISE = 0.7
 _SETTLING_STEPS, _SETTLED = 5, 2.0
 _RIDGE = 1e-12
 
@@ -292,22 +293,32 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
     make = problem.laid_out if laid_out else partial(problem.predicted, slopes=weighed.slopes)
     state = make(state.effects, state.logs, state.wander)
     now = weighed.objective(state)
+    own: list[Array] | None = None
     for _ in range(most):
-        own = [whitener(columns) for whitener, columns in zip(
-            weighed.whiteners, effect_slopes(problem, weighed.slopes, state, moves), strict=True)] if moves else None
+        kept = own is not None
+        if moves and own is None:
+            own = [whitener(columns) for whitener, columns in zip(
+                weighed.whiteners, effect_slopes(problem, weighed.slopes, state, moves), strict=True)]
         information, gradient = _normal(weighed, state, own)
-        gained = 0.0
+        gained = promised = 0.0
         while damping < _LARGEST_DAMPING:
             damped = information + damping * np.diag(np.diag(information))
-            trial = make(*_stepped(weighed, state, moves, np.asarray(np.linalg.solve(damped, gradient), float)))
+            step = np.asarray(np.linalg.solve(damped, gradient), float)
+            trial = make(*_stepped(weighed, state, moves, step))
             there = weighed.objective(trial)
             if there < now:
                 gained, now, state = now - there, there, trial
-                damping = max(damping / 10, 1e-9)
+                promised = float(2 * gradient @ step - step @ information @ step)
+                damping = max(damping / _MORE_DAMPING, 1e-9)
                 break
-            damping *= 10
+            damping *= _MORE_DAMPING
+        # Slopes that keep what they promise serve for the next step too; those that do not are taken anew.
+        if gained < _KEPT_PROMISE * promised or gained < _SMALL_GAIN:
+            own = None
         if gained < _SMALL_GAIN:
-            break
+            if not kept:
+                break
+            damping = _FIRST_DAMPING
     return state
 
 
@@ -333,14 +344,16 @@ def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
     return effects, logs, wander
 
 
-def settled(problem: Problem, state: State, rounds: int = 6) -> tuple[State, Slopes]:
+def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | None = None) -> tuple[State, Slopes]:
     """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
+
+    slopes    taken near the state before; None: they are taken now
 
     Returns the most likely state that was met, laid out, and slopes taken near it.
     """
     moves = moves_of(state.effects)
     state = problem.laid_out(state.effects, state.logs, state.wander)
-    least, slopes = problem.deviance(state), problem.slopes(state)
+    least, slopes = problem.deviance(state), slopes or problem.slopes(state)
     for done in range(1, rounds + 1):
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         trial = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)

@@ -30,6 +30,7 @@ class CornerLaws:
     mount_n_per_m           stiffness of a mount in series with the damper; infinite: none
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
     dry_friction_n          Coulomb friction beside the damper: this force against any motion, up to it at rest
+    friction_transition_mps this times tanh(rate / transition) instead, unless 0
     others                  further forces: (travel, rate) -> force
     tire_damping_n_s_per_m  of the tire
     tires                   forces by deflection beyond the linear tire: deflection [m] -> force [N]
@@ -41,6 +42,7 @@ class CornerLaws:
     mount_n_per_m: float = np.inf
     springs: tuple[Law, ...] = ()
     dry_friction_n: float = 0.0
+    friction_transition_mps: float = 0.0
     others: tuple[Law2, ...] = ()
     tire_damping_n_s_per_m: float = 0.0
     tires: tuple[Law, ...] = ()

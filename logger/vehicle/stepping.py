@@ -4,8 +4,8 @@ The linear part of the car is stepped exactly (as ``state_space`` has it). What 
 depend on the motion itself; within a step they are straight lines from what they are at its beginning to what they come
 to at its end, which is found by trying twice. Dry friction takes whatever value stops the suspension at the end of the
 step, as far as it reaches, and keeps it for the step: that sticks and slips without a smallest speed (J. J. Moreau's
-time stepping, in: Nonsmooth Mechanics and Applications, 1988). A mount in series with a damper has a state, its
-compression, stepped by the trapezoidal rule.
+time stepping, in: Nonsmooth Mechanics and Applications, 1988). One that grows with the rate is found in the same way. A
+mount in series with a damper has a state, its compression, stepped by the trapezoidal rule.
 
 Laws come as tables, so that one loop serves all of them, in whatever combination. The loop is compiled when numba is
 installed (the ``lab`` extra) and runs as plain Python, some hundred times slower, when it is not.
@@ -98,8 +98,8 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
         pairs.append(_pairs(one.others))
         numbers.append([
             bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others), one.dry_friction_n,
-            one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
-            one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i],
+            one.friction_transition_mps, one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m,
+            structure.tires[i], one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i],
         ])
     return np.array(tables).swapaxes(0, 1).copy(), np.array(pairs), np.array(numbers, dtype=float)
 

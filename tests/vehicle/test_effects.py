@@ -77,7 +77,7 @@ def test_those_of_the_format_are_there() -> None:
     assert len(EFFECTS) == 20
     parameters = {name: [one.name for one in effect.parameters] for name, effect in EFFECTS.items()}
     assert parameters["wheel_lift"] == []
-    assert parameters["dry_friction"] == ["friction_force_n"]
+    assert parameters["dry_friction"] == ["friction_force_n", "transition_velocity_m_per_s"]
     assert parameters["body_bending"] == ["frequency_hz", "damping_ratio", "participation", "ends_move"]
     assert parameters["sensor_bandwidth"] == ["cutoff_hz", "order"]
 

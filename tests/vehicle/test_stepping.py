@@ -151,6 +151,10 @@ def things_rub(car: Newton) -> None:
     car.damper = lambda i, v: car.axles[i].suspension_damping_n_s_per_m * v + 150 * np.tanh(v / 5e-4)
 
 
+def rubber_rubs(car: Newton) -> None:
+    car.damper = lambda i, v: car.axles[i].suspension_damping_n_s_per_m * v + 150 * np.tanh(v / 5e-3)
+
+
 def all_but_friction(car: Newton) -> None:
     springs_harden(car)
     hard = car.spring
@@ -177,6 +181,10 @@ CASES = {
     "lift": ((effect("wheel_lift"),), wheels_lift, 0.005),
     "mount": ((effect("top_mount_compliance", mount_stiffness_n_per_m=8e4),), mounts_give, 0.005),
     "friction": ((effect("dry_friction", friction_force_n=150),), things_rub, 0.03),
+    "friction of rubber": ((effect("dry_friction", friction_force_n=150, transition_velocity_m_per_s=5e-3),),
+                           rubber_rubs, 0.01),
+    "friction at nearly once": ((effect("dry_friction", friction_force_n=150, transition_velocity_m_per_s=5e-4),),
+                                things_rub, 0.01),
     "all but friction": ((STOP, BLOW_OFF, effect("wheel_lift"), SPRING, ASYMMETRY,
                           effect("tire_damping", tire_damping_n_s_per_m=100)), all_but_friction, 0.005),
 }

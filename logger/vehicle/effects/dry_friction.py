@@ -1,6 +1,7 @@
 """Bushings, seals and leaves rub: a force that opposes motion, whatever its speed, and holds the suspension at rest.
 
-While the suspension slides the force is F sign(x'); while it sticks, whatever keeps it stuck, up to F.
+While the suspension slides the force is F sign(x'); while it sticks, whatever keeps it stuck, up to F. What rubs on
+rubber gives way first: then the force is F tanh(x' / v), with v the rate at which it has nearly grown to F.
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ class DryFriction(ForceEffect):
     parameters = (
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
                   "of each suspension, front and rear alike"),
+        Parameter("transition_velocity_m_per_s", 0.005, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
+                  "rate at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0),
     )
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"
     signature = "on smooth stretches the springs lock and the body rides on its tires; rough ones change little"
     shown_by = "drive a smooth road slowly, so that the suspension hardly moves"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
-        return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n)
+        return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n,
+                       friction_transition_mps=p.transition_velocity_m_per_s)
 
 
 EFFECT = DryFriction()
