@@ -9,7 +9,7 @@ car whose laws are all linear is stepped in blocks; only one with other laws goe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -81,11 +81,14 @@ class Response:
 
 def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     """A vehicle with its effects. ValueError when it lacks what its model or an effect needs."""
+    given = vehicle.model
     ordered = sorted(effects, key=lambda one: (one.effect.stage, one.effect.name))
     for one in ordered:
         if isinstance(one.effect, VehicleEffect):
             vehicle = one.effect.vehicle(one.p, vehicle)
     structure = structure_of(vehicle)
+    if (given, vehicle.model) == ("half_car", "full_car"):
+        structure = replace(structure, sides=2)
     for one in ordered:
         if isinstance(one.effect, BodyEffect):
             structure = one.effect.structure(one.p, structure)

@@ -62,6 +62,8 @@ class Structure:
     travel                      (w, n) each suspension's extension, body end minus wheel, is ``travel @ q``
     springs, dampers, tires     (w,) what stands in the matrices for each wheel's spring [N/m], damper [N s/m] and
                                 tire [N/m]
+    sides                       how many times the masses that a person gives are in it: twice, where a half car was
+                                made whole
     """
 
     mass: Array
@@ -77,6 +79,7 @@ class Structure:
     springs: Array
     dampers: Array
     tires: Array
+    sides: int = 1
 
     def state_space(self) -> tuple[Array, Array]:
         """A (2n, 2n) and B (2n, w) of x' = A x + B z with x = (q, q'). Row n is the body's acceleration."""

@@ -263,9 +263,11 @@ def test_a_recorded_distance_is_longer_than_the_way_by_the_scale() -> None:
 
 
 def test_a_half_car_that_rolls_is_two_halves_with_equal_tracks() -> None:
-    made = usual(EFFECTS["roll"])
+    """With what it carries: masses are those of one side."""
+    made, carried = usual(EFFECTS["roll"]), [usual(EFFECTS["payload"]), usual(EFFECTS["occupant"])]
     level = Track(0.05, np.stack([LEFT, LEFT], axis=1))
-    full, half = compose(HALF, [made]), compose(HALF)
+    full, half = compose(HALF, [made, *carried]), compose(HALF, carried)
+    assert [full.structure.mass[i, i] for i in (0, 1, -1)] == [2 * half.structure.mass[i, i] for i in (0, 1, -1)]
     passage = Passage(level, 100.0, DISTANCE_M)
     assert recorded(full, passage) == pytest.approx(recorded(half, passage), abs=1e-9)
 
@@ -281,3 +283,9 @@ def table() -> str:
 
 def test_the_table_in_the_readme_is_that_of_the_catalogue() -> None:
     assert table() in (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+
+
+def test_what_a_full_car_carries_is_carried_by_the_whole_car() -> None:
+    full = CARS["full"]
+    made = compose(full, [usual(EFFECTS["payload"], mass_kg=100.0), usual(EFFECTS["occupant"], mass_kg=70.0)]).structure
+    assert (made.mass[0, 0], made.mass[-1, -1]) == (full.sprung_mass_kg + 100.0, 70.0)

@@ -1,6 +1,7 @@
 """People ride on seats: a mass on a spring and a damper upon the body, at its centre of gravity.
 
-The mass is more than what the model's sprung mass says; frequency and damping ratio are those of the seat with it.
+The mass is more than what the model's sprung mass says, in a half car that of one side, as all its masses are;
+frequency and damping ratio are those of the seat with it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ class Occupant(BodyEffect):
     name = "occupant"
     title = "passengers on their seats"
     parameters = (
-        Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,), "that rides on the seats"),
+        Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,),
+                  "that rides on the seats; in a half car on one side"),
         Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0), "of that mass on its seats"),
         Parameter("damping_ratio", 0.3, 0.02, 1.5, None, Scale.LOG, (0.25,), "of the seats"),
     )
@@ -28,9 +30,8 @@ class Occupant(BodyEffect):
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
         if p.mass_kg == 0:
             return structure
-        omega = 2 * np.pi * p.frequency_hz
-        return hung(structure, p.mass_kg, p.mass_kg * omega**2, 2 * p.damping_ratio * omega * p.mass_kg,
-                    structure.body[:, 0])
+        mass, omega = structure.sides * p.mass_kg, 2 * np.pi * p.frequency_hz
+        return hung(structure, mass, mass * omega**2, 2 * p.damping_ratio * omega * mass, structure.body[:, 0])
 
 
 EFFECT = Occupant()

@@ -1,4 +1,7 @@
-"""More on the springs than the model says: luggage, fuel, people on firm seats. It lies at the centre of gravity."""
+"""More on the springs than the model says: luggage, fuel, people on firm seats. It lies at the centre of gravity.
+
+In a half car it is the load of one side, as all its masses are: half of what the car carries.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ class Payload(VehicleEffect):
     name = "payload"
     title = "more sprung mass than the model says"
     parameters = (
-        Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (60.0, 200.0), "beyond the model's sprung mass"),
+        Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (60.0, 200.0),
+                  "beyond the model's sprung mass; in a half car on one side"),
     )
     source = "Newton's second law; 4.4 of Blum 2015 finds the sprung mass from a bump"
     signature = "the body bounces more slowly and shakes less above its bounce, on every road alike"
