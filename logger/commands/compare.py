@@ -17,7 +17,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import check_model, check_out
+from logger.commands.lab_model import check_model, check_out, paragraphs
 from logger.commands.lab_runs import lab_runs
 from logger.errors import EXIT_DONE, BadInput
 
@@ -73,7 +73,8 @@ def _lines(found: Comparison) -> list[str]:
     seconds = sum(map(len, beside.left)) / beside.rate_hz
     return [
         f"{found.vehicle} on {len(beside.runs)} run{'s' * (len(beside.runs) != 1)}, {seconds:.0f} s", "",
-        *headline(found), "", "After the refit:", *(f"- {one}" for one in evidence(found)), "", conclusion(found), "",
+        paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
+        paragraphs([conclusion(found)]), "",
         *_tables(found),
     ]
 

@@ -132,7 +132,7 @@ def headline(found: Comparison) -> list[str]:
 def evidence(found: Comparison) -> list[str]:
     """What speaks for a missing effect, or against one."""
     if not found.marks.found:
-        return ["After the refit nothing is left that differs from noise: no mark is found."]
+        return ["Nothing is left that differs from noise: no mark is found."]
     return [mark.sentence for mark in found.marks.found]
 
 

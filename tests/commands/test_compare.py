@@ -51,7 +51,8 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     lines = told.splitlines()
     assert lines[0] == "rav4-2009 on 2 runs, 24 s"
     assert lines[2].startswith("What the model leaves is ")
-    assert "Next: ridelog diagnose" in told
+    assert "Next: ridelog diagnose" in " ".join(told.split())
+    assert all(len(line) <= 100 for line in lines)
     assert "wheel hop" in told and "run1, " in told
     assert all(len(line) <= 80 for line in told[told.index("Where"):].splitlines())
 
