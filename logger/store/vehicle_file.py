@@ -46,6 +46,7 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 }
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
 _SHORTEST_WHEELBASE_M = 0.1
+_ROUNDING = 1e-12
 KNOW_EFFECTS = "simulate, compare, diagnose, add-effect and lab"
 
 
@@ -142,7 +143,7 @@ def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> flo
     value = node.number(low=0)
     low, high = (limit * sprung_mass_kg for limit in _LIMITS_PER_KG[key])
     none = key in _MAY_BE_MISSING
-    if low <= value <= high or (none and value == 0):
+    if low * (1 - _ROUNDING) <= value <= high * (1 + _ROUNDING) or (none and value == 0):
         return value
     raise node.wrong(f"a number from {low:g} to {high:g}{' or 0' if none else ''}, for {sprung_mass_kg:g} kg on the "
                      "springs")

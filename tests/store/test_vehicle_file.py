@@ -369,6 +369,16 @@ def test_effects_are_written_as_people_write_them(tmp_path: Path) -> None:
     assert read_model(path).effects[0].standard_errors == {}
 
 
+def test_a_number_at_its_limit_is_within_it(tmp_path: Path) -> None:
+    """A thousandth of this mass, as numbers are rounded, is a little more than a thousandth of it."""
+    mass_kg = 12803.837890625
+    assert 0.001 * mass_kg > 12.803837890625
+    text = QUARTER.replace("sprung_mass_kg: 300", f"sprung_mass_kg: {mass_kg}")
+    text = text.replace("unsprung_mass_kg: 40", "unsprung_mass_kg: 12.803837890625")
+    (tmp_path / "q.yaml").write_text(text.replace("damping_n_s_per_m: 1500", "damping_n_s_per_m: 0"))
+    assert read_vehicle(tmp_path / "q.yaml").front.unsprung_mass_kg == 12.803837890625
+
+
 def test_a_car_without_effects_is_a_model_too(tmp_path: Path) -> None:
     (tmp_path / "q.yaml").write_text(QUARTER)
     assert read_model(tmp_path / "q.yaml") == Model(read_vehicle(tmp_path / "q.yaml"))
