@@ -138,11 +138,12 @@ class Problem:
         count = len(self.nuisance.names)
         by_number = [np.empty((count, len(one))) for one in self.measured]
         moved = self.moved_m(state.wander)
+        unmoved = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
         for index in range(count):
             step = np.zeros(count)
             step[index] = _LOG_STEP
-            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
-            for column, there, here in zip(by_number, shifted, state.predictions, strict=True):
+            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved, rough=True)
+            for column, there, here in zip(by_number, shifted, unmoved, strict=True):
                 column[index] = (there - here) / _LOG_STEP
         columns = [
             np.vstack([numbers, one.columns(prediction, run)])
@@ -161,6 +162,23 @@ class Problem:
                 slopes.columns, strict=True)
         ]
         return State(effects, logs, wander, predictions)
+
+    def effect_slopes(self, state: State, moves: Sequence[Move], anchor: Sequence[Array]) -> list[Array]:
+        """What the effects' numbers do to the predictions, on the scales of the parameters: (m, n) per run.
+
+        anchor    the wander over which runs are laid out
+        """
+        over = self.moved_m(anchor)
+        here = coordinates_of(state.effects, moves)
+        unmoved = self.runs.predict(self.car(state.effects, state.logs), over, rough=True)
+        result = [np.empty((len(moves), len(one))) for one in self.measured]
+        for index, step in enumerate(_steps(state.effects, moves)):
+            there = here.copy()
+            there[index] += step
+            shifted = self.runs.predict(self.car(moved(state.effects, moves, there), state.logs), over, rough=True)
+            for column, high, low in zip(result, shifted, unmoved, strict=True):
+                column[index] = (high - low) / step
+        return result
 
 
 def located(problem: Problem, state: State, slopes: Slopes) -> State:
@@ -271,19 +289,6 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     return np.array(steps)
 
 
-def effect_slopes(problem: Problem, slopes: Slopes, state: State, moves: Sequence[Move]) -> list[Array]:
-    """What the effects' numbers do to the predictions, on the scales of the parameters: (m, n) per run."""
-    here = coordinates_of(state.effects, moves)
-    result = [np.empty((len(moves), len(one))) for one in problem.measured]
-    for index, step in enumerate(_steps(state.effects, moves)):
-        there = here.copy()
-        there[index] += step
-        shifted = problem.predicted(moved(state.effects, moves, there), state.logs, state.wander, slopes)
-        for column, high, low in zip(result, shifted.predictions, state.predictions, strict=True):
-            column[index] = (high - low) / step
-    return result
-
-
 def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False) -> State:
     """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander.
 
@@ -298,7 +303,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
         kept = own is not None
         if moves and own is None:
             own = [whitener(columns) for whitener, columns in zip(
-                weighed.whiteners, effect_slopes(problem, weighed.slopes, state, moves), strict=True)]
+                weighed.whiteners, problem.effect_slopes(state, moves, weighed.slopes.anchor), strict=True)]
         information, gradient = _normal(weighed, state, own)
         gained = promised = 0.0
         while damping < _LARGEST_DAMPING:

@@ -26,7 +26,9 @@ Array = npt.NDArray[np.float64]
 SKIP_S = 2.0
 MOST_MPS2 = 1e6
 """Predictions end here: those of a car whose motion grows without bound, which effects may make."""
-_KEPT_PASSAGES = 3
+_KEPT_PASSAGES = 4
+# Dry friction changes at once: it needs so many times the steps that other laws need.
+_FINER_IF_IT_RUBS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,33 +74,35 @@ class Runs:
 
     def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
-        self._passages: list[dict[bytes, Passage]] = [{} for _ in self.runs]
+        self._passages: list[dict[tuple[float, bytes], Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Array]:
+    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False) -> list[Array]:
         """What would have been recorded in each run, (n,) whole [m/s2].
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
+        rough      in no more steps than asked for: good enough for slopes, also where friction needs more
         """
+        fine_hz = self.fine_hz if rough or not car.rubs else _FINER_IF_IT_RUBS * self.fine_hz
         with np.errstate(over="ignore", invalid="ignore"):
-            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
+            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m, fine_hz)]
         return [np.clip(np.nan_to_num(one, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2) for one in found]
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
-        return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
+        return [respond(car, passage) for passage in self._laid_out(car, moved_m, self.fine_hz)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
+    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, fine_hz: float) -> list[Passage]:
         found = []
         for index, run in enumerate(self.runs):
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
             distance = car.driven(distance)
-            key = distance.tobytes()
+            key = fine_hz, distance.tobytes()
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(run.track, run.rate_hz, distance, self.fine_hz)
+                passage = Passage(run.track, run.rate_hz, distance, fine_hz)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import Move, Problem, State, Weighed, coordinates_of, effect_slopes, moves_of
+from logger.lab.fitting import Move, Problem, State, Weighed, coordinates_of, moves_of
 from logger.vehicle.effect import Chosen
 
 Array = npt.NDArray[np.float64]
@@ -32,7 +32,7 @@ def with_spread(problem: Problem, state: State) -> tuple[tuple[Chosen, ...], Arr
     information = weighed.information
     if moves:
         own = [whitener(columns) for whitener, columns in zip(
-            weighed.whiteners, effect_slopes(problem, slopes, state, moves), strict=True)]
+            weighed.whiteners, problem.effect_slopes(state, moves, slopes.anchor), strict=True)]
         mixed = weighed.against(own)
         alone = np.sum([one @ one.T for one in own], axis=0)
         information = np.block([[information, mixed], [mixed.T, alone]])

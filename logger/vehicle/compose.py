@@ -47,6 +47,11 @@ class Car:
     drives: tuple[Chosen, ...]
     bends_laws: bool
 
+    @property
+    def rubs(self) -> bool:
+        """Whether there is dry friction in it."""
+        return any(one.dry_friction_n > 0 for one in self.laws)
+
     def factor(self, s: Complex) -> Complex:
         """What lies between the body and the recorder, at s (f,) [1/s]."""
         result = np.ones_like(s)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
 from logger.identification.axle_response import AxleResponse
+from logger.identification.common_roughness import with_common_roughness
 from logger.identification.crossing import Drive
 from logger.identification.fit import Fit, Options, fit
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
@@ -24,7 +25,7 @@ from logger.identification.obstacles import Bump
 from logger.identification.parameters import changed, free, names
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput, free_input, is_input
+from logger.identification.road_input import RoadInput, expanded, free_input, is_input
 from logger.identification.shared_road import fit_roads
 from logger.identification.verdict import NotIdentifiable
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
@@ -48,6 +49,7 @@ TABLE = {MASS: 875.0, FRONT: 23088.0, REAR: 23088.0}
 IRI, NOISE_MPS2, SECONDS, BUMP_AT_M = 5.0, 0.05, 12.0, 8.0
 DRAWS, START_DRAWS = 200, 4
 GRID = 8192
+PASS_DRAWS = 100
 INPUT_DRAWS, ROAD_DRAWS, ROAD_M, GD_N0_CM3 = 100, 100, 400.0, 64.0
 ROAD_TABLE = {MASS: 875.0, "both.suspension_damping_n_s_per_m": 1776.0}
 
@@ -61,6 +63,7 @@ def main() -> int:
     eight(figures)
     refusals(figures)
     unknown_bump(figures)
+    passes(figures)
     unmeasured(figures)
     no_answer_without_a_road(figures)
     return 1 if figures.missed else 0
@@ -218,6 +221,33 @@ def unknown_bump(figures: Figures) -> None:
     judged(figures, "bump unknown", np.array(errors), np.array(expected), bound)
     figures.at_most("bump unknown: error of the mass, rms", 100 * rms([one[0] / 875 for one in errors]), 0.5, "%")
     print(f"   {', '.join(truth)}: bounds {bound.round(5)}; {np.median(times):.2f} s of the processor a fit")
+
+
+def passes(figures: Figures) -> None:
+    """Three passes over one bump and the same rough road, and over three bumps alike: what the standard errors say."""
+    wanted = {MASS: 875.0, "both.suspension_damping_n_s_per_m": 1776.0}
+    road = RoadInput(bump=Bump(BUMP_AT_M + 0.2, 0.15, 2.6))
+    flat = Track(1.0, np.zeros(2))
+    for title, step in (("three passes over one bump", 0), ("three bumps alike", 1000)):
+        errors, alone, counted = [], [], []
+        for seed in range(PASS_DRAWS):
+            records = [replace(rough(seed + step * number), track=flat) for number in range(3)]
+            for number, record in enumerate(records):  # the sensor's noise is another one each time
+                noise = np.random.default_rng(10_000 + 3 * seed + number).standard_normal(len(record.time_s))
+                records[number] = replace(record, measured_mps2=record.measured_mps2 + NOISE_MPS2 * noise)
+            numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
+                       *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
+            model = VehicleModel(CAR, numbers, records, road)
+            found = fit(model, model.measured, Options(noise=[RoadNoise(model.road_spectra)]))
+            told = with_common_roughness(model, found).fit
+            errors.append([found.parameters[name] / value - 1 for name, value in wanted.items()])
+            alone.append([found.standard_errors[name] / value for name, value in wanted.items()])
+            counted.append([told.standard_errors[name] / value for name, value in wanted.items()])
+        off = np.abs(errors)
+        inside = 100 * float((off < 2 * np.array(counted)).mean())
+        figures.at_least(f"{title}: within two standard errors", inside, 93.0, "%")
+        print(f"   {100 * float((off < 2 * np.array(alone)).mean()):.0f} % were the roads taken for different ones; "
+              f"standard errors {(np.mean(counted, axis=0) / np.mean(alone, axis=0)).round(2)} times as large")
 
 
 def unmeasured(figures: Figures) -> None:

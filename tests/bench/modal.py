@@ -24,7 +24,8 @@ from figures import Figures
 
 RATE_HZ = 100.0
 DECAY_S, RANDOM_S = 20.0, 200.0
-TRIALS_OF_FIVE, TRIALS = 200, 40
+TRIALS_OF_FIVE, TRIALS_OF_ONE, TRIALS = 200, 100, 40
+ONE_HZ = 2.0
 NEAR = 0.05
 BY_CHANCE = 1.05  # a ratio of errors over so many records may exceed 1 by this much and mean nothing
 
@@ -82,6 +83,7 @@ def main() -> int:
     for decibel in (40, 20):
         five_modes(figures, decibel)
     noise_alone(figures)
+    one_mode(figures)
     print("\nr.m.s. error over modes and records: frequency %, damping % of itself; processor time of one record")
     for case in CASES:
         compare(figures, case, "decay", "era", 20)
@@ -142,6 +144,29 @@ def noise_alone(figures: Figures) -> None:
         found += len(find_modes(samples, RATE_HZ, "ssi").modes)
         found += len(find_modes(samples, RATE_HZ, "era", decay=True).modes)
     figures.at_most("modes found in 80 records of noise", found, 1, "")
+
+
+def one_mode(figures: Figures) -> None:
+    """A single mode under random forces for a minute, from light to heavy damping: found, with errors that are right."""
+    missed, inside = 0, []
+    for true_ratio in (0.01, 0.05, 0.2, 0.4):
+        masses = with_damping_ratios(np.eye(1), np.eye(1) * (2 * np.pi * ONE_HZ) ** 2, np.array([true_ratio]))
+        here = []
+        for seed in range(TRIALS_OF_ONE):
+            rng = np.random.default_rng(seed)
+            samples = noisy(random_response(masses, rng.standard_normal((240 * round(RATE_HZ), 1)), RATE_HZ), 20, rng)
+            mode = match(masses.poles()[0], find_modes(samples, RATE_HZ, "ssi", decay=False).modes)[0]
+            missed += mode is None
+            if mode is not None:
+                here.append((abs(mode.frequency_hz - ONE_HZ) < 2 * mode.frequency_std_hz,
+                             abs(mode.damping_ratio - true_ratio) < 2 * mode.damping_std))
+        print(f"   one mode of {ONE_HZ:g} Hz and {true_ratio:.0%}: frequency and damping within 2 sd "
+              f"{(100 * np.mean(here, axis=0)).round(1)} %", flush=True)
+        inside += here
+    name = f"one mode under random forces, {4 * TRIALS_OF_ONE} records of 60 s:"
+    figures.at_most(f"{name} missed", missed, 0, "")
+    for what, share in zip(("frequency", "damping"), 100 * np.mean(inside, axis=0), strict=True):
+        figures.at_least(f"{name} {what} in 2 sd", float(share), 93, "%")
 
 
 def compare(figures: Figures, case: Case, kind: str, method: str, decibel: float) -> None:
