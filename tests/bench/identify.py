@@ -231,10 +231,11 @@ def passes(figures: Figures) -> None:
     for title, step in (("three passes over one bump", 0), ("three bumps alike", 1000)):
         errors, alone, counted = [], [], []
         for seed in range(PASS_DRAWS):
-            records = [replace(rough(seed + step * number), track=flat) for number in range(3)]
-            for number, record in enumerate(records):  # the sensor's noise is another one each time
-                noise = np.random.default_rng(10_000 + 3 * seed + number).standard_normal(len(record.time_s))
-                records[number] = replace(record, measured_mps2=record.measured_mps2 + NOISE_MPS2 * noise)
+            records = []
+            for number in range(3):
+                clean = bump_record(CAR, SECONDS, 0.0, seed + step * number, IRI, start_m=BUMP_AT_M)
+                noise = np.random.default_rng(10_000 + 3 * seed + number).standard_normal(len(clean.time_s))
+                records.append(replace(clean, track=flat, measured_mps2=clean.measured_mps2 + NOISE_MPS2 * noise))
             numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
             model = VehicleModel(CAR, numbers, records, road)

@@ -147,7 +147,7 @@ def noise_alone(figures: Figures) -> None:
 
 
 def one_mode(figures: Figures) -> None:
-    """A single mode under random forces for a minute, from light to heavy damping: found, with errors that are right."""
+    """A single mode under random forces for a minute, lightly to heavily damped: found, with errors that are right."""
     missed, inside = 0, []
     for true_ratio in (0.01, 0.05, 0.2, 0.4):
         masses = with_damping_ratios(np.eye(1), np.eye(1) * (2 * np.pi * ONE_HZ) ** 2, np.array([true_ratio]))
