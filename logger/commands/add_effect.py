@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
     given = replace(given, effects={**given.effects, effect.name: effect},
                     files={**given.files, effect.name: file} if file is not None else given.files)
     try:
-        found = added(given, searched(given, effect, values))
+        is_given = set(values) >= {one.name for one in effect.parameters}
+        found = added(given, searched(given, effect, values), 1 if is_given else len(effect.trials()))
     finally:
         wipe()
     write_model(args.out, model_of(given, found))
@@ -114,12 +115,14 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         tries = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
-    best = max(tries, key=lambda one: one.gain)
+    choices = {one.name for one in effect.parameters if one.choices} & set(values)
+    said = [one for one in tries if all(one.state.effects[-1].values[name] == values[name] for name in choices)]
+    best = max(said or tries, key=lambda one: one.gain)
     return chosen(effect, {**best.state.effects[-1].values, **values})
 
 
-def added(given: Bench, start: Chosen) -> Gained:
-    """The effect fitted with the car's numbers on all of the runs."""
+def added(given: Bench, start: Chosen, starts: int) -> Gained:
+    """The effect fitted with the car's numbers on all of the runs, from the best of so many ``starts``."""
     from logger.lab.addition import add
     from logger.lab.gained import gained
 
@@ -127,7 +130,7 @@ def added(given: Bench, start: Chosen) -> Gained:
     problem = given.problem(whole=True)
     try:
         found = add(problem, given.model.effects, [given.filed(start)])
-        return gained(problem, found, [start.effect.name])
+        return gained(problem, found, [start.effect.name], starts)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
 

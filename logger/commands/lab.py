@@ -117,7 +117,7 @@ def _round(given: Bench, start: Chosen, out: Path, number: int) -> Round:
     from logger.store.vehicle_file import write_model
 
     try:
-        gained = added(given, start)
+        gained = added(given, start, len(start.effect.trials()))
     finally:
         wipe()
     model = model_of(given, gained)

@@ -401,6 +401,7 @@ def _respond_with_effects(
             if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
                 raise BadInput(f"{car.vehicle.name}: its effects are too strong for its masses: they would need steps "
                                f"shorter than {1000 / FINE_RATE_HZ:g} ms")
+            accel = finer if car.rubs else accel
     if not bounded([accel]):
         raise BadInput(f"{car.vehicle.name}: with its effects the car's motion grows without bound")
     columns = {"accel_z_mps2": accel}

@@ -44,6 +44,7 @@ class Base:
     judged_error   of the stretches that no fit saw
     left           its weighed residuals
     uncertainty    (count, count) covariance of the car's numbers and the wander
+    pull           (count,) what is left of the way to where these fit best
     """
 
     state: State
@@ -51,6 +52,7 @@ class Base:
     weighed: Weighed
     left: list[Array]
     uncertainty: Array
+    pull: Array
     fitted: float
     judged: float
     judged_error: float
@@ -61,8 +63,10 @@ class Base:
         slopes = Slopes(slopes.columns, state.wander)  # so that the state is predicted as it was laid out
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
+        left = weighed.residual(state)
+        gradient = weighed.against([one[None] for one in left])[:, 0] - weighed.prior @ weighed.joined(state)
         seen = located(problem, state, slopes)
-        return Base(state, slopes, weighed, weighed.residual(state), uncertainty, problem.deviance(state),
+        return Base(state, slopes, weighed, left, uncertainty, uncertainty @ gradient, problem.deviance(state),
                     problem.deviance(seen, fitted=False), problem.judged_error(seen))
 
     def left_by(self, better: Base) -> float:
@@ -78,6 +82,7 @@ class Tried:
     judged_error         of the stretches that no fit saw
     numbers              how many numbers of the effect were fitted
     starts               at how many values it was tried
+    eased                how much less the car's numbers and the wander are off by than without it, in cost
     slopes               taken near the state, or before the effect
     """
 
@@ -88,6 +93,7 @@ class Tried:
     judged_error: float
     numbers: int
     starts: int
+    eased: float
     slopes: Slopes
 
     @property
@@ -173,20 +179,21 @@ def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: i
     seen = located(problem, state, slopes)
     return Tried(
         effect, state, base.fitted - problem.deviance(state), base.judged - problem.deviance(seen, fitted=False),
-        problem.judged_error(seen), numbers, starts, slopes,
+        problem.judged_error(seen), numbers, starts, problem.cost(base.state) - problem.cost(state), slopes,
     )
 
 
 def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     """A trial at the strength at which it explains most."""
     weighed, state = base.weighed, base.state
-    here = weighed.joined(state)
+    here = weighed.joined(state) + base.pull
     there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes)
     change = [whitener((new - old)[None]) for whitener, new, old in zip(
         weighed.whiteners, there.predictions, state.predictions, strict=True)]
-    absorbed = base.uncertainty @ weighed.against(change)[:, 0]
-    along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True))
-    own = sum(float(c[0] @ c[0]) for c in change) - float(weighed.against(change)[:, 0] @ absorbed)
+    mixed = weighed.against(change)[:, 0]
+    absorbed = base.uncertainty @ mixed
+    along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True)) - float(mixed @ base.pull)
+    own = sum(float(c[0] @ c[0]) for c in change) - float(mixed @ absorbed)
     if not own > 0:
         return Trial(one, 0.0, here)
     strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))

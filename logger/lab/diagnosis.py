@@ -33,6 +33,9 @@ WORTH = 0.0025
 """The least that an effect has to lower the mean logarithm of the power that is left."""
 SHARE = 0.006
 """The least share that an effect has to add to what those before it explain: their laws are never quite the car's."""
+EASED, SHARE_EASED = 16.0, 0.002
+"""An effect of which these data tell only that the car's numbers would be off too far without it is worth naming as
+well: from four standard deviations on, and from this share of what those before it explain."""
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 UNEXPLAINED = 0.10
@@ -227,8 +230,14 @@ def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
     fit saw."""
     freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, None))
     return (_p_value(one.gain, one.numbers, count) < CHANCE
-            and one.whole_gain > max(WORTH * freedom, SHARE * before)
+            and _worthy(one.whole_gain, one.eased, freedom, before)
             and one.judged_gain > -HARM * one.gain)
+
+
+def _worthy(gain: float, eased: float, freedom: float, before: float) -> bool:
+    """Whether what an effect explains, or what it saves the car's numbers from, is worth naming beside what was
+    explained before."""
+    return gain > max(WORTH * freedom, SHARE * before) or eased > max(EASED, SHARE_EASED * before)
 
 
 def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
@@ -250,7 +259,8 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
     def without(place: int) -> Base:
         rest = now.state.effects[:place] + now.state.effects[place + 1:]
         start = problem.laid_out(rest, now.state.logs, now.state.wander)
-        return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes))
+        slopes = None if now.state.effects[place].effect.realigns else now.slopes
+        return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes))
 
     while len(now.state.effects) - present > 1:
         names = [one.effect.name for one in now.state.effects[present:]]
@@ -260,7 +270,8 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
         worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
         freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
-        if worth[least] > max(WORTH * freedom, SHARE * before.left_by(others[least])):
+        eased = problem.cost(others[least].state) - problem.cost(now.state)
+        if _worthy(worth[least], eased, freedom, before.left_by(others[least])):
             break
         now = others[least]
         worth.pop(least)

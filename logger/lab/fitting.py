@@ -358,15 +358,15 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
     """
     moves = moves_of(state.effects)
     state = problem.laid_out(state.effects, state.logs, state.wander)
-    least, slopes = problem.deviance(state), slopes or problem.slopes(state)
+    given, least, slopes = slopes is not None, problem.deviance(state), slopes or problem.slopes(state)
     for done in range(1, rounds + 1):
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         trial = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)
         now = problem.deviance(trial)
-        if now >= least:  # by the weights of before it was better
+        gained = least - now
+        if gained > 0:  # else it was better by the weights of before
+            least, state = now, trial
+        if done == rounds or (gained < _SETTLED and not given):
             break
-        gained, least, state = least - now, now, trial
-        if gained < _SETTLED or done == rounds:
-            break
-        slopes = problem.slopes(state)
+        given, slopes = False, problem.slopes(state)
     return state, slopes

@@ -82,14 +82,15 @@ class Gained:
         return moved_between(self.added, self.added)
 
 
-def gained(problem: Problem, added: Added, names: Sequence[str]) -> Gained:
-    """What adding the effects of these names to ``problem``'s vehicle brought (S. S. Wilks 1938)."""
+def gained(problem: Problem, added: Added, names: Sequence[str], starts: int = 1) -> Gained:
+    """What adding the effects of these names to ``problem``'s vehicle brought (S. S. Wilks 1938). Where the fit begins
+    had been chosen of so many ``starts``."""
     from scipy.special import gammaincc
 
     gain = problem.deviance(added.before) - problem.deviance(added.after)
     which = [index for index, one in enumerate(added.effects) if one.effect.name in names]
     numbers = max(1, len(moves_of(added.effects, which)))
-    return Gained(added, tuple(names), float(gammaincc(numbers / 2, max(gain, 0.0) / 2)),
+    return Gained(added, tuple(names), min(1.0, starts * float(gammaincc(numbers / 2, max(gain, 0.0) / 2))),
                   floor_error(problem, noise_of(problem, added.after)))
 
 
@@ -124,8 +125,8 @@ def judgement(found: Gained) -> list[str]:
     lines = [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if not parameter.choices
-              and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high))
-              <= _AT_BOUND * abs(parameter.high)]
+              and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
+                      if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
         if at:
             lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
     if found.helps:

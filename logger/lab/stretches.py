@@ -57,8 +57,10 @@ class Stretches:
         self.rate_hz, self.first, self.count = rate, run.first, run.count
         time_s = np.arange(run.count - run.first) / rate
         turn_s = min(FIT_S + JUDGE_S, len(time_s) / rate)
-        fit = np.mod(time_s, turn_s) < turn_s * FIT_S / (FIT_S + JUDGE_S)
-        if whole or not (~fit).sum() >= _BLOCK_S * rate:
+        half_s = 0.5 * _BLOCK_S  # blocks begin so far apart: one has to begin where judging does
+        fit_s = half_s * round(turn_s * FIT_S / (FIT_S + JUDGE_S) / half_s)
+        fit = np.mod(time_s, turn_s) < fit_s
+        if whole or turn_s - fit_s < _BLOCK_S:
             fit = np.ones_like(fit)
         self.fit: Bools = fit
         self.judges = bool((~fit).any())

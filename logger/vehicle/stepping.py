@@ -29,6 +29,7 @@ Array = npt.NDArray[np.float64]
 _POINTS = 8001
 _TRAVEL_SIDE, _RATE_SIDE = 120, 160
 _GRAVITY_MPS2 = 9.80665
+_RUBS_AT, _GROWS_AT, _SLOW = 0.7, 0.55, 200.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +79,21 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
     )
     around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
     rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
-    return Motion(*steps(known, forces, step_s, *_tabulated(structure, laws, step_s), rest, around, elevation))
+    ease = -np.diag(forces[2 * w :, 2 * n + w : 2 * n + 2 * w])
+    return Motion(*steps(known, forces, step_s, *_tabulated(structure, laws, step_s, ease), rest, around, elevation))
 
 
-def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> tuple[Array, Array, Array]:
+def _looked_at(one: CornerLaws, ease: float) -> float:
+    """At which share of a step friction looks at the rate, which it can change by force times ``ease``. A half would
+    be right to second order, but nothing comes to rest then; what grows slowly with the rate needs hardly more."""
+    pull = ease * one.dry_friction_n
+    sudden = pull / (pull + _SLOW * one.friction_transition_mps) if pull > 0 else 1.0
+    return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
+
+
+def _tabulated(
+    structure: Structure, laws: Sequence[CornerLaws], step_s: float, ease: Array,
+) -> tuple[Array, Array, Array]:
     """What the laws add to the linear springs, dampers and tires, as the loop reads it: tables of one and of two
     variables, and numbers."""
     from logger.vehicle.stepping_loop import RATE_MPS, TRAVEL_M
@@ -98,8 +110,9 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
         pairs.append(_pairs(one.others))
         numbers.append([
             bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others), one.dry_friction_n,
-            one.friction_transition_mps, one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m,
-            structure.tires[i], one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i],
+            one.friction_transition_mps, _looked_at(one, ease[i]), one.mount_n_per_m if mounted else 0.0, low,
+            1 / step, one.damping_n_s_per_m, structure.tires[i], one.tire_damping_n_s_per_m,
+            np.inf if one.tire_pulls else loads[i],
         ])
     return np.array(tables).swapaxes(0, 1).copy(), np.array(pairs), np.array(numbers, dtype=float)
 

@@ -42,10 +42,6 @@ UNIT_M, UNIT_MPS = 0.01, 0.02
 """Tables of two variables are even in arsinh of travel and rate over these."""
 LANES = 4
 """Numbers that are summed side by side."""
-# Friction looks at the rate at this share of a step: right to second order at a half, where it would not come to rest.
-_RUBS_AT = 0.7
-# One that grows with the rate does come to rest, and needs hardly more than a half.
-_GROWS_AT = 0.55
 _PASSES = 2
 _NEWTON_STEPS, _NEAR = 4, 1e-3
 
@@ -53,8 +49,8 @@ _NEWTON_STEPS, _NEAR = 4, 1e-3
 # Rows of the tables of one variable.
 SPRING, DAMPER, MOUNT, TIRE = range(4)
 # Columns of the numbers of a corner: whether it has these tables and one of two variables, and then
-(PAIR, FRICTION_N, FRICTION_MPS, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING,
- MOST_PULL_N) = range(4, 14)
+(PAIR, FRICTION_N, FRICTION_MPS, FRICTION_AT, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M,
+ TIRE_DAMPING, MOST_PULL_N) = range(4, 15)
 
 
 @_compiled
@@ -166,7 +162,7 @@ def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, 
                 if j != i:
                     free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
             forces[2 * w + i] = _friction(free, -by_force[2 * w + i, m + w + i], numbers[i, FRICTION_N],
-                                          numbers[i, FRICTION_MPS] / _GROWS_AT)
+                                          numbers[i, FRICTION_MPS] / numbers[i, FRICTION_AT])
     for i in range(w):
         for r in range(m, m + 4 * w):
             motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]
@@ -214,8 +210,7 @@ def _walk(
             road[i] = elevation[k + 1, i]
             road[w + i] = (around[k + 2, i] - around[k + 1, i]) / step_s
             mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
-            share = _GROWS_AT if numbers[i, FRICTION_MPS] > 0.0 else _RUBS_AT
-            earlier[i] = (1 - share) / share * motion[m + w + i]
+            earlier[i] = (1 / numbers[i, FRICTION_AT] - 1) * motion[m + w + i]
         _sum(before, 0, nothing, known, m + 4 * w, by_known)
         _settle(motion, m, before, forces, by_force, tables, pairs, numbers, rubs, road, mounts, step_s,
                 earlier)
@@ -243,7 +238,7 @@ def steps(
     by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
                  the road's mean and how far it rises from the middle of the step to its end
     by_force     (3 w, R) the same by the laws' forces at the end, then by dry friction
-    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 14)
+    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 15)
     start        (2 n,) the first state
     around       (M + 1, w) means of the road before, in and after the steps
     elevation    (M, w) of the road at the instants

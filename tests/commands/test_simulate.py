@@ -23,7 +23,7 @@ from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.passage import Passage
-from logger.vehicle.simulate import drive
+from logger.vehicle.simulate import FINE_RATE_HZ, drive
 from logger.vehicle.structure import body_point
 
 BUMP = "bump:start_m=20,height_m=0.08,width_m=3.6"
@@ -228,7 +228,8 @@ def test_a_drive_of_a_car_with_effects(folder: Path, capsys: pytest.CaptureFixtu
          "parameters": {"frequency_hz": 22.0, "damping_ratio": 0.04, "participation": -0.3, "ends_move": 0.0}},
     ]
     car = car_with(**{one["effect"]: one["parameters"] for one in made["effects"]})
-    assert run.accel_z_mps2 == pytest.approx(recorded(car, Passage(run.track, 100.0, run.distance_m)), abs=1e-6)
+    passage = Passage(run.track, 100.0, run.distance_m, 2 * FINE_RATE_HZ)  # dry friction needs it
+    assert run.accel_z_mps2 == pytest.approx(recorded(car, passage), abs=1e-6)
     simulated(folder, "--speed", "20", "--effect", "wheel_lift")
     assert capsys.readouterr().out.endswith("\n  with wheel_lift\n")
 

@@ -19,7 +19,20 @@ def test_two_thirds_of_the_time_are_fitted_and_the_rest_judges() -> None:
     assert stretches.fit.sum() == pytest.approx(36 * 100 * FIT_S / (FIT_S + JUDGE_S))
     shorter = Stretches(run_of(200 + 12 * 100))
     assert shorter.judges
-    assert shorter.fit.sum() == pytest.approx(8 * 100, abs=1)
+    assert shorter.fit.sum() == pytest.approx(7.5 * 100, abs=1)
+
+
+@pytest.mark.parametrize("seconds", np.arange(4.0, 40.0, 0.7))
+def test_what_judges_has_a_power_whatever_the_length(seconds: float) -> None:
+    run = run_of(200 + round(seconds * 100))
+    stretches = Stretches(run)
+    noise = np.random.default_rng(2).normal(0, 0.05, run.count)
+    cells = stretches.cells(noise, False)
+    judged = cells.freedom.sum()
+    assert (judged > 0) == stretches.judges == (~stretches.fit).any()
+    assert stretches.judges or seconds < 18
+    if judged:
+        assert cells.freedom @ cells.power / judged == pytest.approx(0.05**2, rel=0.3)
 
 
 def test_a_run_too_short_to_judge_is_fitted_whole() -> None:

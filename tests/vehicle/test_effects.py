@@ -237,6 +237,13 @@ def test_a_body_that_bends_does_as_its_equation_says(ends_move: float) -> None:
     assert structure.body[:2, 0] == pytest.approx([1, 0])
 
 
+@pytest.mark.parametrize("ends_move", [0.0, 1.0])
+def test_a_person_of_a_gram_does_nothing_to_a_body_that_bends(ends_move: float) -> None:
+    bends = usual(EFFECTS["body_bending"], ends_move=ends_move)
+    light = usual(EFFECTS["occupant"], mass_kg=0.001)
+    assert record(HALF, bends, light) == pytest.approx(record(HALF, bends), abs=1e-4)
+
+
 def test_a_late_clock_and_a_gain_shift_and_stretch_the_record() -> None:
     plain = record(HALF)
     late = record(HALF, usual(EFFECTS["time_offset"], delay_s=0.03))

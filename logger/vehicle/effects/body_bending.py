@@ -37,6 +37,8 @@ class BodyBending(BodyEffect):
     signature = "a narrow peak above wheel hop that follows the forces of the suspensions, with a dip beside it"
     shown_by = "drive a rough road at two speeds: the peak keeps its frequency and grows with the road"
 
+    stage = 5  # what hangs on the body hangs on the rigid one
+
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
         omega, mass = 2 * np.pi * p.frequency_hz, structure.mass[0, 0]
         share = 1.0 if p.ends_move else _AT_A_NODE

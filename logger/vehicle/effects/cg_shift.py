@@ -18,7 +18,8 @@ class CgShift(VehicleEffect):
     name = "cg_shift"
     title = "the centre of gravity sits ahead of where the model puts it, or behind"
     parameters = (
-        Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, 0.15), "ahead positive, behind negative"),
+        Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, -0.03, 0.03, 0.15),
+                  "ahead positive, behind negative"),
     )
     source = "rigid-body mechanics (Eq 4.12 of Blum 2015 with other distances)"
     signature = "one axle is heard more than the model says, the other one less"

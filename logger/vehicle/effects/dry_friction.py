@@ -19,7 +19,7 @@ class DryFriction(ForceEffect):
     parameters = (
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
                   "of each suspension, front and rear alike"),
-        Parameter("transition_velocity_m_per_s", 0.005, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
+        Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "rate at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0),
     )
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"
@@ -27,6 +27,8 @@ class DryFriction(ForceEffect):
     shown_by = "drive a smooth road slowly, so that the suspension hardly moves"
 
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        if p.friction_force_n == 0:
+            return laws
         return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n,
                        friction_transition_mps=p.transition_velocity_m_per_s)
 

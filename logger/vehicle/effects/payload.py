@@ -15,7 +15,7 @@ class Payload(VehicleEffect):
     name = "payload"
     title = "more sprung mass than the model says"
     parameters = (
-        Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (60.0, 200.0),
+        Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (10.0, 60.0, 200.0),
                   "beyond the model's sprung mass; in a half car on one side"),
     )
     source = "Newton's second law; 4.4 of Blum 2015 finds the sprung mass from a bump"

@@ -16,7 +16,7 @@ class TireEnveloping(VehicleEffect):
     name = "tire_enveloping"
     title = "another contact length than the model's"
     parameters = (
-        Parameter("contact_patch_m", 0.25, 0.0, 1.0, None, Scale.LINEAR, (0.0, 0.12, 0.35, 0.5),
+        Parameter("contact_patch_m", 0.25, 0.0, 1.0, None, Scale.LINEAR, (0.0, 0.12, 0.2, 0.28, 0.35, 0.5),
                   "over which a tire averages the road"),
     )
     source = "M. W. Sayers, S. M. Karamihas, The Little Book of Profiling (1998): a moving average of 0.25 m"
