@@ -159,7 +159,7 @@ def parse_sentence(sentence: bytes) -> Sentence | None:
 
 
 def _parser(sentence: bytes) -> Callable[[list[bytes]], Sentence] | None:
-    if sentence[6:7] != b"," or sentence[1:2] == b"P":
+    if not sentence[1:6].isalnum() or sentence[6:7] != b"," or sentence[1:2] == b"P":
         return None
     return _PARSERS.get(sentence[3:6])
 

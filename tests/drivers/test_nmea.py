@@ -314,6 +314,13 @@ def test_a_receiver_without_fix_or_time_is_still_heard():
     assert [fix.valid for fix in decode(lines(*stuck))[0]] == [False] * 4
 
 
+def test_an_address_with_other_than_letters_and_digits_is_none():
+    place = "120000,A,4807.038,N,01131.000,E,10.0,84.4,150626,,,A"
+    assert parse_sentence(sentence(f"GNRMC,{place}")) is not None
+    for address in ("G,RMC", ",,RMC", "G RMC", "G*RMC"):
+        assert parse_sentence(sentence(f"{address},{place}")) is None
+
+
 def test_several_talkers_make_one_fix():
     fixes, _ = decode(lines(rmc(talker="GP"), rmc(talker="GL", speed="11.0"), rmc("120001", talker="GN")))
     assert [fix.speed_mps for fix in fixes] == [10 * KNOT_MPS] * 2

@@ -1,0 +1,23 @@
+"""docs/faults.md: what it says is what the bench says, and no promise on it is broken."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "faults.md"
+
+
+def test_no_promise_is_broken_and_no_goal_missed() -> None:
+    bad = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if "BROKEN" in line or "MISSED" in line]
+    assert bad == []
+
+
+def test_its_head_is_that_of_the_bench(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [str(ROOT / "tests" / "bench"), *sys.path])
+    import faults
+
+    assert PAGE.read_text(encoding="utf-8").startswith(f"{faults.HEAD}\n## What `ridelog status` says\n")
