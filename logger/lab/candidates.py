@@ -28,7 +28,7 @@ from logger.lab.fitting import (
     settled,
 )
 from logger.lab.prediction import Run
-from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
+from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 
 Array = npt.NDArray[np.float64]
 
@@ -198,9 +198,21 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
         return Trial(one, 0.0, here)
     strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))
     scaled = _scaled(one, strength)
+    whole = Trial(one, 2 * along - own, here - absorbed)
     if scaled is None:
-        return Trial(one, 2 * along - own, here - absorbed)
-    return Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed)
+        return whole
+    shared = Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed)
+    if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
+        return shared
+    # A resonance that is half as strong lies elsewhere, and may do something else altogether.
+    return max((_as_predicted(problem, base, trial) for trial in (shared, whole)), key=lambda trial: trial.gain)
+
+
+def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
+    """The same with the gain that it truly has."""
+    logs, wander = base.weighed.parted(trial.joined)
+    state = problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes)
+    return Trial(trial.one, base.weighed.objective(base.state) - base.weighed.objective(state), trial.joined)
 
 
 def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:

@@ -208,8 +208,9 @@ def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
 
 
 def _merit(one: Tried) -> float:
-    """For sorting, best first: the gain, each number that was fitted counted off."""
-    return 2 * one.numbers - one.whole_gain
+    """For sorting, best first: the gain; each number that was fitted has to gain what tells two effects apart, so that
+    the simpler of two that cannot be told apart comes first."""
+    return _ALIKE * one.numbers - one.whole_gain
 
 
 def _p_value(gain: float, numbers: int, count: int) -> float:
