@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 
-_CELL, _LEFT, _TOP, _ROOM = 26, 190, 170, 12
+_CELL, _LEFT, _TOP, _ROOM, _LAST_LABEL = 26, 190, 170, 12, 40
 _RIGHT_COLOUR, _WRONG_COLOUR, _INK, _SOFT, _LINE = (
     "var(--c0,#2f6db5)", "var(--c4,#d0402b)", "var(--ink,#1d242b)", "var(--soft,#5c6873)", "var(--faint,#dfe4e8)")
 _FONT = "font-family:system-ui,sans-serif;font-size:12px"
@@ -18,7 +18,7 @@ def matrix_figure(title: str, rows: Sequence[str], columns: Sequence[str], count
                   good: Mapping[str, str]) -> str:
     """The SVG element: what was hidden (rows), what was said (columns), how often; ``good``: the right column of a
     row. Right answers are blue, wrong ones red, and stronger the larger their share of the row."""
-    width, height = _LEFT + _CELL * len(columns) + _ROOM, _TOP + _CELL * len(rows) + _ROOM
+    width, height = _LEFT + _CELL * len(columns) + _LAST_LABEL, _TOP + _CELL * len(rows) + _ROOM
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img" '
              f'aria-label="{escape(title)}">']
     for j, column in enumerate(columns):
