@@ -64,9 +64,9 @@ class Base:
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
         left = weighed.residual(state)
-        gradient = weighed.against([one[None] for one in left])[:, 0] - weighed.prior @ weighed.joined(state)
         seen = located(problem, state, slopes)
-        return Base(state, slopes, weighed, left, uncertainty, uncertainty @ gradient, problem.deviance(state),
+        return Base(state, slopes, weighed, left, uncertainty, uncertainty @ weighed.gradient(state, left),
+                    problem.deviance(state),
                     problem.deviance(seen, fitted=False), problem.judged_error(seen))
 
     def left_by(self, better: Base) -> float:

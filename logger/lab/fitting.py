@@ -242,6 +242,11 @@ class Weighed:
             result[place] += white @ one.T
         return result
 
+    def gradient(self, state: State, left: Sequence[Array]) -> Array:
+        """Which way the car's numbers and the wander fit better (count,), by weighed residuals (kept,) per run; nothing
+        where they fit best."""
+        return self.against([one[None] for one in left])[:, 0] - self.prior @ self.joined(state)
+
 
 @dataclass(frozen=True)
 class Move:
@@ -330,7 +335,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
 def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tuple[Array, Array]:
     """The normal equations: information (count + m, count + m) and gradient (count + m,)."""
     left = weighed.residual(state)
-    gradient = weighed.against([one[None] for one in left])[:, 0] - weighed.prior @ weighed.joined(state)
+    gradient = weighed.gradient(state, left)
     if own is None:
         return weighed.information, gradient
     mixed = weighed.against(own)
