@@ -209,10 +209,15 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
 
 
 def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
-    """The same with the gain that it truly has."""
-    logs, wander = base.weighed.parted(trial.joined)
-    state = problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes)
-    return Trial(trial.one, base.weighed.objective(base.state) - base.weighed.objective(state), trial.joined)
+    """The same with the gain that it truly has, the car's numbers and the wander counted to first order: sensors are
+    tried on one body then."""
+    weighed, state = base.weighed, base.state
+    there = problem.predicted((*state.effects, trial.one), state.logs, state.wander, base.slopes)
+    moved_by = trial.joined - weighed.joined(state)
+    left = [one - moved_by[place] @ white
+            for one, white, place in zip(weighed.residual(there), weighed.white, weighed.places, strict=True)]
+    squares = sum(float(one @ one) for one in left) + float(trial.joined @ weighed.prior @ trial.joined)
+    return Trial(trial.one, weighed.objective(state) - squares, trial.joined)
 
 
 def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:

@@ -27,12 +27,14 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_LOG_STEP = 0.01
+# Slopes are taken over so much of a logarithm, or over so many of its deviations if that is less: a length may be
+# known to micrometres.
+_LOG_STEP, _STEP_IN_DEVIATIONS = 0.002, 5.0
 _SHARE_STEP = 0.02
 _LEAST_SHARE = 0.1
 _FIRST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 100.0, 30.0
-# A step that gains less than this share of a degree of freedom ends a fit.
-_SMALL_GAIN = 0.05
+# A step that gains less than this in minus twice a log-likelihood ends a fit.
+_SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _SETTLING_STEPS, _SETTLED = 5, 2.0
 _RIDGE = 1e-12
@@ -133,18 +135,18 @@ class Problem:
         """Weights by what the state leaves in the fitted stretches."""
         return [Whitener(one, cells) for one, cells in zip(self.stretches, self.cells(state), strict=True)]
 
-    def slopes(self, state: State) -> Slopes:
-        """Of a state that was laid out."""
+    def slopes(self, state: State, steps: Array | None = None) -> Slopes:
+        """Of a state that was laid out; ``steps`` (p,) of the car's numbers."""
         count = len(self.nuisance.names)
         by_number = [np.empty((count, len(one))) for one in self.measured]
         moved = self.moved_m(state.wander)
-        unmoved = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
+        unmoved = self.runs.predict(self.car(state.effects, state.logs), moved)
         for index in range(count):
             step = np.zeros(count)
-            step[index] = _LOG_STEP
-            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved, rough=True)
+            step[index] = _LOG_STEP if steps is None else steps[index]
+            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
             for column, there, here in zip(by_number, shifted, unmoved, strict=True):
-                column[index] = (there - here) / _LOG_STEP
+                column[index] = (there - here) / step[index]
         columns = [
             np.vstack([numbers, one.columns(prediction, run)])
             for numbers, one, prediction, run in zip(by_number, self.wander, state.predictions, self.runs.runs,
@@ -170,12 +172,12 @@ class Problem:
         """
         over = self.moved_m(anchor)
         here = coordinates_of(state.effects, moves)
-        unmoved = self.runs.predict(self.car(state.effects, state.logs), over, rough=True)
+        unmoved = self.runs.predict(self.car(state.effects, state.logs), over)
         result = [np.empty((len(moves), len(one))) for one in self.measured]
         for index, step in enumerate(_steps(state.effects, moves)):
             there = here.copy()
             there[index] += step
-            shifted = self.runs.predict(self.car(moved(state.effects, moves, there), state.logs), over, rough=True)
+            shifted = self.runs.predict(self.car(moved(state.effects, moves, there), state.logs), over)
             for column, high, low in zip(result, shifted, unmoved, strict=True):
                 column[index] = (high - low) / step
         return result
@@ -217,6 +219,12 @@ class Weighed:
         self.information = self.prior.copy()
         for white, place in zip(self.white, self.places, strict=True):
             self.information[np.ix_(place, place)] += white @ white.T
+
+    @property
+    def fine_steps(self) -> Array:
+        """Of the logarithms of the car's numbers (p,), by how well they are known."""
+        sizes = np.sqrt(np.diag(self.information)[: len(self.problem.nuisance.names)])
+        return np.minimum(_LOG_STEP, _STEP_IN_DEVIATIONS / sizes)
 
     def joined(self, state: State) -> Array:
         """The car's numbers and the wander of all runs as one vector."""
@@ -289,6 +297,7 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
         parameter = effects[move.effect].effect.parameters[move.parameter]
         usual = abs(parameter.coordinate(parameter.start))
         step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
+        step = max(step, parameter.unseen)
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
         steps.append(forward if abs(forward) > 0.5 * step else back)
     return np.array(steps)
@@ -373,5 +382,5 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
             least, state = now, trial
         if done == rounds or (gained < _SETTLED and not given):
             break
-        given, slopes = False, problem.slopes(state)
+        given, slopes = False, problem.slopes(state, weighed.fine_steps)
     return state, slopes

@@ -9,6 +9,7 @@ with a normal prior, whose deviation is what such numbers are usually off by.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +33,7 @@ class Tolerance:
     """
 
     numbers: float = 0.025
-    lengths: float = 0.015
+    lengths: float = 0.02
     scale: float = 0.0003
     start_m: float = 0.004
     wander_m: float = 0.004
@@ -79,8 +80,22 @@ class Wander:
 
     def columns(self, prediction: Array, run: Run) -> Array:
         """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
-        rise = np.gradient(prediction, 1 / run.rate_hz) / np.maximum(run.speed_mps, _SLOWEST_MPS)
+        rise = rate_of_change(prediction, run.rate_hz) / np.maximum(run.speed_mps, _SLOWEST_MPS)
         return np.asarray(self.basis.T * rise)
+
+
+def rate_of_change(samples: Array, rate_hz: float) -> Array:
+    """The derivative of evenly spaced samples (n,), right to 0.1 % up to a quarter of their rate: central differences
+    of sixteenth order (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be
+    half of it at 30 Hz."""
+    half = len(_DIFFERENCES)
+    past_ends = np.pad(samples, half, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(past_ends, [*_DIFFERENCES[::-1], 0.0, *-_DIFFERENCES], mode="valid") * rate_hz)
+
+
+_ORDER = 8
+_DIFFERENCES = np.array([(-1.0) ** (k + 1) * factorial(_ORDER) ** 2 / (k * factorial(_ORDER - k) * factorial(_ORDER + k))
+                         for k in range(1, _ORDER + 1)])
 
 
 def wander_of(run: Run, tolerance: Tolerance) -> Wander:

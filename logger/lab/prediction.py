@@ -79,22 +79,21 @@ class Runs:
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False) -> list[Array]:
+    def predict(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Array]:
         """What would have been recorded in each run, (n,) whole [m/s2].
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
-        rough      in no more steps than asked for: good enough for slopes, also where friction needs more
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m, rough)]
+            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
         return [np.clip(np.nan_to_num(one, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2) for one in found]
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
         return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False) -> list[Passage]:
-        fine_hz = self.fine_hz if rough or not car.rubs else _FINER_IF_IT_RUBS * self.fine_hz
+    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
+        fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]

@@ -8,7 +8,7 @@ car whose laws are all linear is stepped in blocks; only one with other laws goe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +37,7 @@ class Car:
     row          (n,) of the sensor's acceleration
     sensors      effects between body and record, in order
     drives       effects on the position signal, in order
+    body         equal for two cars whose bodies move alike where the sensor sits
     """
 
     vehicle: Vehicle
@@ -46,6 +47,7 @@ class Car:
     sensors: tuple[Chosen, ...]
     drives: tuple[Chosen, ...]
     bends_laws: bool
+    body: Hashable
 
     @property
     def rubs(self) -> bool:
@@ -106,9 +108,12 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
             corner = one.effect.laws(one.p, corner)
         laws.append(corner)
     row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
+    around = (SensorEffect, DriveEffect)
+    body = (vehicle, structure.sides, *(
+        (one.effect, *sorted(one.values.items())) for one in ordered if not isinstance(one.effect, around)))
     return Car(vehicle, structure, tuple(laws), row,
                tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
-               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces))
+               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body)
 
 
 def recorded(car: Car, passage: Passage) -> Array:
@@ -116,11 +121,12 @@ def recorded(car: Car, passage: Passage) -> Array:
 
     The passage is over where the car truly was: ``car.driven`` of what was recorded.
     """
-    if car.bends_laws:
-        fine = _accelerations(car, moved(car, passage), passage.under_wheels(car.structure)[0])
-    else:
-        fine = _linear(car, passage)
-    return passage.recorded(fine, car.factor)
+    def accelerations() -> Array:
+        if car.bends_laws:
+            return _accelerations(car, moved(car, passage), passage.under_wheels(car.structure)[0])
+        return _linear(car, passage)
+
+    return passage.recorded_of(car.body, accelerations, car.factor)
 
 
 def respond(car: Car, passage: Passage) -> Response:

@@ -57,6 +57,7 @@ class Parameter:
     meaning    in words
     choices    if not empty, the only values there are; a fit tries each
     default    what it is when nothing is said; None: it must be said
+    unseen     a change of it on its scale that hardly shows: slopes are taken over as much at least
     """
 
     name: str
@@ -69,6 +70,7 @@ class Parameter:
     meaning: str
     choices: tuple[float, ...] = ()
     default: float | None = None
+    unseen: float = 0.0
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""

@@ -3,13 +3,14 @@
 Problem: a nonlinear car has to be stepped finely, and fits step it hundreds of times over the same road, of which only
 what changed should be computed again; and a recorder's filter, a sensor's own dynamics and a late clock lie between the
 body and each sample. Solution: a ``Passage`` holds the elevations under the wheels, exact means over each step as in
-``simulate``, for the last few places that wheels stood at; and everything linear behind the body, down to the
-recorder's filter and the choice of one step in ten, is one product in frequency.
+``simulate``, for the last few places that wheels stood at; everything linear behind the body, down to the recorder's
+filter and the choice of one step in ten, is one product in frequency; and the motions of the last few bodies are held
+as well, since many a sensor is tried on one body.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ APPROACH_S = 2.0
 _TAIL_S = 2.5
 # What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
 _REST_S = 1.0
-_KEPT_PLACES = 3
+_KEPT_PLACES, _KEPT_BODIES = 3, 6
 _EVEN = 1e-3
 
 
@@ -65,6 +66,7 @@ class Passage:
         centred[: half + 1], centred[-half:] = taps[half:], taps[:half]
         self._recorder = np.fft.rfft(centred)[: len(f_hz)].real / self.steps
         self._known: dict[tuple[float, ...], tuple[Array, Array]] = {}
+        self._bodies: dict[Hashable, Complex] = {}
 
     @property
     def fine_count(self) -> int:
@@ -93,8 +95,25 @@ class Passage:
 
         factor    of what lies between the body and the recorder, by s (f,) [1/s]
         """
-        transform = np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * self._recorder * factor(self._s)
-        return np.fft.irfft(transform, self._coarse)[self._lead : self._lead + self.count]
+        return self._kept(self._transform(fine), factor)
+
+    def recorded_of(self, body: Hashable, accelerations: Callable[[], Array],
+                    factor: Callable[[Complex], Complex]) -> Array:
+        """The same of a body that may have passed before; ``accelerations`` are asked only if it has not.
+
+        body    equal for two bodies that move alike on this passage
+        """
+        transform = self._bodies.get(body)
+        if transform is None:
+            transform = self._transform(accelerations())
+            self._bodies = dict([*self._bodies.items()][-_KEPT_BODIES + 1 :]) | {body: transform}
+        return self._kept(transform, factor)
+
+    def _transform(self, fine: Array) -> Complex:
+        return np.asarray(np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * self._recorder)
+
+    def _kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
+        return np.fft.irfft(transform * factor(self._s), self._coarse)[self._lead : self._lead + self.count]
 
     def sampled(self, fine: Array) -> Array:
         """Fine instants (M, ...) at the samples (N, ...), as they are."""

@@ -42,7 +42,7 @@ UNIT_M, UNIT_MPS = 0.01, 0.02
 """Tables of two variables are even in arsinh of travel and rate over these."""
 LANES = 4
 """Numbers that are summed side by side."""
-_PASSES = 2
+_PASSES, _SWEEPS = 2, 2
 _NEWTON_STEPS, _NEAR = 4, 1e-3
 
 
@@ -138,7 +138,7 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
     size, pull = abs(free), ease * most
     rate = max(size / (1.0 + pull / transition), size - pull)
     for _ in range(_NEWTON_STEPS):
-        grown = np.tanh(rate / transition)
+        grown = 1.0 - 2.0 / (np.exp(2.0 * rate / transition) + 1.0)  # tanh, in half its time
         short = (size - rate - pull * grown) / (1.0 + pull / transition * (1.0 - grown * grown))
         rate += short
         if short < _NEAR * transition:
@@ -148,14 +148,16 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
 
 
 @_compiled
-def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array) -> None:
+def _rub(
+    motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array, sweeps: int,
+) -> None:
     """Find the dry friction at the rates that each suspension has a little after the middle of the step, and add what
     it does to travels and rates.
 
     earlier    (w,) the rates at the beginning, as they count for that instant
     """
     w = len(numbers)
-    for _ in range(2):
+    for _ in range(sweeps):
         for i in range(w):
             free = motion[m + w + i] + earlier[i]
             for j in range(w):
@@ -171,26 +173,27 @@ def _rub(motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, 
 @_compiled
 def _settle(
     motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
-    rubs: bool, road: Array, mounts: Array, step_s: float, earlier: Array,
+    passes: int, rubs: bool, road: Array, mounts: Array, step_s: float, earlier: Array,
 ) -> None:
     """Find the forces at the end of a step (3 w) from those at its beginning, and the motion there.
 
     before    (R,) the motion without these forces
+    passes    how often the laws are asked: not at all if friction is all there is
     road      (2 w) its heights under the wheels and their rates
     """
     w = len(numbers)
     seen = m // LANES * LANES
-    for _ in range(_PASSES):
+    for _ in range(passes):
         _sum(motion, seen, before, forces, 2 * w, by_force)
         if rubs:
-            _rub(motion, m, forces, numbers, by_force, earlier)
+            _rub(motion, m, forces, numbers, by_force, earlier, 1)
         for i in range(w):
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
     if rubs:
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        _rub(motion, m, forces, numbers, by_force, earlier)
+        _rub(motion, m, forces, numbers, by_force, earlier, _SWEEPS)
     _sum(motion, 0, before, forces, 3 * w, by_force)
 
 
@@ -198,7 +201,7 @@ def _settle(
 def _walk(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, around: Array,
     elevation: Array, states: Array, recorded: Array, known: Array, before: Array, nothing: Array, motion: Array,
-    forces: Array, road: Array, mounts: Array, earlier: Array, rubs: bool,
+    forces: Array, road: Array, mounts: Array, earlier: Array, passes: int, rubs: bool,
 ) -> None:
     """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
     step needs."""
@@ -212,7 +215,7 @@ def _walk(
             mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
             earlier[i] = (1 / numbers[i, FRICTION_AT] - 1) * motion[m + w + i]
         _sum(before, 0, nothing, known, m + 4 * w, by_known)
-        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, rubs, road, mounts, step_s,
+        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, passes, rubs, road, mounts, step_s,
                 earlier)
         for r in range(m):
             known[r] = motion[r]
@@ -248,7 +251,9 @@ def steps(
     states[0] = start
     known, before, motion = np.zeros(m + 4 * w), np.zeros(by_known.shape[1]), np.zeros(by_known.shape[1])
     known[:m] = start
+    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any()
+            or not np.isinf(numbers[:, MOST_PULL_N]).all())
     _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,
           np.zeros_like(before), motion, np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3)), np.zeros(w),
-          numbers[:, FRICTION_N].max() > 0.0)
+          _PASSES if acts else 0, numbers[:, FRICTION_N].max() > 0.0)
     return states, recorded
