@@ -97,10 +97,13 @@ def _usual(effect: Effect) -> dict[str, float]:
     return {one.name: one.start if one.default is None else one.default for one in effect.parameters}
 
 
+_ROUNDS = 3
+
+
 def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chosen:
     """Where the fit of an effect begins: as it was said, and for the rest where a search for it alone ends."""
-    from logger.lab.candidates import Base, fitted, misalignment, screened
-    from logger.lab.fitting import settled
+    from logger.lab.candidates import Base, best_choice, fitted, misalignment, screened, settled_further
+    from logger.lab.fitting import aligned, settled
     from logger.vehicle.effect import chosen
 
     if set(values) >= {one.name for one in effect.parameters}:
@@ -110,14 +113,14 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         problem = given.problem(whole=False)
         tell("refitting the car's own numbers")
         nominal = problem.start(given.model.effects)
-        base = Base.of(problem, *settled(problem, nominal))
+        base = Base.of(problem, *settled(problem, aligned(problem, nominal)))
         tell(f"searching for {effect.name}")
         tries = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     choices = {one.name for one in effect.parameters if one.choices} & set(values)
     said = [one for one in tries if all(one.state.effects[-1].values[name] == values[name] for name in choices)]
-    best = max(said or tries, key=lambda one: one.gain)
+    best = best_choice([settled_further(problem, base, one, _ROUNDS) for one in said or tries])
     return chosen(effect, {**best.state.effects[-1].values, **values})
 
 
@@ -144,7 +147,7 @@ def model_of(given: Bench, found: Gained) -> Model:
         history = (Step("as it was given", found.added.error_before, found.floor),
                    Step("numbers refitted", found.added.error_refitted, found.floor))
     step = Step(f"added {' and '.join(found.names)}", found.added.error_after, found.floor)
-    return Model(found.added.vehicle, found.added.effects, (*history, step))
+    return Model(found.added.vehicle, found.added.effects, (*history, step), given.model.given or given.model.vehicle)
 
 
 def lines(found: Gained) -> list[str]:

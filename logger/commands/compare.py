@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     runs = lab_runs(args.runs)
     check_model(args.vehicle, model, runs)
     try:
-        found = compare(runs, model.vehicle, model.effects)
+        found = compare(runs, model.vehicle, model.effects, model.given)
     except ValueError as error:
         raise BadInput(f"{args.vehicle}: {error}") from None
     if args.out is not None:

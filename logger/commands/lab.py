@@ -142,7 +142,7 @@ def _compared(given: Bench) -> Comparison:
 
     on_screen()("comparing")
     try:
-        return compare(given.runs, given.model.vehicle, given.model.effects)
+        return compare(given.runs, given.model.vehicle, given.model.effects, given.model.given)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     finally:

@@ -59,7 +59,8 @@ class Bench:
         from logger.lab.prediction import Runs
 
         runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
-        return Problem(runs, self.model.vehicle, Tolerance(numbers=self.numbers), whole=whole)
+        model = self.model
+        return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle)
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""

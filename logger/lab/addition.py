@@ -22,7 +22,7 @@ from logger.vehicle.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the car: as its file says, refitted without the added effects, and with them; with standard errors,
+    """A number of the car: as it was given, refitted without the added effects, and with them; with standard errors,
     which include how far off it may have been."""
 
     name: str
@@ -62,8 +62,10 @@ def add(problem: Problem, present: Sequence[Chosen], added: Sequence[Chosen]) ->
     that these have are where the fit begins."""
     nominal = problem.start(present)
     before, _ = settled(problem, nominal)
-    start = problem.laid_out((*before.effects, *added), before.logs, before.wander)
-    after, _ = settled(problem, start)
+    # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
+    starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
+              problem.start((*present, *added)))
+    after, _ = settled(problem, min(starts, key=problem.deviance))
     _, spread_before = with_spread(problem, before)
     effects, spread = with_spread(problem, after)
     vehicle = problem.nuisance.vehicle(problem.vehicle, after.logs)

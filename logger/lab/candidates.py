@@ -8,12 +8,13 @@ out, and the trial that explains most, at the strength at which it explains most
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.identification.parameters import read
 from logger.lab.fitting import (
     Move,
     Problem,
@@ -34,6 +35,8 @@ Array = npt.NDArray[np.float64]
 
 _STRONGEST, _WEAKEST = 10.0, 0.03
 _STEPS, _ROUNDS = 5, 4
+TOLD_APART = 10.0
+"""Gains that differ by less do not tell two effects apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,9 @@ class Base:
 
     judged_error   of the stretches that no fit saw
     left           its weighed residuals
+    objective      squares of the weighed residuals that the whole model leaves, and the cost of what is off
+    cost           the latter alone
+    ahead          what that falls by when numbers that an effect sets go back to what was given (``without``)
     uncertainty    (count, count) covariance of the car's numbers and the wander
     pull           (count,) what is left of the way to where these fit best
     """
@@ -51,6 +57,9 @@ class Base:
     slopes: Slopes
     weighed: Weighed
     left: list[Array]
+    objective: float
+    cost: float
+    ahead: float
     uncertainty: Array
     pull: Array
     fitted: float
@@ -65,9 +74,30 @@ class Base:
         uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
         left = weighed.residual(state)
         seen = located(problem, state, slopes)
-        return Base(state, slopes, weighed, left, uncertainty, uncertainty @ weighed.gradient(state, left),
-                    problem.deviance(state),
+        return Base(state, slopes, weighed, left, weighed.objective(state), problem.cost(state), 0.0, uncertainty,
+                    uncertainty @ weighed.gradient(state, left), problem.deviance(state),
                     problem.deviance(seen, fitted=False), problem.judged_error(seen))
+
+    def without(self, problem: Problem, names: Sequence[str]) -> Base:
+        """The same with some of the car's numbers as they were given, to stay there: for effects that set them. What it
+        leaves is still what the whole model leaves."""
+        away = [problem.nuisance.names.index(name) for name in names if name in problem.nuisance.names]
+        if not away:
+            return self
+        logs = self.state.logs.copy()
+        logs[away] = 0.0
+        columns = [one.copy() for one in self.slopes.columns]
+        for one in columns:
+            one[away] = 0.0
+        slopes = Slopes(columns, self.slopes.anchor)
+        state = problem.predicted(self.state.effects, logs, self.state.wander, slopes)
+        weighed = Weighed(problem, slopes, self.weighed.whiteners)
+        uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
+        left = weighed.residual(state)
+        pull = uncertainty @ weighed.gradient(state, left)
+        within_reach = pull @ weighed.information @ pull - self.pull @ self.weighed.information @ self.pull
+        return replace(self, state=state, slopes=slopes, weighed=weighed, left=left, uncertainty=uncertainty, pull=pull,
+                       ahead=self.objective - weighed.objective(state) + float(within_reach))
 
     def left_by(self, better: Base) -> float:
         """What it leaves more than a better model does, of all stretches."""
@@ -132,8 +162,12 @@ class Screened:
 
 def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -> Screened:
     """Trials of an effect on a model."""
-    best: dict[tuple[float, ...], Trial] = {}
     trials = effect.trials(seen)
+    if effect.replaces:  # where a fit has brought the car's own number is worth a trial
+        car = problem.nuisance.vehicle(problem.vehicle, base.state.logs)
+        trials.append(trials[0] | {name: read(car, name) for name in effect.replaces})
+    base = base.without(problem, effect.replaces)
+    best: dict[tuple[float, ...], Trial] = {}
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         trial = _trial(problem, base, chosen(effect, values))
@@ -146,6 +180,7 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
 
 def as_screened(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
     """The model of ``base`` with an effect at its most promising trial, not fitted further."""
+    base = base.without(problem, promise.effect.replaces)
     trial = promise.trials[0]
     logs, wander = base.weighed.parted(trial.joined)
     state = problem.predicted((*base.state.effects, trial.one), logs, wander, base.slopes)
@@ -156,6 +191,7 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
     """The model of ``base`` with an effect, fitted with all the others, on the slopes of ``base``: one for each choice
     that no fit moves."""
     tries = []
+    base = base.without(problem, promise.effect.replaces)
     for trial in promise.trials:
         effects = (*base.state.effects, trial.one)
         if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
@@ -166,6 +202,11 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
         better = improved(base.weighed, state, moves_of(effects), _STEPS)
         tries.append(_tried(problem, base, better, base.slopes, promise.count))
     return tries
+
+
+def best_choice(tries: Sequence[Tried]) -> Tried:
+    """Of one effect with other choices, the likeliest; the first (the usual one) unless another is clearly so."""
+    return max(tries, key=lambda one: one.whole_gain + (TOLD_APART if one is tries[0] else 0.0))
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
@@ -179,7 +220,7 @@ def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: i
     seen = located(problem, state, slopes)
     return Tried(
         effect, state, base.fitted - problem.deviance(state), base.judged - problem.deviance(seen, fitted=False),
-        problem.judged_error(seen), numbers, starts, problem.cost(base.state) - problem.cost(state), slopes,
+        problem.judged_error(seen), numbers, starts, base.cost - problem.cost(state), slopes,
     )
 
 
@@ -195,13 +236,13 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True)) - float(mixed @ base.pull)
     own = sum(float(c[0] @ c[0]) for c in change) - float(mixed @ absorbed)
     if not own > 0:
-        return Trial(one, 0.0, here)
+        return Trial(one, base.ahead, here)
     strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))
     scaled = _scaled(one, strength)
-    whole = Trial(one, 2 * along - own, here - absorbed)
+    whole = Trial(one, base.ahead + 2 * along - own, here - absorbed)
     if scaled is None:
         return whole
-    shared = Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed)
+    shared = Trial(scaled, base.ahead + 2 * strength * along - strength**2 * own, here - strength * absorbed)
     if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
         return shared
     # A resonance that is half as strong lies elsewhere, and may do something else altogether.
@@ -217,15 +258,14 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
     left = [one - moved_by[place] @ white
             for one, white, place in zip(weighed.residual(there), weighed.white, weighed.places, strict=True)]
     squares = sum(float(one @ one) for one in left) + float(trial.joined @ weighed.prior @ trial.joined)
-    return Trial(trial.one, weighed.objective(state) - squares, trial.joined)
+    return Trial(trial.one, base.objective - squares, trial.joined)
 
 
 def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:
     """A trial of the car as its file says: where positions are wrong, what was fitted before is worth nothing."""
     nothing = np.zeros(base.weighed.count)
     state = problem.laid_out((*base.state.effects, one), *base.weighed.parted(nothing))
-    gain = base.weighed.objective(base.state) - base.weighed.objective(state)
-    return Trial(one, gain, nothing)
+    return Trial(one, base.objective - base.weighed.objective(state), nothing)
 
 
 def _scaled(one: Chosen, strength: float) -> Chosen | None:

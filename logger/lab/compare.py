@@ -67,24 +67,26 @@ class Comparison:
         return bool(self.far) or any(mark.road for mark in self.marks.found)
 
 
-def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Comparison:
+def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None) -> Comparison:
     """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
+
+    given    the vehicle before any fit, if it has been refitted: what its numbers are usually off from
 
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
     plain = _standing(Beside(runs.runs, car, runs.predict(car), runs.respond(car)))
-    refitted, moves, far = _refitted(runs, vehicle, effects, plain)
+    refitted, moves, far = _refitted(runs, vehicle, effects, plain, given)
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves, far,
                       read_marks(refitted.beside, refitted.where, plain.beside))
 
 
 def _refitted(
-    runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen], plain: Standing
+    runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen], plain: Standing, given: Vehicle | None,
 ) -> tuple[Standing, dict[str, float], tuple[str, ...]]:
     """The model refitted, how its numbers moved, and which of them far. One that is no better than the plain model is
     the plain one: the fit weighs every frequency by its noise, and may buy a better top with a worse body bounce."""
-    problem = Problem(runs, vehicle, Tolerance(), whole=True)
+    problem = Problem(runs, given or vehicle, Tolerance(), whole=True, stands=vehicle)
     names = problem.nuisance.names
     state, _ = settled(problem, problem.start(effects))
     if problem.error(state) > plain.error:

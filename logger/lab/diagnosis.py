@@ -6,7 +6,7 @@ screened; the promising ones are fitted in full; the best is taken when it passe
 would hardly come by chance in so many trials, it explains stretches that no fit saw, and what it explains is worth
 naming. Then the next round begins, on the model with it. At the end every effect that was taken must still be needed by
 the others. What is left then is compared with the noise that the sensor has where no car moves it: what stays above it
-is unexplained.
+is unexplained, and so is what takes numbers of the car to explain that nobody granted.
 """
 
 from __future__ import annotations
@@ -17,8 +17,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.candidates import Base, Screened, Tried, as_screened, fitted, misalignment, screened, settled_further
-from logger.lab.fitting import Problem, State, settled
+from logger.lab.candidates import (
+    TOLD_APART,
+    Base,
+    Screened,
+    Tried,
+    as_screened,
+    fitted,
+    misalignment,
+    screened,
+    settled_further,
+)
+from logger.lab.fitting import Problem, State, aligned, settled
 from logger.lab.noise import Noise, floor_error, noise_of
 from logger.lab.prediction import Runs
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
@@ -40,12 +50,14 @@ HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
+STRAINED = 4.0
+"""A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
-# Gains that differ by less than this, or by this share of the larger, do not tell two effects apart.
-_ALIKE, _ALIKE_SHARE = 10.0, 0.01
+# Nor do gains tell two effects apart that differ by less than this share of the larger.
+_ALIKE_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +94,8 @@ class Diagnosis:
     candidates     of the first round, with those of later rounds in place of theirs where they were taken; best first
     obstacles      effects that could not be tried, and why
     verdict        effects that the model lacks, the most certain first
+    excess         the share by which what is left is above the noise in the run where it is most
+    strained       numbers of the car that have to be off too far, by which share
     judged         some stretches were kept from the fits
     """
 
@@ -93,6 +107,7 @@ class Diagnosis:
     verdict: tuple[str, ...]
     unexplained: bool
     excess: float
+    strained: Mapping[str, float]
     steps: tuple[Step, ...]
     before: State
     after: State
@@ -107,11 +122,17 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Taken:
-    """An effect that was taken, as it was tried in its round, which had so many trials."""
+    """An effect that was taken, as it was tried in its round, which had so many trials; and those that explain as much.
+    """
 
     tried: Tried
-    rivals: tuple[str, ...]
+    rivals: tuple[Tried, ...]
     count: int
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return self.tried.effect.name
 
 
 def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -122,7 +143,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     progress("refitting the car's own numbers")
     nominal = problem.start(present)
     seen = misalignment(problem, nominal)
-    before = now = Base.of(problem, *settled(problem, nominal))
+    before = now = Base.of(problem, *settled(problem, aligned(problem, nominal)))
     steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
              Step("its numbers refitted within what is granted", now.judged_error)]
     first: list[Tried] = []
@@ -138,22 +159,24 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
             break
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        now = Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
-        explained = before.left_by(now)
+        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
+        if not best.effect.realigns:  # what was only moved to its place was explained by nothing
+            explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
+    now, taken = _simplest(problem, now, taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
     progress("fitting all stretches")
     whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
     after, _ = settled(whole, now.state, _FINAL_ROUNDS)
     noise = noise_of(whole, after)
-    excess = _excess(whole, after, noise)
+    excess, strained = _excess(whole, after, noise), _strained(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
         baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
-        unexplained=excess > UNEXPLAINED, excess=excess, steps=tuple(steps), before=before.state, after=after,
-        problem=whole, judged=any(one.judges for one in problem.stretches),
+        unexplained=excess > UNEXPLAINED or bool(strained), excess=excess, strained=strained, steps=tuple(steps),
+        before=before.state, after=after, problem=whole, judged=any(one.judges for one in problem.stretches),
     )
 
 
@@ -210,7 +233,7 @@ def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
 def _merit(one: Tried) -> float:
     """For sorting, best first: the gain; each number that was fitted has to gain what tells two effects apart, so that
     the simpler of two that cannot be told apart comes first."""
-    return _ALIKE * one.numbers - one.whole_gain
+    return TOLD_APART * one.numbers - one.whole_gain
 
 
 def _p_value(gain: float, numbers: int, count: int) -> float:
@@ -230,7 +253,8 @@ def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
     """Whether an effect is there: not by chance, worth naming beside what was explained before, and no harm to what no
     fit saw."""
     freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, None))
-    return (_p_value(one.gain, one.numbers, count) < CHANCE
+    return (not one.state.effects[-1].at_an_end
+            and _p_value(one.gain, one.numbers, count) < CHANCE
             and _worthy(one.whole_gain, one.eased, freedom, before)
             and one.judged_gain > -HARM * one.gain)
 
@@ -241,13 +265,13 @@ def _worthy(gain: float, eased: float, freedom: float, before: float) -> bool:
     return gain > max(WORTH * freedom, SHARE * before) or eased > max(EASED, SHARE_EASED * before)
 
 
-def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[str, ...]:
+def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[Tried, ...]:
     """Effects that explain as well what this one explains; none for one that explains nothing."""
     worthy = [other for other in tried if _accepted(problem, other, _starts(tried), 0.0)]
     if one not in worthy:
         return ()
-    near = max(_ALIKE, _ALIKE_SHARE * one.whole_gain)
-    return tuple(other.effect.name for other in worthy
+    near = max(TOLD_APART, _ALIKE_SHARE * one.whole_gain)
+    return tuple(other for other in worthy
                  if other is not one and abs(other.whole_gain - one.whole_gain) < near)
 
 
@@ -271,12 +295,42 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
         worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
         freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
-        eased = problem.cost(others[least].state) - problem.cost(now.state)
-        if _worthy(worth[least], eased, freedom, before.left_by(others[least])):
+        moved = sum(worth[one.effect.name] for one in now.state.effects[present:]
+                    if one.effect.realigns and one.effect.name != least)
+        explained = before.left_by(others[least]) - moved
+        if _worthy(worth[least], others[least].cost - now.cost, freedom, explained):
             break
         now = others[least]
         worth.pop(least)
     return now, dict(sorted(worth.items(), key=lambda pair: -pair[1]))
+
+
+def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
+              progress: Progress) -> tuple[Base, list[_Taken]]:
+    """The model with simpler effects in place of those that explain no more, now that the others are known too."""
+    found = list(taken)
+    for place in range(present, len(now.state.effects)):
+        number = next(i for i, one in enumerate(found) if one.name == now.state.effects[place].effect.name)
+        there = {one.effect.name for one in now.state.effects}
+        for rival in found[number].rivals:
+            if rival.numbers >= found[number].tried.numbers or rival.effect.name in there:
+                continue
+            progress(f"would {rival.effect.name} do for {found[number].name}?")
+            effects = list(now.state.effects)
+            effects[place] = rival.state.effects[-1]
+            start = problem.laid_out(tuple(effects), now.state.logs, now.state.wander)
+            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes))
+            if other.left_by(now) < TOLD_APART * (found[number].tried.numbers - rival.numbers):
+                rest = tuple(one for one in (found[number].tried, *found[number].rivals) if one is not rival)
+                now, found[number] = other, _Taken(rival, rest, found[number].count)
+    return now, found
+
+
+def _strained(problem: Problem, state: State) -> dict[str, float]:
+    """Numbers of the car that are off by more than anybody granted, by which share."""
+    nuisance = problem.nuisance
+    return {name: float(np.expm1(log)) for name, log, deviation in zip(
+        nuisance.names, state.logs, nuisance.deviations, strict=True) if abs(log) > STRAINED * deviation}
 
 
 def _excess(problem: Problem, state: State, noise: Noise) -> float:
@@ -300,9 +354,10 @@ def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Seque
     return tuple(found)
 
 
-def _candidate(tried: Tried, count: int, rivals: tuple[str, ...],
+def _candidate(tried: Tried, count: int, rivals: tuple[Tried, ...],
                values: Mapping[str, float] | None) -> Candidate:
     return Candidate(
         tried.effect, tried.state.effects[-1].values if values is None else values, tried.judged_error,
-        _p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain, rivals,
+        _p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain,
+        tuple(one.effect.name for one in rivals),
     )

@@ -27,9 +27,9 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-# Slopes are taken over so much of a logarithm, or over so many of its deviations if that is less: a length may be
-# known to micrometres.
-_LOG_STEP, _STEP_IN_DEVIATIONS = 0.002, 5.0
+_LOG_STEP = 0.01
+# Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
+_STEP_IN_DEVIATIONS = 5.0
 _SHARE_STEP = 0.02
 _LEAST_SHARE = 0.1
 _FIRST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 100.0, 30.0
@@ -37,6 +37,7 @@ _FIRST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 100.0, 30.0
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _SETTLING_STEPS, _SETTLED = 5, 2.0
+_ALIGNING_ROUNDS = 20
 _RIDGE = 1e-12
 
 
@@ -71,12 +72,15 @@ class Slopes:
 class Problem:
     """Runs, a nominal vehicle, and what may be a little off.
 
-    whole    fit all of the runs, and leave no stretch to judge
+    whole     fit all of the runs, and leave no stretch to judge
+    stands    the vehicle as it stands, where fits begin, if that is another than was given
     """
 
-    def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False) -> None:
+    def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
+                 stands: Vehicle | None = None) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance)
+        self._stands = np.zeros(len(self.nuisance.names)) if stands is None else self.nuisance.logs(vehicle, stands)
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
         self.stretches = [Stretches(run, whole) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
@@ -87,17 +91,21 @@ class Problem:
 
     def moved_m(self, wander: Sequence[Array]) -> list[Array]:
         """By how much the car was farther than its distance signal said (n,), per run."""
-        return [one.basis @ k for one, k in zip(self.wander, wander, strict=True)]
+        return [one.moved_m(k) for one, k in zip(self.wander, wander, strict=True)]
 
     def laid_out(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array]) -> State:
         """A state whose predictions are made anew, over the road as the wander has it."""
+        return State(effects, logs, wander, self._recorded(effects, logs, wander))
+
+    def _recorded(self, effects: tuple[Chosen, ...], logs: Array, wander: Sequence[Array]) -> list[Array]:
         predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander))
-        return State(effects, logs, wander, predictions)
+        return [one.recorded(prediction, k, run) for one, prediction, k, run in zip(
+            self.wander, predictions, wander, self.runs.runs, strict=True)]
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
-        """The nominal car."""
-        return self.laid_out(tuple(effects), np.zeros(len(self.nuisance.names)),
-                             [np.zeros(one.basis.shape[1]) for one in self.wander])
+        """The car as it stands."""
+        return self.laid_out(tuple(effects), self._stands.copy(),
+                             [np.zeros(one.count) for one in self.wander])
 
     def residuals(self, state: State) -> list[Array]:
         """Measured minus predicted (n,), per run."""
@@ -137,13 +145,14 @@ class Problem:
 
     def slopes(self, state: State, steps: Array | None = None) -> Slopes:
         """Of a state that was laid out; ``steps`` (p,) of the car's numbers."""
+        steps = self.nuisance.steps if steps is None else steps
         count = len(self.nuisance.names)
         by_number = [np.empty((count, len(one))) for one in self.measured]
         moved = self.moved_m(state.wander)
         unmoved = self.runs.predict(self.car(state.effects, state.logs), moved)
         for index in range(count):
             step = np.zeros(count)
-            step[index] = _LOG_STEP if steps is None else steps[index]
+            step[index] = steps[index]
             shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
             for column, there, here in zip(by_number, shifted, unmoved, strict=True):
                 column[index] = (there - here) / step[index]
@@ -160,8 +169,7 @@ class Problem:
         predictions = [
             prediction + (k - anchor) @ columns[count:]
             for prediction, k, anchor, columns in zip(
-                self.runs.predict(self.car(effects, logs), self.moved_m(slopes.anchor)), wander, slopes.anchor,
-                slopes.columns, strict=True)
+                self._recorded(effects, logs, slopes.anchor), wander, slopes.anchor, slopes.columns, strict=True)
         ]
         return State(effects, logs, wander, predictions)
 
@@ -207,7 +215,7 @@ class Weighed:
         self.problem, self.slopes, self.whiteners = problem, slopes, list(whiteners)
         self.white = [whitener(columns) for whitener, columns in zip(whiteners, slopes.columns, strict=True)]
         p = len(problem.nuisance.names)
-        sizes = [one.basis.shape[1] for one in problem.wander]
+        sizes = [one.count for one in problem.wander]
         ends = p + np.cumsum([0, *sizes])
         self.places = [np.concatenate([np.arange(p), np.arange(low, high)])
                        for low, high in pairwise(ends)]
@@ -224,7 +232,7 @@ class Weighed:
     def fine_steps(self) -> Array:
         """Of the logarithms of the car's numbers (p,), by how well they are known."""
         sizes = np.sqrt(np.diag(self.information)[: len(self.problem.nuisance.names)])
-        return np.minimum(_LOG_STEP, _STEP_IN_DEVIATIONS / sizes)
+        return np.minimum(self.problem.nuisance.steps, _STEP_IN_DEVIATIONS / sizes)
 
     def joined(self, state: State) -> Array:
         """The car's numbers and the wander of all runs as one vector."""
@@ -296,8 +304,9 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
         usual = abs(parameter.coordinate(parameter.start))
-        step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
-        step = max(step, parameter.unseen)
+        step = parameter.step
+        if step is None:
+            step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
         steps.append(forward if abs(forward) > 0.5 * step else back)
     return np.array(steps)
@@ -361,6 +370,23 @@ def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
     logs, wander = weighed.parted(weighed.joined(state) + step[: weighed.count])
     effects = moved(state.effects, moves, coordinates_of(state.effects, moves) + step[weighed.count:])
     return effects, logs, wander
+
+
+def aligned(problem: Problem, state: State) -> State:
+    """The state with the wander of the distance alone fitted, until it lies as it can: that takes many rounds where it
+    is far off, in which the car's numbers would be bent."""
+    numbers, least = len(state.logs), problem.deviance(state)
+    for _ in range(_ALIGNING_ROUNDS):
+        columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
+                   for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
+        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state))
+        trial = improved(weighed, state, [], _SETTLING_STEPS, laid_out=True)
+        gained = least - problem.deviance(trial)
+        if gained > 0:
+            least, state = least - gained, trial
+        if gained < _SETTLED:
+            break
+    return state
 
 
 def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | None = None) -> tuple[State, Slopes]:

@@ -1,9 +1,10 @@
 """What is never quite as the vehicle's file and the run's files say, although no physics is missing.
 
-Problem: nominal masses and rates are a few per cent off, and a speed signal wanders; a lab that does not grant this
-takes every small mistake for an effect, and one that grants too much lets mistakes swallow effects. Solution: each
-number of the car may differ by a few per cent and each run's distance by a little, both with a cost: they are unknowns
-with a normal prior, whose deviation is what such numbers are usually off by.
+Problem: nominal masses and rates are a few per cent off, a speed signal wanders, and no recorder passes all frequencies
+quite alike; a lab that does not grant this takes every small mistake for an effect, and one that grants too much lets
+mistakes swallow effects. Solution: each number of the car may differ by a few per cent, each run's distance and its
+scale of acceleration by a little, all with a cost: they are unknowns with a normal prior, whose deviation is what such
+numbers are usually off by.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ class Tolerance:
     scale        of each run's distance, as a share
     start_m      of where each run begins [m]
     wander_m     of the distance signal, after one second; it grows with the root of the time [m]
+    gain         of the acceleration, as a share
+    droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
+                 each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
     """
 
     numbers: float = 0.025
@@ -37,51 +41,82 @@ class Tolerance:
     scale: float = 0.0003
     start_m: float = 0.004
     wander_m: float = 0.004
+    gain: float = 0.005
+    droop: float = 0.4
 
 
 KNOT_S = 2.0
 """The wander of a distance signal is straight between knots so far apart."""
 _LENGTHS = ("cg_distance_m", "contact_patch_m")
+# Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
+_STEP, _LENGTH_STEP = 0.002, 1e-4
 _LEFT_ALONE = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
 _SLOWEST_MPS = 0.5
 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """Numbers of a vehicle that may be a little off: names, and deviations of their logarithms (p,)."""
+    """Numbers of a vehicle that may be a little off: names, and (p,) deviations of their logarithms and steps to take
+    slopes over."""
 
     names: tuple[str, ...]
     deviations: Array
+    steps: Array
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
         """The vehicle with its numbers moved by these logarithms (p,)."""
         return changed(vehicle, {name: read(vehicle, name) * float(np.exp(log))
                                  for name, log in zip(self.names, logs, strict=True)})
 
+    def logs(self, vehicle: Vehicle, other: Vehicle) -> Array:
+        """The reverse: logarithms (p,) of another vehicle's numbers over those of this one."""
+        return np.log([read(other, name) / read(vehicle, name) for name in self.names])
+
 
 def nuisance_of(vehicle: Vehicle, tolerance: Tolerance) -> Nuisance:
     """What may be a little off in this vehicle."""
     known = [name for name in names(vehicle) if not name.startswith(("both.", "sensor."))]
     kept = [name for name in known if name.rpartition(".")[2] not in _LEFT_ALONE and read(vehicle, name) > 0]
-    deviations = [tolerance.lengths if name.endswith(_LENGTHS) else tolerance.numbers for name in kept]
-    return Nuisance(tuple(kept), np.array(deviations))
+    lengths = np.array([name.endswith(_LENGTHS) for name in kept], dtype=bool)
+    return Nuisance(tuple(kept), np.where(lengths, tolerance.lengths, tolerance.numbers),
+                    np.where(lengths, _LENGTH_STEP, _STEP))
 
 
 @dataclass(frozen=True, eq=False)
 class Wander:
-    """How the distance signal of one run may be off: ``basis @ k`` metres with k normal.
+    """How the record of one run may be off, by normal numbers k: those of its places, then two of its recorder.
 
-    basis       (n, k) straight lines between knots, and the distance itself
+    basis       (n, k - 2) of the distance [m]: straight lines between knots, and the distance itself
     precision   (k, k) inverse covariance of k
     """
 
     basis: Array
     precision: Array
 
+    @property
+    def count(self) -> int:
+        """How many numbers there are."""
+        return len(self.precision)
+
+    def moved_m(self, k: Array) -> Array:
+        """By how much the car was farther than its distance signal said (n,)."""
+        return np.asarray(self.basis @ k[:-_RECORDER])
+
+    def recorded(self, prediction: Array, k: Array, run: Run) -> Array:
+        """A prediction (n,) as such a recorder has it."""
+        return np.asarray(prediction + k[-_RECORDER:] @ self._recorder(prediction, run))
+
     def columns(self, prediction: Array, run: Run) -> Array:
         """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
         rise = rate_of_change(prediction, run.rate_hz) / np.maximum(run.speed_mps, _SLOWEST_MPS)
-        return np.asarray(self.basis.T * rise)
+        return np.vstack([self.basis.T * rise, self._recorder(prediction, run)])
+
+    def _recorder(self, prediction: Array, run: Run) -> Array:
+        curvature = rate_of_change(rate_of_change(prediction, run.rate_hz), run.rate_hz)
+        return np.stack([prediction, curvature / (2 * np.pi * run.rate_hz) ** 2])
+
+
+_RECORDER = 2
 
 
 def rate_of_change(samples: Array, rate_hz: float) -> Array:
@@ -94,8 +129,10 @@ def rate_of_change(samples: Array, rate_hz: float) -> Array:
 
 
 _ORDER = 8
-_DIFFERENCES = np.array([(-1.0) ** (k + 1) * factorial(_ORDER) ** 2 / (k * factorial(_ORDER - k) * factorial(_ORDER + k))
-                         for k in range(1, _ORDER + 1)])
+_DIFFERENCES = np.array([
+    (-1.0) ** (k + 1) * factorial(_ORDER) ** 2 / (k * factorial(_ORDER - k) * factorial(_ORDER + k))
+    for k in range(1, _ORDER + 1)
+])
 
 
 def wander_of(run: Run, tolerance: Tolerance) -> Wander:
@@ -106,8 +143,9 @@ def wander_of(run: Run, tolerance: Tolerance) -> Wander:
     hats = np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(knots)))
     basis = np.column_stack([hats, run.distance_m - run.distance_m[0]])
     steps = np.diff(np.eye(knots), axis=0) / (tolerance.wander_m * np.sqrt(time_s[-1] / (knots - 1)))
-    precision = np.zeros((knots + 1, knots + 1))
+    precision = np.zeros((knots + 1 + _RECORDER, knots + 1 + _RECORDER))
     precision[:knots, :knots] = steps.T @ steps
     precision[0, 0] += tolerance.start_m**-2
     precision[knots, knots] = tolerance.scale**-2
+    precision[-2, -2], precision[-1, -1] = tolerance.gain**-2, tolerance.droop**-2
     return Wander(basis, precision)

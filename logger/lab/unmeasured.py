@@ -90,7 +90,8 @@ class SameRoad:
         self.runs, self.vehicle, self.rate_hz = list(runs), vehicle, runs[0].rate_hz
         known = nuisance_of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
-        self.nuisance = Nuisance(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept])
+        self.nuisance = Nuisance(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
+                                 known.steps[kept])
         structure = compose(vehicle).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m

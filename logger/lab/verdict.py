@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from logger.lab.blind import Blind, blind
-from logger.lab.diagnosis import Candidate, Diagnosis
+from logger.lab.diagnosis import UNEXPLAINED, Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
 from logger.lab.stretches import Stretches
@@ -83,9 +83,13 @@ def summary(found: Verdict) -> list[str]:
     if not lines and not diagnosis.unexplained:
         lines.append("Nothing is missing: with its numbers refitted within what they are usually off, the model leaves "
                      "hardly more than the sensor's noise.")
-    if diagnosis.unexplained:
+    if diagnosis.excess > UNEXPLAINED:
         lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: what is left is "
                      f"{1 + diagnosis.excess:.3g} times the sensor's noise in the run where it is most.")
+    if diagnosis.strained:
+        off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
+        lines.append(f"That takes a car whose numbers are off by more than was granted: {off}. Either the vehicle's "
+                     "file is wrong there, or something else is missing that no candidate explains.")
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]
@@ -180,7 +184,7 @@ def as_json(found: Verdict) -> dict[str, Any]:
              "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.judged_gain / 2}
             for one in diagnosis.candidates],
         "verdict": list(diagnosis.verdict), "unexplained": diagnosis.unexplained,
-        "left_over_noise": 1 + diagnosis.excess,
+        "left_over_noise": 1 + diagnosis.excess, "numbers_off_too_far": dict(diagnosis.strained),
         "steps": [{"step": step.words, "error": step.error} for step in diagnosis.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.blind},

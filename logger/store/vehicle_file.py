@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from logger.errors import BadInput
+from logger.identification.parameters import BOTH, changed, names, read
 from logger.store.yaml_lines import Node, load_mapping
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
@@ -64,11 +65,15 @@ class Step:
 
 @dataclass(frozen=True)
 class Model:
-    """A vehicle with its effects, and the steps that led to them, the first one first."""
+    """A vehicle with its effects, and the steps that led to them, the first one first.
+
+    given    the vehicle as it was before any of its numbers was refitted; None: none was
+    """
 
     vehicle: Vehicle
     effects: tuple[Chosen, ...] = ()
     history: tuple[Step, ...] = ()
+    given: Vehicle | None = None
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
@@ -100,7 +105,22 @@ def read_model(path: Path | str) -> Model:
         vehicle,
         read_effects(keys["effects"], vehicle) if "effects" in keys else (),
         tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
+        _read_given(keys["given"], vehicle) if "given" in keys else None,
     )
+
+
+def _numbers(vehicle: Vehicle) -> list[str]:
+    return [name for name in names(vehicle) if not name.startswith(BOTH)]
+
+
+def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
+    """The vehicle with its numbers as they were given: ``front.unsprung_mass_kg: 40``."""
+    values = {}
+    for name, one in node.mapping().items():
+        if name not in _numbers(vehicle):
+            raise one.wrong(f"a number of the vehicle ({', '.join(_numbers(vehicle))})")
+        values[name] = one.number(above=0)
+    return changed(vehicle, values)
 
 
 def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
@@ -110,7 +130,7 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
     if model_node is None:
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
     model = model_node.choice(*_MODEL_KEYS)
-    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects", "history"))
+    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects", "given", "history"))
     mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
     front = _read_axle(keys["front"], model, mass_kg)
     rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
@@ -188,6 +208,9 @@ def write_model(path: Path | str, model: Model) -> None:
 
     keys = _vehicle_keys(model.vehicle)
     keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
+    if model.given is not None:
+        keys["given"] = {name: float(read(model.given, name)) for name in _numbers(model.given)
+                         if read(model.given, name) != read(model.vehicle, name)}
     if model.history:
         keys["history"] = [_OneLine(step=one.step, error=float(one.error),
                                     noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]

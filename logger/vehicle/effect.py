@@ -35,6 +35,8 @@ from logger.vehicle.vehicle import Vehicle
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+_AT_END = 1e-3
+
 
 class Scale(Enum):
     """The coordinate in which a parameter is moved by a fit."""
@@ -57,7 +59,7 @@ class Parameter:
     meaning    in words
     choices    if not empty, the only values there are; a fit tries each
     default    what it is when nothing is said; None: it must be said
-    unseen     a change of it on its scale that hardly shows: slopes are taken over as much at least
+    step       slopes are taken over so much of it, on its scale; None: a small share of it
     """
 
     name: str
@@ -70,7 +72,7 @@ class Parameter:
     meaning: str
     choices: tuple[float, ...] = ()
     default: float | None = None
-    unseen: float = 0.0
+    step: float | None = None
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""
@@ -87,6 +89,11 @@ class Parameter:
         else:
             found = coordinate
         return float(min(max(found, self.low), self.high))
+
+    def at_an_end(self, value: float) -> bool:
+        """Whether a value is at an end of what it may be."""
+        here = self.coordinate(value)
+        return any(abs(here - self.coordinate(end)) < _AT_END for end in (self.low, self.high))
 
 
 @dataclass(frozen=True)
@@ -111,6 +118,7 @@ class Effect(ABC):
     signature    what it leaves in a measurement that a model without it is compared with
     shown_by     the drive that would show it best, as an instruction
     realigns     whether it moves the model against the measurement, so that a search looks at how they lie first
+    replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     """
 
     name: str
@@ -120,6 +128,7 @@ class Effect(ABC):
     signature: str
     shown_by: str
     realigns: bool = False
+    replaces: tuple[str, ...] = ()
     stage: int = 0
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
@@ -202,6 +211,14 @@ class Chosen:
     values: Mapping[str, float]
     standard_errors: Mapping[str, float] = field(default_factory=dict)
     file: str | None = None
+
+    @property
+    def at_an_end(self) -> bool:
+        """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping):
+        what looks like it is something else."""
+        numbers = [one for one in self.effect.parameters if not one.choices]
+        shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
+        return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
 
     @property
     def p(self) -> SimpleNamespace:

@@ -117,7 +117,7 @@ def test_the_prior_of_the_wander_has_the_spread_it_was_given() -> None:
     tolerance = Tolerance(scale=1e-9)
     wander = wander_of(run, tolerance)
     covariance = np.linalg.inv(wander.precision)
-    last = wander.basis[-1]
+    last = np.append(wander.basis[-1], [0.0, 0.0])
     lasts_s = run.count / run.rate_hz
     deviation_m = np.hypot(tolerance.start_m, tolerance.wander_m * lasts_s**0.5)
     assert np.sqrt(last @ covariance @ last) == pytest.approx(deviation_m, rel=0.02)
