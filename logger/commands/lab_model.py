@@ -60,7 +60,8 @@ class Bench:
 
         runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
         model = self.model
-        return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle)
+        return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle,
+                       firm=not whole)
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""

@@ -71,7 +71,7 @@ class Base:
         """From a state that was laid out, and slopes taken near it."""
         slopes = Slopes(slopes.columns, state.wander)  # so that the state is predicted as it was laid out
         weighed = Weighed(problem, slopes, problem.whiteners(state))
-        uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
+        uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
         left = weighed.residual(state)
         seen = located(problem, state, slopes)
         return Base(state, slopes, weighed, left, weighed.objective(state), problem.cost(state), 0.0, uncertainty,
@@ -92,10 +92,11 @@ class Base:
         slopes = Slopes(columns, self.slopes.anchor)
         state = problem.predicted(self.state.effects, logs, self.state.wander, slopes)
         weighed = Weighed(problem, slopes, self.weighed.whiteners)
-        uncertainty = np.asarray(np.linalg.inv(weighed.information), float)
+        uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
         left = weighed.residual(state)
-        pull = uncertainty @ weighed.gradient(state, left)
-        within_reach = pull @ weighed.information @ pull - self.pull @ self.weighed.information @ self.pull
+        gradient = weighed.gradient(state, left)
+        pull = uncertainty @ gradient
+        within_reach = gradient @ pull - self.weighed.gradient(self.state, self.left) @ self.pull
         return replace(self, state=state, slopes=slopes, weighed=weighed, left=left, uncertainty=uncertainty, pull=pull,
                        ahead=self.objective - weighed.objective(state) + float(within_reach))
 
@@ -257,7 +258,7 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
     moved_by = trial.joined - weighed.joined(state)
     left = [one - moved_by[place] @ white
             for one, white, place in zip(weighed.residual(there), weighed.white, weighed.places, strict=True)]
-    squares = sum(float(one @ one) for one in left) + float(trial.joined @ weighed.prior @ trial.joined)
+    squares = sum(float(one @ one) for one in left) + problem.cost_of(*weighed.parted(trial.joined))
     return Trial(trial.one, base.objective - squares, trial.joined)
 
 

@@ -74,12 +74,13 @@ class Problem:
 
     whole     fit all of the runs, and leave no stretch to judge
     stands    the vehicle as it stands, where fits begin, if that is another than was given
+    firm      hold on to the car's numbers: a search whose car may bend as it likes never misses an effect
     """
 
     def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
-                 stands: Vehicle | None = None) -> None:
+                 stands: Vehicle | None = None, firm: bool = False) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
-        self.nuisance: Nuisance = nuisance_of(vehicle, tolerance)
+        self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
         self._stands = np.zeros(len(self.nuisance.names)) if stands is None else self.nuisance.logs(vehicle, stands)
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
         self.stretches = [Stretches(run, whole) for run in runs.runs]
@@ -116,9 +117,13 @@ class Problem:
         return [one.cells(left, fitted) for one, left in zip(self.stretches, self.residuals(state), strict=True)]
 
     def cost(self, state: State) -> float:
-        """What the state's car and wander cost: squares of their deviations."""
-        squares = float(((state.logs / self.nuisance.deviations) ** 2).sum())
-        return squares + sum(float(k @ one.precision @ k) for one, k in zip(self.wander, state.wander, strict=True))
+        """What the state's car and wander cost: squares of their deviations, and what firmness adds."""
+        return self.cost_of(state.logs, state.wander)
+
+    def cost_of(self, logs: Array, wander: Sequence[Array]) -> float:
+        """The same of numbers and wander."""
+        return self.nuisance.cost(logs) + sum(
+            float(k @ one.precision @ k) for one, k in zip(self.wander, wander, strict=True))
 
     def deviance(self, state: State, fitted: bool | None = True) -> float:
         """Minus twice the log-likelihood: of the fitted stretches (or all) with the cost of what is off, or of those
@@ -261,7 +266,16 @@ class Weighed:
     def gradient(self, state: State, left: Sequence[Array]) -> Array:
         """Which way the car's numbers and the wander fit better (count,), by weighed residuals (kept,) per run; nothing
         where they fit best."""
-        return self.against([one[None] for one in left])[:, 0] - self.prior @ self.joined(state)
+        gradient = self.against([one[None] for one in left])[:, 0] - self.prior @ self.joined(state)
+        gradient[: len(state.logs)] -= self.problem.nuisance.firmness(state.logs)[0]
+        return gradient
+
+    def information_at(self, state: State) -> Array:
+        """The normal equations' matrix (count, count) where the car's numbers are those of a state."""
+        information = self.information.copy()
+        diagonal = np.arange(len(state.logs))
+        information[diagonal, diagonal] += self.problem.nuisance.firmness(state.logs)[1]
+        return information
 
 
 @dataclass(frozen=True)
@@ -354,11 +368,12 @@ def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tupl
     """The normal equations: information (count + m, count + m) and gradient (count + m,)."""
     left = weighed.residual(state)
     gradient = weighed.gradient(state, left)
+    information = weighed.information_at(state)
     if own is None:
-        return weighed.information, gradient
+        return information, gradient
     mixed = weighed.against(own)
     alone = np.sum([one @ one.T for one in own], axis=0)
-    information = np.block([[weighed.information, mixed], [mixed.T, alone]])
+    information = np.block([[information, mixed], [mixed.T, alone]])
     pulled = np.sum([one @ rest for one, rest in zip(own, left, strict=True)], axis=0)
     sizes = np.diag(information)
     ridge = _RIDGE * np.where(sizes > 0, sizes, 1.0)  # a number that does nothing stays where it is

@@ -52,16 +52,35 @@ _LENGTHS = ("cg_distance_m", "contact_patch_m")
 _STEP, _LENGTH_STEP = 0.002, 1e-4
 _LEFT_ALONE = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
 _SLOWEST_MPS = 0.5
+_FREE, _FIRMNESS = 2.0, 100.0
 
 
 @dataclass(frozen=True)
 class Nuisance:
     """Numbers of a vehicle that may be a little off: names, and (p,) deviations of their logarithms and steps to take
-    slopes over."""
+    slopes over.
+
+    firm    a number that is off by more than ``_FREE`` deviations costs more and more
+    """
 
     names: tuple[str, ...]
     deviations: Array
     steps: Array
+    firm: bool = False
+
+    def cost(self, logs: Array) -> float:
+        """Of numbers that are off: squares of their deviations, and what firmness adds."""
+        squares = float(((logs / self.deviations) ** 2).sum())
+        return squares + (_FIRMNESS * float((self._beyond(logs) ** 4).sum()) if self.firm else 0.0)
+
+    def firmness(self, logs: Array) -> tuple[Array, Array]:
+        """Half of the first and of the second derivative (p,) of what firmness adds to the cost."""
+        beyond = self._beyond(logs) if self.firm else np.zeros_like(logs)
+        return (2 * _FIRMNESS * beyond**3 * np.sign(logs) / self.deviations,
+                6 * _FIRMNESS * beyond**2 / self.deviations**2)
+
+    def _beyond(self, logs: Array) -> Array:
+        return np.maximum(np.abs(logs / self.deviations) - _FREE, 0.0)
 
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
         """The vehicle with its numbers moved by these logarithms (p,)."""
@@ -73,13 +92,13 @@ class Nuisance:
         return np.log([read(other, name) / read(vehicle, name) for name in self.names])
 
 
-def nuisance_of(vehicle: Vehicle, tolerance: Tolerance) -> Nuisance:
+def nuisance_of(vehicle: Vehicle, tolerance: Tolerance, firm: bool = False) -> Nuisance:
     """What may be a little off in this vehicle."""
     known = [name for name in names(vehicle) if not name.startswith(("both.", "sensor."))]
     kept = [name for name in known if name.rpartition(".")[2] not in _LEFT_ALONE and read(vehicle, name) > 0]
     lengths = np.array([name.endswith(_LENGTHS) for name in kept], dtype=bool)
     return Nuisance(tuple(kept), np.where(lengths, tolerance.lengths, tolerance.numbers),
-                    np.where(lengths, _LENGTH_STEP, _STEP))
+                    np.where(lengths, _LENGTH_STEP, _STEP), firm)
 
 
 @dataclass(frozen=True, eq=False)
