@@ -27,7 +27,7 @@ _NAMED = 4
 
 @dataclass(frozen=True)
 class Moved:
-    """A number of the car: as its file says, refitted without effects that were added later, and with them.
+    """A number of the car: as it was given, refitted without effects that were added later, and with them.
 
     shift    from the one to the other, in standard errors of the last
     """
@@ -156,7 +156,7 @@ def bias(names: Sequence[str], moved: Sequence[Moved]) -> str:
 
 
 MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Without and with: refitted, in per cent from what the file says, ± standard error. Shift: from the one "
+MOVED_HINT = ("Without and with: refitted, in per cent from what was given, ± standard error. Shift: from the one "
               "to the other in standard errors. A number that moved by more than two had been bent to make up for what "
               "was missing.")
 

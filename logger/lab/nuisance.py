@@ -139,7 +139,7 @@ _RECORDER = 2
 
 
 def rate_of_change(samples: Array, rate_hz: float) -> Array:
-    """The derivative of evenly spaced samples (n,), right to 0.1 % up to a quarter of their rate: central differences
+    """The derivative of evenly spaced samples (n,), right to 0.2 % up to a quarter of their rate: central differences
     of sixteenth order (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be
     half of it at 30 Hz."""
     half = len(_DIFFERENCES)

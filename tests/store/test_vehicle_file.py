@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
+from logger.identification.parameters import changed
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import Model, Step, read_model, read_vehicle, write_model, write_vehicle
@@ -492,3 +493,31 @@ def test_complaints_about_an_effect_of_ones_own_name_its_file(
     assert words in str(caught.value)
     assert f"{tmp_path / 'mine.py'}" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+# --- what was given ---
+
+def test_the_numbers_that_were_given_first_come_back_with_the_refitted_ones(tmp_path: Path) -> None:
+    first = read_vehicle(vehicle_file("rav4-2009"))
+    refitted = changed(first, {"sprung_mass_kg": 700.0, "front.suspension_damping_n_s_per_m": 1000.0})
+    path = tmp_path / "refitted.yaml"
+    write_model(path, Model(refitted, given=first))
+    assert read_model(path) == Model(refitted, given=first)
+    text = path.read_text()
+    assert "given:" in text and text.count("suspension_damping_n_s_per_m") == 3  # two axles, and the one that moved
+    write_model(path, Model(first))
+    assert "given" not in path.read_text()
+
+
+@pytest.mark.parametrize(("line", "words"), [
+    ("sprung_mass_kg: nonsense", "number"), ("sprung_mass_kg: 0", "greater than 0"),
+    ("rear.unsprung_mass_kg: 30", "expected a number of the vehicle"),
+    ("colour: 3", "expected a number of the vehicle"),
+])
+def test_complaints_about_what_was_given_name_the_line(tmp_path: Path, line: str, words: str) -> None:
+    path = tmp_path / "car.yaml"
+    path.write_text(QUARTER + f"given:\n  {line}\n")
+    with pytest.raises(BadInput) as caught:
+        read_model(path)
+    assert str(caught.value).startswith(f"{path}:{len((QUARTER + 'given:').splitlines()) + 1}: ")
+    assert words in str(caught.value)

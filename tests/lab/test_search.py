@@ -1,0 +1,131 @@
+"""A whole search, on runs whose secret is known: what is granted is granted, and no more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from logger.identification.parameters import changed, read
+from logger.lab import candidates
+from logger.lab.addition import add
+from logger.lab.candidates import Base, misalignment, screened
+from logger.lab.diagnosis import Diagnosis, diagnose
+from logger.lab.fitting import Problem, aligned, settled
+from logger.lab.nuisance import Tolerance
+from logger.lab.prediction import Run, Runs
+from logger.lab.verdict import as_json, told
+from logger.store.effect_file import shipped_effects
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.vehicle import Vehicle
+
+from compared import CAR, a_run, measuring
+
+EFFECTS = shipped_effects()
+NOISE_MPS2 = 0.05
+
+
+def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0) -> Runs:
+    """Three drives of a car with effects, and noise."""
+    rng = np.random.default_rng(8)
+    plain = [a_run(f"run{i}", speed, lasts_s, i) for i, speed in enumerate((7.0, 12.0, 18.0))]
+    return Runs([measuring(run, one + rng.normal(0, NOISE_MPS2, run.count)) for run, one in zip(
+        plain, Runs(plain).predict(compose(car, effects)), strict=True)], 500.0)
+
+
+def with_record(runs: Runs, change) -> Runs:  # type: ignore[no-untyped-def]
+    return Runs([measuring(run, change(run)) for run in runs.runs], 500.0)
+
+
+def searched(runs: Runs, car: Vehicle = CAR, names: tuple[str, ...] = ()) -> Diagnosis:
+    effects = {name: EFFECTS[name] for name in names} if names else EFFECTS
+    return diagnose(Problem(runs, car, Tolerance(), firm=True), effects)
+
+
+@pytest.fixture(scope="module")
+def flawless() -> Runs:
+    return runs_of(CAR, [])
+
+
+def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics(flawless: Runs) -> None:
+    def weak(run: Run) -> np.ndarray:
+        f_hz = np.fft.rfftfreq(run.count, 1 / run.rate_hz)
+        return np.fft.irfft(np.fft.rfft(run.measured_mps2) * 0.992 * np.sinc(f_hz / run.rate_hz), run.count)
+
+    found = searched(with_record(flawless, weak))
+    assert found.verdict == () and not found.unexplained
+
+
+def test_a_clock_that_runs_a_little_fast_lacks_no_physics(flawless: Runs) -> None:
+    fast = Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
+                 for one in flawless.runs], 500.0)
+    found = searched(fast)
+    assert set(found.verdict) <= {"speed_scale"} and not found.unexplained
+    assert fast.runs and found.problem.error(found.after) < 0.3 * found.baseline_error
+
+
+def test_aligning_moves_the_distance_and_leaves_the_car(flawless: Runs) -> None:
+    fast = Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
+                 for one in flawless.runs], 500.0)
+    problem = Problem(fast, CAR, Tolerance())
+    nominal = problem.start()
+    state = aligned(problem, nominal)
+    assert not state.logs.any()
+    assert problem.error(state) < 0.5 * problem.error(nominal)
+
+
+def test_what_only_another_car_would_explain_is_unexplained() -> None:
+    stiff = changed(CAR, {name: 1.35 * read(CAR, name) for name in (
+        "front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m")})
+    found = searched(runs_of(stiff, []), names=("sensor_gain", "sensor_mount_resonance"))
+    assert found.unexplained
+    assert "front.suspension_stiffness_n_per_m" in found.strained
+    told_of = as_json(told(found, EFFECTS))
+    assert any("front.suspension_stiffness_n_per_m by +" in one for one in told_of["sentences"])
+    assert told_of["numbers_off_too_far"] == found.strained
+
+
+def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too() -> None:
+    patch = chosen(EFFECTS["tire_enveloping"], {"contact_patch_m": 0.75 * CAR.contact_patch_m})
+    problem = Problem(runs_of(CAR, [patch]), CAR, Tolerance(), firm=True)
+    base = Base.of(problem, *settled(problem, problem.start()))
+    away = base.without(problem, ("contact_patch_m",))
+    place = problem.nuisance.names.index("contact_patch_m")
+    assert base.state.logs[place] < 0 and away.state.logs[place] == 0
+    promise = screened(problem, base, EFFECTS["tire_enveloping"], misalignment(problem, base.state))
+    (tried,) = candidates.fitted(problem, base, promise)
+    assert tried.whole_gain > 30
+    assert tried.state.effects[-1].values["contact_patch_m"] == pytest.approx(0.75 * CAR.contact_patch_m, rel=0.1)
+
+
+def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() -> None:
+    friction = chosen(EFFECTS["dry_friction"], {"friction_force_n": 90.0})
+    offset = chosen(EFFECTS["sensor_offset"], {"offset_m": 0.4})
+    runs = runs_of(CAR, [friction, offset])
+    first = add(Problem(runs, CAR, Tolerance(), whole=True), [], [friction])
+    bent = max(abs(one.found / one.nominal - 1) for one in first.numbers)
+    second = add(Problem(runs, CAR, Tolerance(), whole=True, stands=first.vehicle), first.effects, [offset])
+    assert bent > 0.05  # the missing offset pulls at the car
+    assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)
+    found = {one.effect.name: one for one in second.effects}
+    assert found["sensor_offset"].values["offset_m"] == pytest.approx(0.4, rel=0.06)
+    assert found["dry_friction"].values["friction_force_n"] == pytest.approx(90.0, rel=0.06)
+    assert max(abs(one.found / one.nominal - 1) for one in second.numbers) < 0.5 * bent
+
+
+def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
+    bending, roll = EFFECTS["body_bending"], EFFECTS["roll"]
+    usual = {"frequency_hz": 21.0, "damping_ratio": 0.05, "participation": 0.5}
+    assert not chosen(bending, usual).at_an_end
+    assert chosen(bending, usual | {"frequency_hz": 60.0}).at_an_end
+    assert chosen(bending, usual | {"damping_ratio": 0.003}).at_an_end
+    assert not chosen(bending, usual | {"participation": 10.0}).at_an_end  # a strength, which may be large
+    shapes = {one.name: one.high for one in roll.parameters}
+    assert not chosen(roll, shapes).at_an_end  # it has no strength that could make up for a shape
+
+
+def test_of_choices_the_usual_one_wins_unless_another_explains_clearly_more() -> None:
+    first = candidates.Tried(EFFECTS["body_bending"], None, 50.0, 20.0, 0.1, 3, 1, 0.0, None)  # type: ignore[arg-type]
+    assert candidates.best_choice([first, replace(first, gain=58.0)]) is first
+    better = replace(first, gain=62.0)
+    assert candidates.best_choice([first, better]) is better
