@@ -10,7 +10,7 @@ numbers are usually off by.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial
+from math import comb
 
 import numpy as np
 import numpy.typing as npt
@@ -139,18 +139,18 @@ _RECORDER = 2
 
 
 def rate_of_change(samples: Array, rate_hz: float) -> Array:
-    """The derivative of evenly spaced samples (n,), right to 0.2 % up to a quarter of their rate: central differences
-    of sixteenth order (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be
-    half of it at 30 Hz."""
+    """The derivative of evenly spaced samples (n,), right to 0.03 % up to a third of their rate: central differences of
+    order 48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be half of it at
+    30 Hz."""
     half = len(_DIFFERENCES)
     past_ends = np.pad(samples, half, mode="reflect", reflect_type="odd")
     return np.asarray(np.convolve(past_ends, [*_DIFFERENCES[::-1], 0.0, *-_DIFFERENCES], mode="valid") * rate_hz)
 
 
-_ORDER = 8
+_HALF_ORDER = 24
 _DIFFERENCES = np.array([
-    (-1.0) ** (k + 1) * factorial(_ORDER) ** 2 / (k * factorial(_ORDER - k) * factorial(_ORDER + k))
-    for k in range(1, _ORDER + 1)
+    (-1.0) ** (k + 1) * comb(2 * _HALF_ORDER, _HALF_ORDER - k) / (k * comb(2 * _HALF_ORDER, _HALF_ORDER))
+    for k in range(1, _HALF_ORDER + 1)
 ])
 
 

@@ -9,10 +9,10 @@ from logger.lab.nuisance import Tolerance, nuisance_of, rate_of_change, wander_o
 from compared import CAR, a_run
 
 RATE_HZ = 100.0
-INNER = slice(20, -20)
+INNER = slice(50, -50)
 
 
-@pytest.mark.parametrize(("at_hz", "within"), [(1.0, 1e-9), (10.0, 1e-6), (25.0, 2e-3), (30.0, 0.02)])
+@pytest.mark.parametrize(("at_hz", "within"), [(1.0, 1e-9), (10.0, 1e-9), (25.0, 1e-6), (33.0, 3e-4)])
 def test_the_rate_of_change_of_a_wave_is_its_derivative(at_hz: float, within: float) -> None:
     time_s = np.arange(1000) / RATE_HZ
     turn = 2 * np.pi * at_hz
