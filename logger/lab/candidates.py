@@ -164,9 +164,10 @@ class Screened:
 def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -> Screened:
     """Trials of an effect on a model."""
     trials = effect.trials(seen)
-    if effect.replaces:  # where a fit has brought the car's own number is worth a trial
+    known = [one for one in effect.parameters if one.name in effect.replaces and one.name in problem.nuisance.names]
+    if known:  # where a fit has brought the car's own numbers is worth a trial
         car = problem.nuisance.vehicle(problem.vehicle, base.state.logs)
-        trials.append(trials[0] | {name: read(car, name) for name in effect.replaces})
+        trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     base = base.without(problem, effect.replaces)
     best: dict[tuple[float, ...], Trial] = {}
     for values in trials:

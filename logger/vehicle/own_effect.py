@@ -53,6 +53,8 @@ def look_through(effect: object) -> Effect:
     names = [one.name for one in effect.parameters]
     if len(set(names)) < len(names):
         raise ValueError(f"expected each parameter once, found {', '.join(names)}")
+    if not isinstance(effect.replaces, tuple) or not set(effect.replaces) <= set(names):
+        raise ValueError(f"expected replaces to be a tuple of names of parameters, found {effect.replaces!r}")
     for one in effect.parameters:
         _look_through(one)
     return effect
@@ -66,6 +68,8 @@ def _look_through(one: Parameter) -> None:
         raise ValueError(f"{one.name}: expected finite low <= start <= high, found {one.low}, {one.start}, {one.high}")
     if one.scale is not Scale.LINEAR and one.low <= 0:
         raise ValueError(f"{one.name}: expected low above 0 for a scale that is {one.scale.value}, found {one.low}")
+    if one.step is not None and not 0 < one.step < float("inf"):
+        raise ValueError(f"{one.name}: expected a step above 0, found {one.step}")
     if not one.trials:
         raise ValueError(f"{one.name}: expected trials, the values that a search begins at, as in ({one.start},)")
     default = () if one.default is None else (one.default,)

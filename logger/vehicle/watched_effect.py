@@ -52,7 +52,7 @@ class _Watched(Effect):
         self._own, self._blame = own, blame
         self.name, self.title, self.parameters = own.name, own.title, own.parameters
         self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
-        self.realigns, self.stage = own.realigns, own.stage
+        self.realigns, self.replaces, self.stage = own.realigns, own.replaces, own.stage
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         with self._blame():
