@@ -143,11 +143,35 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     progress("refitting the car's own numbers")
     nominal = problem.start(present)
     seen = misalignment(problem, nominal)
-    before = now = Base.of(problem, *settled(problem, aligned(problem, nominal)))
+    before = Base.of(problem, *settled(problem, aligned(problem, nominal)))
     steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
-             Step("its numbers refitted within what is granted", now.judged_error)]
+             Step("its numbers refitted within what is granted", before.judged_error)]
+    now, taken, first, further = _found(problem, before, left, seen, progress, workers)
+    now, taken = _simplest(problem, now, taken, len(present), progress)
+    now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
+    progress("fitting all stretches")
+    whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
+    after, _ = settled(whole, now.state, _FINAL_ROUNDS)
+    noise = noise_of(whole, after)
+    excess, strained = _excess(whole, after, noise), _strained(whole, after)
+    verdict = tuple(needed)
+    return Diagnosis(
+        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
+        candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
+        unexplained=excess > UNEXPLAINED or bool(strained), excess=excess, strained=strained,
+        steps=(*steps, *further), before=before.state, after=after, problem=whole,
+        judged=any(one.judges for one in problem.stretches),
+    )
+
+
+def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misalignment, progress: Progress,
+           workers: int) -> tuple[Base, list[_Taken], list[Tried], list[Step]]:
+    """The model with the effects that were taken one after the other, these, what the first round tried, and the steps.
+    """
+    now, left = before, list(effects)
     first: list[Tried] = []
     taken: list[_Taken] = []
+    steps: list[Step] = []
     explained = 0.0
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}")
@@ -164,20 +188,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
             explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
-    now, taken = _simplest(problem, now, taken, len(present), progress)
-    now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
-    progress("fitting all stretches")
-    whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
-    after, _ = settled(whole, now.state, _FINAL_ROUNDS)
-    noise = noise_of(whole, after)
-    excess, strained = _excess(whole, after, noise), _strained(whole, after)
-    verdict = tuple(needed)
-    return Diagnosis(
-        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
-        candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
-        unexplained=excess > UNEXPLAINED or bool(strained), excess=excess, strained=strained, steps=tuple(steps),
-        before=before.state, after=after, problem=whole, judged=any(one.judges for one in problem.stretches),
-    )
+    return now, taken, first, steps
 
 
 def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
