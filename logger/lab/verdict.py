@@ -116,9 +116,8 @@ def untested(found: Verdict) -> list[str]:
 def _missing(found: Verdict, one: Chosen) -> str:
     numbers = f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(one.effect.name)
-    is_missing = ("would explain part of what is missing, or stands in for something else" if found.diagnosis.unexplained
-                  else "is missing")
-    return (f"{one.effect.name} {is_missing} ({one.effect.title}){numbers}. The chance that noise looks like that, all "
+    partly = "would explain part of what is missing, or stands in for something else"
+    return (f"{one.effect.name} {partly if found.diagnosis.unexplained else 'is missing'} ({one.effect.title}){numbers}. The chance that noise looks like that, all "
             f"candidates together: {chance(candidate.p_value)}.")
 
 
