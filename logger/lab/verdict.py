@@ -117,8 +117,8 @@ def _missing(found: Verdict, one: Chosen) -> str:
     numbers = f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(one.effect.name)
     partly = "would explain part of what is missing, or stands in for something else"
-    return (f"{one.effect.name} {partly if found.diagnosis.unexplained else 'is missing'} ({one.effect.title}){numbers}. The chance that noise looks like that, all "
-            f"candidates together: {chance(candidate.p_value)}.")
+    return (f"{one.effect.name} {partly if found.diagnosis.unexplained else 'is missing'} ({one.effect.title}){numbers}. "
+            f"The chance that noise looks like that, all candidates together: {chance(candidate.p_value)}.")
 
 
 def floor_where_judged(diagnosis: Diagnosis) -> float | None:
