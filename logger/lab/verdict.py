@@ -116,8 +116,10 @@ def untested(found: Verdict) -> list[str]:
 def _missing(found: Verdict, one: Chosen) -> str:
     numbers = f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(one.effect.name)
-    partly = "would explain part of what is missing, or stands in for something else"
-    return (f"{one.effect.name} {partly if found.diagnosis.unexplained else 'is missing'} ({one.effect.title}){numbers}. "
+    says = "is missing"
+    if found.diagnosis.unexplained:
+        says = "would explain part of what is missing, or stands in for something else"
+    return (f"{one.effect.name} {says} ({one.effect.title}){numbers}. "
             f"The chance that noise looks like that, all candidates together: {chance(candidate.p_value)}.")
 
 
