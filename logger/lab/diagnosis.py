@@ -39,8 +39,9 @@ MOST_EFFECTS = 4
 """No more than so many are looked for."""
 CHANCE = 0.001
 """How often, at most, noise alone may look like an effect, all candidates together."""
-WORTH = 0.0025
-"""The least that an effect has to lower the mean logarithm of the power that is left."""
+WORTH, DIFFER = 0.0025, 0.001
+"""The least that an effect has to lower the mean logarithm of the power that is left; and what two right simulations of
+a car may differ by, over what was measured, which is no effect either."""
 SHARE = 0.006
 """The least share that an effect has to add to what those before it explain: their laws are never quite the car's."""
 EASED, SHARE_EASED = 16.0, 0.002
@@ -263,17 +264,18 @@ def _starts(tried: Sequence[Tried]) -> int:
 def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
     """Whether an effect is there: not by chance, worth naming beside what was explained before, and no harm to what no
     fit saw."""
-    freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(one.state, None))
     return (not one.state.effects[-1].at_an_end
             and _p_value(one.gain, one.numbers, count) < CHANCE
-            and _worthy(one.whole_gain, one.eased, freedom, before)
+            and _worthy(problem, one.state, one.whole_gain, one.eased, before)
             and one.judged_gain > -HARM * one.gain)
 
 
-def _worthy(gain: float, eased: float, freedom: float, before: float) -> bool:
-    """Whether what an effect explains, or what it saves the car's numbers from, is worth naming beside what was
-    explained before."""
-    return gain > max(WORTH * freedom, SHARE * before) or eased > max(EASED, SHARE_EASED * before)
+def _worthy(problem: Problem, state: State, gain: float, eased: float, before: float) -> bool:
+    """Whether what an effect of a model explains, or what it saves the car's numbers from, is worth naming beside what
+    was explained before."""
+    freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(state, None))
+    least = max(WORTH, float(np.log1p((DIFFER / problem.error(state)) ** 2)))
+    return gain > max(least * freedom, SHARE * before) or eased > max(EASED, SHARE_EASED * before)
 
 
 def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[Tried, ...]:
@@ -305,11 +307,10 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
             others = dict(zip(names, pool.map(without, range(present, len(now.state.effects))), strict=True))
         worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
-        freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(now.state, None))
         moved = sum(worth[one.effect.name] for one in now.state.effects[present:]
                     if one.effect.realigns and one.effect.name != least)
         explained = before.left_by(others[least]) - moved
-        if _worthy(worth[least], others[least].cost - now.cost, freedom, explained):
+        if _worthy(problem, now.state, worth[least], others[least].cost - now.cost, explained):
             break
         now = others[least]
         worth.pop(least)
