@@ -33,7 +33,9 @@ from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 
 Array = npt.NDArray[np.float64]
 
-_STRONGEST, _WEAKEST = 10.0, 0.03
+# How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
+# next to nothing.
+_STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
 _STEPS, _ROUNDS = 5, 4
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
@@ -239,7 +241,8 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     own = sum(float(c[0] @ c[0]) for c in change) - float(mixed @ absorbed)
     if not own > 0:
         return Trial(one, base.ahead, here)
-    strength = float(np.clip(along / own, _WEAKEST, _STRONGEST))
+    strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
+    strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
     scaled = _scaled(one, strength)
     whole = Trial(one, base.ahead + 2 * along - own, here - absorbed)
     if scaled is None:

@@ -185,7 +185,7 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
-        if not best.effect.realigns:  # what was only moved to its place was explained by nothing
+        if best.effect.reshapes:  # what was only moved to its place was explained by nothing
             explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
@@ -308,7 +308,7 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
         worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
         moved = sum(worth[one.effect.name] for one in now.state.effects[present:]
-                    if one.effect.realigns and one.effect.name != least)
+                    if not one.effect.reshapes and one.effect.name != least)
         explained = before.left_by(others[least]) - moved
         if _worthy(problem, now.state, worth[least], others[least].cost - now.cost, explained):
             break

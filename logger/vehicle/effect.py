@@ -118,6 +118,7 @@ class Effect(ABC):
     signature    what it leaves in a measurement that a model without it is compared with
     shown_by     the drive that would show it best, as an instruction
     realigns     whether it moves the model against the measurement, so that a search looks at how they lie first
+    reshapes     whether it does more than that
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     """
 
@@ -128,6 +129,7 @@ class Effect(ABC):
     signature: str
     shown_by: str
     realigns: bool = False
+    reshapes: bool = True
     replaces: tuple[str, ...] = ()
     stage: int = 0
 

@@ -45,9 +45,11 @@ def look_through(effect: object) -> Effect:
             raise ValueError(f"expected EFFECT to have a text {word!r}")
     if not effect.name.isidentifier():
         raise ValueError(f"expected a name of letters, digits and _, found {effect.name!r}")
-    if not isinstance(effect.stage, int) or not isinstance(effect.realigns, bool):
-        raise ValueError(f"expected a whole number as stage and True or False as realigns, found {effect.stage!r} and "
-                         f"{effect.realigns!r}")
+    if not isinstance(effect.stage, int):
+        raise ValueError(f"expected a whole number as stage, found {effect.stage!r}")
+    for word in ("realigns", "reshapes"):
+        if not isinstance(getattr(effect, word), bool):
+            raise ValueError(f"expected True or False as {word}, found {getattr(effect, word)!r}")
     if not isinstance(effect.parameters, tuple) or not all(isinstance(one, Parameter) for one in effect.parameters):
         raise ValueError("expected parameters to be a tuple of Parameter, as in (Parameter(...),)")
     names = [one.name for one in effect.parameters]

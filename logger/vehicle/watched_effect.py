@@ -52,7 +52,8 @@ class _Watched(Effect):
         self._own, self._blame = own, blame
         self.name, self.title, self.parameters = own.name, own.title, own.parameters
         self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
-        self.realigns, self.replaces, self.stage = own.realigns, own.replaces, own.stage
+        self.realigns, self.reshapes, self.replaces = own.realigns, own.reshapes, own.replaces
+        self.stage = own.stage
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         with self._blame():

@@ -19,7 +19,7 @@ class SensorBandwidth(SensorEffect):
     name = "sensor_bandwidth"
     title = "the sensor's own low-pass"
     parameters = (
-        Parameter("cutoff_hz", 25.0, 0.5, 2000.0, float("inf"), Scale.RECIPROCAL, (15.0, 50.0),
+        Parameter("cutoff_hz", 25.0, 0.5, 2000.0, float("inf"), Scale.RECIPROCAL, (15.0, 50.0, 1000.0),
                   "where its gain has fallen by 3 dB"),
         Parameter("order", 1.0, 1.0, 2.0, None, Scale.LINEAR, (1.0, 2.0), "1, or 2 for Butterworth's of second order",
                   choices=(1.0, 2.0), default=1.0),
@@ -27,6 +27,7 @@ class SensorBandwidth(SensorEffect):
     source = "S. Butterworth, On the Theory of Filter Amplifiers (1930)"
     signature = "the measurement falls behind the model more and more as the frequency rises, and comes later"
     shown_by = "drive a road with sharp edges, which excites high frequencies"
+    realigns = True
     stage = 3
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:

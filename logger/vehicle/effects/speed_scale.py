@@ -14,8 +14,8 @@ from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
 
 Array = npt.NDArray[np.float64]
 
-# A search begins no nearer to nothing than this.
-_LEAST = 0.0005
+# So little moves all waves alike: a search can tell from it how much it takes. Runs lie wrong from the second on.
+_LITTLE, _WRONG = 1e-5, 0.0005
 
 
 class SpeedScale(DriveEffect):
@@ -28,12 +28,13 @@ class SpeedScale(DriveEffect):
     source = "UN Regulation 39: a speedometer may read up to a tenth too much; worn tires change the rest"
     signature = "model and measurement drift apart along the road, the more the farther"
     shown_by = "drive a long stretch with a mark at each end, and measure it"
-    realigns = True
+    realigns, reshapes = True, False
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        if seen is None or abs(seen.scale - 1) < _LEAST:
-            return [{"scale": 1 - _LEAST}, {"scale": 1 + _LEAST}]
-        return [{"scale": seen.scale}]
+        if seen is None:
+            return [{"scale": 1 - _WRONG}, {"scale": 1 + _WRONG}]
+        wrong = [seen.scale] if abs(seen.scale - 1) > _WRONG else []
+        return [{"scale": scale} for scale in (1 + _LITTLE, *wrong)]
 
     def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
         return distance_m / p.scale

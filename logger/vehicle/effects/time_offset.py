@@ -11,8 +11,8 @@ from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 
 Complex = npt.NDArray[np.complex128]
 
-# A search begins no nearer to nothing than this.
-_LEAST_S = 0.002
+# So little moves all waves alike: a search can tell from it how much it takes. Runs lie wrong from the second on.
+_LITTLE_S, _WRONG_S = 2e-4, 0.002
 
 
 class TimeOffset(SensorEffect):
@@ -25,13 +25,14 @@ class TimeOffset(SensorEffect):
     source = "the shift theorem of the Laplace transform"
     signature = "model and measurement have the same shape, shifted by the same time at every speed"
     shown_by = "drive one bump at two speeds: the distance it seems moved by grows with the speed"
-    realigns = True
+    realigns, reshapes = True, False
     stage = 4
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        if seen is None or abs(seen.delay_s) < _LEAST_S:
-            return [{"delay_s": -_LEAST_S}, {"delay_s": _LEAST_S}]
-        return [{"delay_s": seen.delay_s}]
+        if seen is None:
+            return [{"delay_s": -_WRONG_S}, {"delay_s": _WRONG_S}]
+        wrong_s = [seen.delay_s] if abs(seen.delay_s) > _WRONG_S else []
+        return [{"delay_s": delay_s} for delay_s in (_LITTLE_S, *wrong_s)]
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         return np.exp(-s * p.delay_s)
