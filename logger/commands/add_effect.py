@@ -110,7 +110,7 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         return chosen(effect, values)
     tell = on_screen()
     try:
-        problem = given.problem(whole=False)
+        problem = given.problem(whole=False, firm=True)
         tell("refitting the car's own numbers")
         nominal = problem.start(given.model.effects)
         base = Base.of(problem, *settled(problem, aligned(problem, nominal)))
@@ -130,9 +130,9 @@ def added(given: Bench, start: Chosen, starts: int) -> Gained:
     from logger.lab.gained import gained
 
     on_screen()(f"fitting the car without and with {start.effect.name}")
-    problem = given.problem(whole=True)
+    problem = given.problem(whole=True, firm=True)
     try:
-        found = add(problem, given.model.effects, [given.filed(start)])
+        found = add(problem, given.problem(whole=True, firm=False), given.model.effects, [given.filed(start)])
         return gained(problem, found, [start.effect.name], starts)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None

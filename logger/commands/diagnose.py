@@ -81,7 +81,7 @@ def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
     tell = on_screen()
     effects = {name: effect for name, effect in given.effects.items() if name not in left_out}
     try:
-        found = diagnose(given.problem(whole=False), effects, given.model.effects, tell)
+        found = diagnose(given.problem(whole=False, firm=True), effects, given.model.effects, tell)
         finely = found.problem.start(given.model.effects)  # a search simulates less finely
         return told(replace(found, baseline_error=found.problem.error(finely)), effects, tell)
     except ValueError as error:

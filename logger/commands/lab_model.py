@@ -49,8 +49,9 @@ class Bench:
     files: Mapping[str, str]
     numbers: float
 
-    def problem(self, whole: bool) -> Problem:
-        """To search on (a third of the runs is kept to judge), or on the whole of the runs, finely simulated.
+    def problem(self, whole: bool, firm: bool) -> Problem:
+        """To search on (a third of the runs is kept to judge), or on the whole of the runs, finely simulated; holding
+        on to the car's numbers or not.
 
         Raises BadInput when the vehicle lacks what it needs.
         """
@@ -61,7 +62,7 @@ class Bench:
         runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
         model = self.model
         return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle,
-                       firm=not whole)
+                       firm)
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""

@@ -57,19 +57,24 @@ class Added:
     after: State
 
 
-def add(problem: Problem, present: Sequence[Chosen], added: Sequence[Chosen]) -> Added:
+def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequence[Chosen]) -> Added:
     """Fit ``problem``'s vehicle, with the effects that are present, without and with those that are added; the values
-    that these have are where the fit begins."""
+    that these have are where the fit begins.
+
+    problem    firm, so that what is still missing beside these effects does not bend the car, and they not with it
+    loose      the same, not firm: it shows how far the car would have to bend without the added effects
+    """
     nominal = problem.start(present)
     before, _ = settled(problem, nominal)
     # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
     starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
               problem.start((*present, *added)))
     after, _ = settled(problem, min(starts, key=problem.deviance))
-    _, spread_before = with_spread(problem, before)
+    bent, _ = settled(loose, before)
+    _, spread_before = with_spread(loose, bent)
     effects, spread = with_spread(problem, after)
     vehicle = problem.nuisance.vehicle(problem.vehicle, after.logs)
-    earlier = problem.nuisance.vehicle(problem.vehicle, before.logs)
+    earlier = problem.nuisance.vehicle(problem.vehicle, bent.logs)
     numbers = tuple(
         Number(name, read(problem.vehicle, name), read(earlier, name), read(earlier, name) * float(was),
                read(vehicle, name), read(vehicle, name) * float(now))

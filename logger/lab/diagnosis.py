@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from logger.lab.candidates import (
     Screened,
     Tried,
     as_screened,
+    best_choice,
     fitted,
     misalignment,
     screened,
@@ -55,6 +57,7 @@ STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
+_HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 # Nor do gains tell two effects apart that differ by less than this share of the larger.
@@ -179,14 +182,17 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
         tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
         first = first or tried
-        best = next((one for one in tried if _accepted(problem, one, _starts(tried), explained)), None)
-        if best is None:
+        accepted = [one for one in tried if _accepted(problem, one, _starts(tried), explained)]
+        if not accepted:
             break
+        best = _simplest_of_the_best(accepted)
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
         if best.effect.reshapes:  # what was only moved to its place was explained by nothing
             explained += earlier.left_by(now)
+        for earlier_one in taken[:-1]:
+            now = _sought_again(problem, now, earlier_one.tried, seen, progress)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
     return now, taken, first, steps
@@ -242,6 +248,17 @@ def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
     return list(found.values())
 
 
+def _simplest_of_the_best(accepted: Sequence[Tried]) -> Tried:
+    """Of those that explain about as much as the best one, the one with the fewest numbers."""
+    near = _near(accepted[0])
+    return min((one for one in accepted if one.whole_gain > accepted[0].whole_gain - near), key=lambda one: one.numbers)
+
+
+def _near(one: Tried) -> float:
+    """Gains that differ by less from that of one effect do not tell another from it."""
+    return max(TOLD_APART, _ALIKE_SHARE * one.whole_gain)
+
+
 def _merit(one: Tried) -> float:
     """For sorting, best first: the gain; each number that was fitted has to gain what tells two effects apart, so that
     the simpler of two that cannot be told apart comes first."""
@@ -283,9 +300,8 @@ def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[Tried
     worthy = [other for other in tried if _accepted(problem, other, _starts(tried), 0.0)]
     if one not in worthy:
         return ()
-    near = max(TOLD_APART, _ALIKE_SHARE * one.whole_gain)
     return tuple(other for other in worthy
-                 if other is not one and abs(other.whole_gain - one.whole_gain) < near)
+                 if other is not one and abs(other.whole_gain - one.whole_gain) < _near(one))
 
 
 def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], present: int,
@@ -294,17 +310,11 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
     others is worth."""
     worth = {taken[0].tried.effect.name: taken[0].tried.whole_gain} if len(taken) == 1 else {}
 
-    def without(place: int) -> Base:
-        rest = now.state.effects[:place] + now.state.effects[place + 1:]
-        start = problem.laid_out(rest, now.state.logs, now.state.wander)
-        slopes = None if now.state.effects[place].effect.realigns else now.slopes
-        return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes))
-
     while len(now.state.effects) - present > 1:
         names = [one.effect.name for one in now.state.effects[present:]]
         progress(f"are all of {', '.join(names)} still needed?")
         with ThreadPoolExecutor(workers) as pool:
-            others = dict(zip(names, pool.map(without, range(present, len(now.state.effects))), strict=True))
+            others = dict(zip(names, pool.map(partial(_without, problem, now), names), strict=True))
         worth = {name: other.left_by(now) for name, other in others.items()}
         least = min(worth, key=lambda name: worth[name])
         moved = sum(worth[one.effect.name] for one in now.state.effects[present:]
@@ -315,6 +325,27 @@ def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], 
         now = others[least]
         worth.pop(least)
     return now, dict(sorted(worth.items(), key=lambda pair: -pair[1]))
+
+
+def _sought_again(problem: Problem, now: Base, one: Tried, seen: Misalignment, progress: Progress) -> Base:
+    """The model with an effect where it explains most beside those that were found after it, which may be elsewhere."""
+    if one.numbers < _HAS_A_SHAPE:
+        return now
+    name = one.effect.name
+    progress(f"is {name} still what it was?")
+    without = _without(problem, now, name)
+    again = best_choice(fitted(problem, without, screened(problem, without, one.effect, seen)))
+    other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes))
+    return other if now.left_by(other) > TOLD_APART else now
+
+
+def _without(problem: Problem, now: Base, name: str) -> Base:
+    """The model without one of its effects, refitted."""
+    rest = tuple(one for one in now.state.effects if one.effect.name != name)
+    away = next(one for one in now.state.effects if one.effect.name == name)
+    start = problem.laid_out(rest, now.state.logs, now.state.wander)
+    slopes = None if away.effect.realigns else now.slopes
+    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes))
 
 
 def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,

@@ -32,7 +32,8 @@ _LOG_STEP = 0.01
 _STEP_IN_DEVIATIONS = 5.0
 _SHARE_STEP = 0.02
 _LEAST_SHARE = 0.1
-_FIRST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 100.0, 30.0
+# Far off, steps are damped; near the end they are hardly, or nothing would move along with what makes up for it.
+_FIRST_DAMPING, _LAST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 1e-9, 100.0, 30.0
 # A step that gains less than this in minus twice a log-likelihood ends a fit.
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
@@ -326,12 +327,13 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     return np.array(steps)
 
 
-def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False) -> State:
+def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False,
+             first_damping: float = _FIRST_DAMPING) -> State:
     """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander.
 
     laid_out    lay the road out anew for every trial, instead of counting the wander to first order
     """
-    problem, damping = weighed.problem, _FIRST_DAMPING
+    problem, damping = weighed.problem, first_damping
     make = problem.laid_out if laid_out else partial(problem.predicted, slopes=weighed.slopes)
     state = make(state.effects, state.logs, state.wander)
     now = weighed.objective(state)
@@ -351,7 +353,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
             if there < now:
                 gained, now, state = now - there, there, trial
                 promised = float(2 * gradient @ step - step @ information @ step)
-                damping = max(damping / _MORE_DAMPING, 1e-9)
+                damping = max(damping / _MORE_DAMPING, _LAST_DAMPING)
                 break
             damping *= _MORE_DAMPING
         # Slopes that keep what they promise serve for the next step too; those that do not are taken anew.
@@ -360,7 +362,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
         if gained < _SMALL_GAIN:
             if not kept:
                 break
-            damping = _FIRST_DAMPING
+            damping = first_damping
     return state
 
 
@@ -416,7 +418,7 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
     given, least, slopes = slopes is not None, problem.deviance(state), slopes or problem.slopes(state)
     for done in range(1, rounds + 1):
         weighed = Weighed(problem, slopes, problem.whiteners(state))
-        trial = improved(weighed, state, moves, _SETTLING_STEPS, laid_out=True)
+        trial = improved(weighed, state, moves, _SETTLING_STEPS, True, _FIRST_DAMPING if done == 1 else _LAST_DAMPING)
         now = problem.deviance(trial)
         gained = least - now
         if gained > 0:  # else it was better by the weights of before

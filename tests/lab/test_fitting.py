@@ -61,7 +61,7 @@ def test_a_car_that_lacks_nothing_settles_at_the_noise_and_at_its_true_numbers()
     noise = truth["noise"]["rms_mps2"] / np.sqrt((measured**2).mean())
     assert problem.error(state) < problem.error(nominal)
     assert problem.error(state) == pytest.approx(noise, rel=0.05)
-    added = add(problem, [], [])
+    added = add(problem, problem, [], [])
     off = [(one.found - true_number(truth, one.name)) / one.found_standard_error for one in added.numbers]
     assert np.sqrt(np.mean(np.square(off))) < 1.6
 
@@ -73,7 +73,7 @@ def test_an_effect_is_found_with_its_number_and_its_error() -> None:
     seen = misalignment(problem, base.state)
     (found,) = fitted(problem, base, screened(problem, base, EFFECTS["damper_asymmetry"], seen))
     assert found.gain > 100
-    added = add(problem, [], found.state.effects)
+    added = add(problem, problem, [], found.state.effects)
     ratio, true = added.effects[0].values["rebound_to_bump_ratio"], truth["effects"][0]["parameters"]
     error = added.effects[0].standard_errors["rebound_to_bump_ratio"]
     assert abs(ratio - true["rebound_to_bump_ratio"]) < max(4 * error, 0.02 * ratio)

@@ -102,10 +102,13 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     friction = chosen(EFFECTS["dry_friction"], {"friction_force_n": 90.0})
     offset = chosen(EFFECTS["sensor_offset"], {"offset_m": 0.4})
     runs = runs_of(CAR, [friction, offset])
-    first = add(Problem(runs, CAR, Tolerance(), whole=True), [], [friction])
+    firm, loose = (Problem(runs, CAR, Tolerance(), whole=True, firm=firm) for firm in (True, False))
+    first = add(firm, loose, [], [friction])
     bent = max(abs(one.found / one.nominal - 1) for one in first.numbers)
-    second = add(Problem(runs, CAR, Tolerance(), whole=True, stands=first.vehicle), first.effects, [offset])
-    assert bent > 0.05  # the missing offset pulls at the car
+    assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to what was granted
+    assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
+    firm, loose = (Problem(runs, CAR, Tolerance(), whole=True, stands=first.vehicle, firm=one) for one in (True, False))
+    second = add(firm, loose, first.effects, [offset])
     assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)
     found = {one.effect.name: one for one in second.effects}
     assert found["sensor_offset"].values["offset_m"] == pytest.approx(0.4, rel=0.06)

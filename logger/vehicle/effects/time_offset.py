@@ -20,7 +20,7 @@ class TimeOffset(SensorEffect):
     title = "the acceleration is late against the position"
     parameters = (
         Parameter("delay_s", 0.02, -2.0, 2.0, 0.0, Scale.LINEAR, (-0.02, 0.02), "late positive, early negative",
-                  step=2e-5),
+                  step=1e-6),
     )
     source = "the shift theorem of the Laplace transform"
     signature = "model and measurement have the same shape, shifted by the same time at every speed"
