@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.identification.parameters import changed, read
-from logger.lab import candidates
+from logger.lab import candidates, diagnosis
 from logger.lab.addition import add
 from logger.lab.candidates import Base, misalignment, screened
 from logger.lab.diagnosis import Diagnosis, diagnose
@@ -132,3 +132,25 @@ def test_of_choices_the_usual_one_wins_unless_another_explains_clearly_more() ->
     assert candidates.best_choice([first, replace(first, gain=58.0)]) is first
     better = replace(first, gain=62.0)
     assert candidates.best_choice([first, better]) is better
+
+
+def test_an_effect_that_was_taken_for_what_it_is_not_is_sought_again() -> None:
+    tires = chosen(EFFECTS["tire_damping"], {"tire_damping_n_s_per_m": 400.0})
+    people = chosen(EFFECTS["occupant"], {"mass_kg": 50.0, "frequency_hz": 5.6, "damping_ratio": 0.2})
+    problem = Problem(runs_of(CAR, [tires, people]), CAR, Tolerance(), firm=True)
+    seen = misalignment(problem, problem.start())
+    wrong = chosen(EFFECTS["occupant"], {"mass_kg": 90.0, "frequency_hz": 11.6, "damping_ratio": 0.3})
+    stuck = Base.of(problem, *settled(problem, problem.start([wrong, tires]), 2))
+    once = candidates.Tried(EFFECTS["occupant"], stuck.state, 0.0, 0.0, 0.0, 3, 1, 0.0, stuck.slopes)
+    again = diagnosis._sought_again(problem, stuck, once, seen, lambda words: None)
+    found = {one.effect.name: one for one in again.state.effects}
+    assert stuck.left_by(again) >= 0
+    assert found["occupant"].values["frequency_hz"] == pytest.approx(5.6, rel=0.05)
+    assert found["tire_damping"].values["tire_damping_n_s_per_m"] == pytest.approx(400.0, rel=0.2)
+
+
+def test_of_two_that_explain_alike_the_simpler_is_taken() -> None:
+    first = candidates.Tried(EFFECTS["occupant"], None, 6000.0, 2000.0, 0.1, 3, 1, 0.0, None)  # type: ignore[arg-type]
+    simpler = replace(first, effect=EFFECTS["tire_damping"], numbers=1, gain=5950.0)
+    assert diagnosis._simplest_of_the_best([first, simpler]) is simpler
+    assert diagnosis._simplest_of_the_best([first, replace(simpler, gain=5800.0)]) is first
