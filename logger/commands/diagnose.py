@@ -122,6 +122,9 @@ def _next(args: argparse.Namespace, given: Bench, found: Verdict) -> str:
         name = given.files.get(one.effect.name, one.effect.name)
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
+    if found.diagnosis.strained and not found.diagnosis.left_over:
+        names = ", ".join(found.diagnosis.strained)
+        return paragraphs([f"Next: see whether {names} of the vehicle's file can be right."])
     if found.diagnosis.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where what is left sits."])

@@ -99,8 +99,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
             tell([*added_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
             tell(_chapter("Compare again", why.get("again")))
             tell(_comparison_lines(rounds[-1].comparison))
-            given = replace(given, model=replace(given.model, effects=rounds[-1].gained.added.effects,
-                                                 history=model_of(given, rounds[-1].gained).history))
+            given = replace(given, model=model_of(given, rounds[-1].gained))
             if not same:  # what is missing beside another effect is to be found anew
                 going = True
                 break

@@ -209,7 +209,7 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
 
 
 def best_choice(tries: Sequence[Tried]) -> Tried:
-    """Of one effect with other choices, the likeliest; the first (the usual one) unless another is clearly so."""
+    """Of one effect with other choices, the likeliest; that which promised most unless another is clearly so."""
     return max(tries, key=lambda one: one.whole_gain + (TOLD_APART if one is tries[0] else 0.0))
 
 
@@ -267,7 +267,7 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
 
 
 def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:
-    """A trial of the car as its file says: where positions are wrong, what was fitted before is worth nothing."""
+    """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing."""
     nothing = np.zeros(base.weighed.count)
     state = problem.laid_out((*base.state.effects, one), *base.weighed.parted(nothing))
     return Trial(one, base.objective - base.weighed.objective(state), nothing)

@@ -32,7 +32,6 @@ from logger.lab.candidates import (
 )
 from logger.lab.fitting import Problem, State, aligned, settled
 from logger.lab.noise import Noise, floor_error, noise_of
-from logger.lab.prediction import Runs
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
 Progress = Callable[[str], None]
@@ -95,7 +94,8 @@ class Step:
 class Diagnosis:
     """What was found.
 
-    candidates     of the first round, with those of later rounds in place of theirs where they were taken; best first
+    candidates     of the first round, with those of later rounds in place of theirs where they were taken; best first;
+                   those of the verdict with the values that they end with
     obstacles      effects that could not be tried, and why
     verdict        effects that the model lacks, the most certain first
     excess         the share by which what is left is above the noise in the run where it is most
@@ -117,6 +117,11 @@ class Diagnosis:
     after: State
     problem: Problem
     judged: bool
+
+    @property
+    def left_over(self) -> bool:
+        """Whether more is left than the sensor's noise."""
+        return self.excess > UNEXPLAINED
 
     @property
     def judged_on(self) -> str:
@@ -151,10 +156,13 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
              Step("its numbers refitted within what is granted", before.judged_error)]
     now, taken, first, further = _found(problem, before, left, seen, progress, workers)
+    on_the_way = now
     now, taken = _simplest(problem, now, taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
+    if now is not on_the_way:
+        further.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
-    whole = Problem(Runs(problem.runs.runs), problem.vehicle, problem.tolerance, whole=True)
+    whole = problem.entire()
     after, _ = settled(whole, now.state, _FINAL_ROUNDS)
     noise = noise_of(whole, after)
     excess, strained = _excess(whole, after, noise), _strained(whole, after)
@@ -178,6 +186,8 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
     steps: list[Step] = []
     explained = 0.0
     for number in range(1, MOST_EFFECTS + 1):
+        if not left:
+            break
         progress(f"round {number}")
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
         tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
@@ -189,10 +199,10 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
-        if best.effect.reshapes:  # what was only moved to its place was explained by nothing
-            explained += earlier.left_by(now)
         for earlier_one in taken[:-1]:
             now = _sought_again(problem, now, earlier_one.tried, seen, progress)
+        if best.effect.reshapes:  # what was only moved to its place was explained by nothing
+            explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
     return now, taken, first, steps
@@ -336,7 +346,8 @@ def _sought_again(problem: Problem, now: Base, one: Tried, seen: Misalignment, p
     without = _without(problem, now, name)
     again = best_choice(fitted(problem, without, screened(problem, without, one.effect, seen)))
     other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes))
-    return other if now.left_by(other) > TOLD_APART else now
+    at_an_end = any(one.at_an_end for one in other.state.effects)
+    return other if now.left_by(other) > TOLD_APART and not at_an_end else now
 
 
 def _without(problem: Problem, now: Base, name: str) -> Base:
@@ -363,7 +374,8 @@ def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int
             effects[place] = rival.state.effects[-1]
             start = problem.laid_out(tuple(effects), now.state.logs, now.state.wander)
             other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes))
-            if other.left_by(now) < TOLD_APART * (found[number].tried.numbers - rival.numbers):
+            most = TOLD_APART * (found[number].tried.numbers - rival.numbers)
+            if other.left_by(now) < most and not other.state.effects[place].at_an_end:
                 rest = tuple(one for one in (found[number].tried, *found[number].rivals) if one is not rival)
                 now, found[number] = other, _Taken(rival, rest, found[number].count)
     return now, found
@@ -391,7 +403,8 @@ def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Seque
     found = []
     for name in verdict:
         one = own[name]
-        found.append(_candidate(one.tried, one.count, one.rivals, values[name]))
+        rivals = tuple(rival for rival in one.rivals if rival.effect.name not in verdict)
+        found.append(_candidate(one.tried, one.count, rivals, values[name]))
     found += [_candidate(tried, _starts(first), _rivals(tried, first, problem), None)
               for tried in first if tried.effect.name not in verdict]
     return tuple(found)

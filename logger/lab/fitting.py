@@ -75,17 +75,23 @@ class Problem:
 
     whole     fit all of the runs, and leave no stretch to judge
     stands    the vehicle as it stands, where fits begin, if that is another than was given
-    firm      hold on to the car's numbers: a search whose car may bend as it likes never misses an effect
+    firm      hold on to the car's numbers: a car that may bend as it likes makes up for effects that it lacks
     """
 
     def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
                  stands: Vehicle | None = None, firm: bool = False) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
+        self._as_it_stands = stands
         self._stands = np.zeros(len(self.nuisance.names)) if stands is None else self.nuisance.logs(vehicle, stands)
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
         self.stretches = [Stretches(run, whole) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
+
+    def entire(self) -> Problem:
+        """All of the runs, finely simulated, by a car that is not held, so that it shows when it has to bend too far.
+        """
+        return Problem(Runs(self.runs.runs), self.vehicle, self.tolerance, True, self._as_it_stands)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -215,10 +221,13 @@ def located(problem: Problem, state: State, slopes: Slopes) -> State:
 
 
 class Weighed:
-    """Slopes, weighed; and the normal equations of what they hold."""
+    """Slopes, weighed; and the normal equations of what they hold.
 
-    def __init__(self, problem: Problem, slopes: Slopes, whiteners: Sequence[Whitener]) -> None:
-        self.problem, self.slopes, self.whiteners = problem, slopes, list(whiteners)
+    still    the car's numbers stay where they are
+    """
+
+    def __init__(self, problem: Problem, slopes: Slopes, whiteners: Sequence[Whitener], still: bool = False) -> None:
+        self.problem, self.slopes, self.whiteners, self._still = problem, slopes, list(whiteners), still
         self.white = [whitener(columns) for whitener, columns in zip(whiteners, slopes.columns, strict=True)]
         p = len(problem.nuisance.names)
         sizes = [one.count for one in problem.wander]
@@ -269,6 +278,8 @@ class Weighed:
         where they fit best."""
         gradient = self.against([one[None] for one in left])[:, 0] - self.prior @ self.joined(state)
         gradient[: len(state.logs)] -= self.problem.nuisance.firmness(state.logs)[0]
+        if self._still:
+            gradient[: len(state.logs)] = 0.0
         return gradient
 
     def information_at(self, state: State) -> Array:
@@ -323,7 +334,7 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
         if step is None:
             step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
-        steps.append(forward if abs(forward) > 0.5 * step else back)
+        steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
     return np.array(steps)
 
 
@@ -396,7 +407,7 @@ def aligned(problem: Problem, state: State) -> State:
     for _ in range(_ALIGNING_ROUNDS):
         columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
                    for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
-        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state))
+        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state), still=True)
         trial = improved(weighed, state, [], _SETTLING_STEPS, laid_out=True)
         gained = least - problem.deviance(trial)
         if gained > 0:

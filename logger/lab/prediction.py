@@ -90,7 +90,8 @@ class Runs:
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
-        return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
 
     def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
         fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs else self.fine_hz

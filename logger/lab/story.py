@@ -75,6 +75,8 @@ def ending(story: Story) -> list[str]:
         lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:
         lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
+    elif verdict.diagnosis.strained and not verdict.diagnosis.left_over:
+        lines.append("Numbers of the vehicle's file are off by more than was granted: see whether they can be right.")
     elif verdict.diagnosis.unexplained:
         lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
     else:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from logger.lab.blind import Blind, blind
-from logger.lab.diagnosis import UNEXPLAINED, Candidate, Diagnosis
+from logger.lab.diagnosis import Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
 from logger.lab.stretches import Stretches
@@ -33,7 +33,7 @@ class Verdict:
     effects      of the model that it ends with, with standard errors
     catalogue    all effects that were asked for, by name
     blind        those that these runs could not show at their usual strength
-    shape        of what no candidate explains; None where nothing is unexplained
+    shape        of what no candidate explains; None where no more than noise is left
     """
 
     diagnosis: Diagnosis
@@ -68,9 +68,9 @@ def told(diagnosis: Diagnosis, catalogue: Mapping[str, Effect],
     taken = {one.effect.name for one in after.effects}
     others = [effect for name, effect in catalogue.items() if name not in diagnosis.obstacles and name not in taken]
     hidden = blind(problem, after, others)
-    if diagnosis.unexplained:
+    if diagnosis.left_over:
         progress("the shape of what is left")
-    return Verdict(diagnosis, effects, catalogue, hidden, shape_of(problem, after) if diagnosis.unexplained else None)
+    return Verdict(diagnosis, effects, catalogue, hidden, shape_of(problem, after) if diagnosis.left_over else None)
 
 
 # --- in words ---
@@ -83,13 +83,13 @@ def summary(found: Verdict) -> list[str]:
     if not lines and not diagnosis.unexplained:
         lines.append("Nothing is missing: with its numbers refitted within what they are usually off, the model leaves "
                      "hardly more than the sensor's noise.")
-    if diagnosis.excess > UNEXPLAINED:
+    if diagnosis.left_over:
         lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: what is left is "
                      f"{1 + diagnosis.excess:.3g} times the sensor's noise in the run where it is most.")
     if diagnosis.strained:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
-        lines.append(f"That takes a car whose numbers are off by more than was granted: {off}. Either the vehicle's "
-                     "file is wrong there, or something else is missing that no candidate explains.")
+        lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "
+                     "vehicle's file is wrong there, or something else is missing that no candidate explains.")
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]
@@ -99,7 +99,7 @@ def summary(found: Verdict) -> list[str]:
 
 
 def looks_like(found: Verdict) -> list[str]:
-    """What no candidate explains, described; nothing where nothing is unexplained."""
+    """What no candidate explains, described; nothing where no more than noise is left."""
     return [] if found.shape is None else sentences(found.shape)
 
 

@@ -74,6 +74,21 @@ def test_aligning_moves_the_distance_and_leaves_the_car(flawless: Runs) -> None:
     assert problem.error(state) < 0.5 * problem.error(nominal)
 
 
+def test_aligning_leaves_a_car_that_was_refitted_where_it_stands(flawless: Runs) -> None:
+    stands = changed(CAR, {"sprung_mass_kg": 1.2 * CAR.sprung_mass_kg})
+    start = Problem(flawless, CAR, Tolerance(), stands=stands).start()
+    assert start.logs.any()
+    assert aligned(Problem(flawless, CAR, Tolerance(), stands=stands), start).logs.tolist() == start.logs.tolist()
+    entire = Problem(flawless, CAR, Tolerance(), stands=stands, firm=True).entire()
+    assert entire.start().logs.tolist() == start.logs.tolist() and not entire.nuisance.firm
+
+
+def test_one_effect_is_enough_to_ask_for() -> None:
+    strong = chosen(EFFECTS["sensor_gain"], {"gain": 1.2})
+    found = searched(runs_of(CAR, [strong]), names=("sensor_gain",))
+    assert found.verdict == ("sensor_gain",) and not found.unexplained
+
+
 def test_what_only_another_car_would_explain_is_unexplained() -> None:
     stiff = changed(CAR, {name: 1.35 * read(CAR, name) for name in (
         "front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m")})
@@ -82,6 +97,7 @@ def test_what_only_another_car_would_explain_is_unexplained() -> None:
     assert "front.suspension_stiffness_n_per_m" in found.strained
     told_of = as_json(told(found, EFFECTS))
     assert any("front.suspension_stiffness_n_per_m by +" in one for one in told_of["sentences"])
+    assert not found.left_over and told_of["unexplained_shape"] is None
     assert told_of["numbers_off_too_far"] == found.strained
 
 

@@ -128,6 +128,7 @@ def test_trials_that_are_none(tmp_path: Path, does: str, words: str) -> None:
     ('source = "mine"', 'source = "mine"\n    stage = "first"', "a whole number as stage"),
     ('source = "mine"', 'source = "mine"\n    realigns = None', "True or False as realigns"),
     ('source = "mine"', 'source = "mine"\n    replaces = ("colour",)', "tuple of names of parameters"),
+    ('source = "mine"', 'source = "mine"\n    reshapes = 0', "True or False as reshapes"),
 ])
 def test_what_is_seen_when_it_is_read(tmp_path: Path, old: str, new: str, words: str) -> None:
     more = "\n\n    def driven(self, p, distance_m):\n        return distance_m"

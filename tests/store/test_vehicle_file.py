@@ -510,9 +510,10 @@ def test_the_numbers_that_were_given_first_come_back_with_the_refitted_ones(tmp_
 
 
 @pytest.mark.parametrize(("line", "words"), [
-    ("sprung_mass_kg: nonsense", "number"), ("sprung_mass_kg: 0", "greater than 0"),
-    ("rear.unsprung_mass_kg: 30", "expected a number of the vehicle"),
-    ("colour: 3", "expected a number of the vehicle"),
+    ("sprung_mass_kg: nonsense", "number"), ("sprung_mass_kg: 1e300", "expected a number from 1 to"),
+    ("front.suspension_damping_n_s_per_m: 0", "above 0"), ("contact_patch_m: 5000", "expected a number from 0 to 1"),
+    ("rear.unsprung_mass_kg: 30", "expected one of the keys sprung_mass_kg"),
+    ("both.unsprung_mass_kg: 30", "expected one of the keys sprung_mass_kg"),
 ])
 def test_complaints_about_what_was_given_name_the_line(tmp_path: Path, line: str, words: str) -> None:
     path = tmp_path / "car.yaml"
