@@ -18,6 +18,7 @@ BOTH, AXLES, SENSOR = "both", ("front", "rear"), "sensor"
 _BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m", "contact_patch_m")
 _AXLE = ("cg_distance_m", "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
          "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
+_OF_ROLL = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
 _PLACE = {"half_car": ("ahead_m",), "full_car": ("ahead_m", "left_m")}
 WEAKEST = 0.5
 """A number whose standard error is larger than this share of it has not been measured."""
@@ -70,6 +71,13 @@ def names(vehicle: Vehicle) -> list[str]:
         single += [f"rear.{name}" for name in axle]
         joint = [f"{BOTH}.{name}" for name in axle]
     return single + [f"{SENSOR}.{name}" for name in _PLACE.get(vehicle.model, ())] + joint
+
+
+def sized(vehicle: Vehicle) -> tuple[str, ...]:
+    """The numbers that are never quite as a file says, but for those that only a roll shows: masses, inertias, springs,
+    dampers and lengths, as far as the vehicle has them."""
+    known = [name for name in names(vehicle) if not name.startswith((BOTH, SENSOR))]
+    return tuple(name for name in known if name.rpartition(".")[2] not in _OF_ROLL and read(vehicle, name) > 0)
 
 
 def read(vehicle: Vehicle, name: str) -> float:

@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import changed, names, read
+from logger.identification.parameters import changed, read, sized
 from logger.lab.prediction import Run
 from logger.vehicle.vehicle import Vehicle
 
@@ -50,7 +50,6 @@ KNOT_S = 2.0
 _LENGTHS = ("cg_distance_m", "contact_patch_m")
 # Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
 _STEP, _LENGTH_STEP = 0.002, 1e-4
-_LEFT_ALONE = ("track_width_m", "roll_inertia_kg_m2", "anti_roll_stiffness_n_m_per_rad")
 _SLOWEST_MPS = 0.5
 _FREE, _FIRMNESS = 2.0, 100.0
 
@@ -94,10 +93,9 @@ class Nuisance:
 
 def nuisance_of(vehicle: Vehicle, tolerance: Tolerance, firm: bool = False) -> Nuisance:
     """What may be a little off in this vehicle."""
-    known = [name for name in names(vehicle) if not name.startswith(("both.", "sensor."))]
-    kept = [name for name in known if name.rpartition(".")[2] not in _LEFT_ALONE and read(vehicle, name) > 0]
+    kept = sized(vehicle)
     lengths = np.array([name.endswith(_LENGTHS) for name in kept], dtype=bool)
-    return Nuisance(tuple(kept), np.where(lengths, tolerance.lengths, tolerance.numbers),
+    return Nuisance(kept, np.where(lengths, tolerance.lengths, tolerance.numbers),
                     np.where(lengths, _LENGTH_STEP, _STEP), firm)
 
 

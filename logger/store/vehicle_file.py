@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from logger.errors import BadInput
-from logger.identification.parameters import changed, read
+from logger.identification.parameters import changed, read, sized
 from logger.store.yaml_lines import Node, load_mapping
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
@@ -109,16 +109,9 @@ def read_model(path: Path | str) -> Model:
     )
 
 
-def _fitted(vehicle: Vehicle) -> tuple[str, ...]:
-    """The numbers that fits move."""
-    from logger.lab.nuisance import Tolerance, nuisance_of
-
-    return nuisance_of(vehicle, Tolerance()).names
-
-
 def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
     """The vehicle with its numbers as they were given: ``front.unsprung_mass_kg: 40``."""
-    keys = node.mapping(optional=_fitted(vehicle))
+    keys = node.mapping(optional=sized(vehicle))
     mass_kg = vehicle.sprung_mass_kg
     values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg)
               for name, one in keys.items()}
@@ -214,7 +207,7 @@ def write_model(path: Path | str, model: Model) -> None:
     keys = _vehicle_keys(model.vehicle)
     keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
     if model.given is not None:
-        keys["given"] = {name: float(read(model.given, name)) for name in _fitted(model.given)
+        keys["given"] = {name: float(read(model.given, name)) for name in sized(model.given)
                          if read(model.given, name) != read(model.vehicle, name)}
     if model.history:
         keys["history"] = [_OneLine(step=one.step, error=float(one.error),
