@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from logger.lab.compare import Comparison
     from logger.lab.story import Round, Story
     from logger.lab.verdict import Verdict
+    from logger.store.vehicle_file import Model
     from logger.vehicle.effect import Chosen
 
 STORY = "story.html"
@@ -95,11 +96,12 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
                 continue
             tell(_chapter(f"Add {wanted}", why.get("add")))
             same = wanted == one.effect.name
-            rounds.append(_round(given, one if same else _searched(given, wanted), out, len(rounds) + 1))
+            made, model = _round(given, one if same else _searched(given, wanted), out, len(rounds) + 1)
+            rounds.append(made)
             tell([*added_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
             tell(_chapter("Compare again", why.get("again")))
             tell(_comparison_lines(rounds[-1].comparison))
-            given = replace(given, model=model_of(given, rounds[-1].gained))
+            given = replace(given, model=model)
             if not same:  # what is missing beside another effect is to be found anew
                 going = True
                 break
@@ -110,8 +112,8 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
     return story
 
 
-def _round(given: Bench, start: Chosen, out: Path, number: int) -> Round:
-    """Add an effect, write the vehicle and compare it."""
+def _round(given: Bench, start: Chosen, out: Path, number: int) -> tuple[Round, Model]:
+    """Add an effect, write the vehicle and compare it; the model with it."""
     from logger.lab.story import Round
     from logger.store.vehicle_file import write_model
 
@@ -122,7 +124,7 @@ def _round(given: Bench, start: Chosen, out: Path, number: int) -> Round:
     model = model_of(given, gained)
     file = _vehicle_file(out, number)
     write_model(file, model)
-    return Round(gained, _compared(replace(given, model=model)), str(file))
+    return Round(gained, _compared(replace(given, model=model)), str(file)), model
 
 
 def _vehicle_file(out: Path, number: int) -> Path:

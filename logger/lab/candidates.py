@@ -39,6 +39,7 @@ _STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
 _STEPS, _ROUNDS = 5, 4
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
+_ALIKE_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +207,11 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
         better = improved(base.weighed, state, moves_of(effects), _STEPS)
         tries.append(_tried(problem, base, better, base.slopes, promise.count))
     return tries
+
+
+def alike_within(gain: float) -> float:
+    """Gains that differ from this one by less do not tell another effect from that which has it."""
+    return max(TOLD_APART, _ALIKE_SHARE * gain)
 
 
 def best_choice(tries: Sequence[Tried]) -> Tried:

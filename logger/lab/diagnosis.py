@@ -23,6 +23,7 @@ from logger.lab.candidates import (
     Base,
     Screened,
     Tried,
+    alike_within,
     as_screened,
     best_choice,
     fitted,
@@ -59,8 +60,6 @@ _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
-# Nor do gains tell two effects apart that differ by less than this share of the larger.
-_ALIKE_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +108,6 @@ class Diagnosis:
     candidates: tuple[Candidate, ...]
     obstacles: Mapping[str, str]
     verdict: tuple[str, ...]
-    unexplained: bool
     excess: float
     strained: Mapping[str, float]
     steps: tuple[Step, ...]
@@ -122,6 +120,11 @@ class Diagnosis:
     def left_over(self) -> bool:
         """Whether more is left than the sensor's noise."""
         return self.excess > UNEXPLAINED
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the effects of the verdict, in a car as it was granted, do not explain all."""
+        return self.left_over or bool(self.strained)
 
     @property
     def judged_on(self) -> str:
@@ -165,13 +168,12 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     whole = problem.entire()
     after, _ = settled(whole, now.state, _FINAL_ROUNDS)
     noise = noise_of(whole, after)
-    excess, strained = _excess(whole, after, noise), _strained(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
         baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
-        unexplained=excess > UNEXPLAINED or bool(strained), excess=excess, strained=strained,
-        steps=(*steps, *further), before=before.state, after=after, problem=whole,
+        excess=_excess(whole, after, noise), strained=_strained(whole, after), steps=(*steps, *further),
+        before=before.state, after=after, problem=whole,
         judged=any(one.judges for one in problem.stretches),
     )
 
@@ -260,13 +262,8 @@ def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
 
 def _simplest_of_the_best(accepted: Sequence[Tried]) -> Tried:
     """Of those that explain about as much as the best one, the one with the fewest numbers."""
-    near = _near(accepted[0])
-    return min((one for one in accepted if one.whole_gain > accepted[0].whole_gain - near), key=lambda one: one.numbers)
-
-
-def _near(one: Tried) -> float:
-    """Gains that differ by less from that of one effect do not tell another from it."""
-    return max(TOLD_APART, _ALIKE_SHARE * one.whole_gain)
+    best = accepted[0].whole_gain
+    return min((one for one in accepted if one.whole_gain > best - alike_within(best)), key=lambda one: one.numbers)
 
 
 def _merit(one: Tried) -> float:
@@ -310,15 +307,15 @@ def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[Tried
     worthy = [other for other in tried if _accepted(problem, other, _starts(tried), 0.0)]
     if one not in worthy:
         return ()
-    return tuple(other for other in worthy
-                 if other is not one and abs(other.whole_gain - one.whole_gain) < _near(one))
+    near = alike_within(one.whole_gain)
+    return tuple(other for other in worthy if other is not one and abs(other.whole_gain - one.whole_gain) < near)
 
 
 def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], present: int,
             progress: Progress, workers: int) -> tuple[Base, dict[str, float]]:
     """The model without those that were taken and are not needed by the side of the others, and what each of the
     others is worth."""
-    worth = {taken[0].tried.effect.name: taken[0].tried.whole_gain} if len(taken) == 1 else {}
+    worth = {taken[0].name: taken[0].tried.whole_gain} if len(taken) == 1 else {}
 
     while len(now.state.effects) - present > 1:
         names = [one.effect.name for one in now.state.effects[present:]]
@@ -399,7 +396,7 @@ def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Seque
             verdict: Sequence[str]) -> tuple[Candidate, ...]:
     """The candidates, those of the verdict before the others."""
     values = {one.effect.name: one.values for one in after.effects}
-    own = {one.tried.effect.name: one for one in taken}
+    own = {one.name: one for one in taken}
     found = []
     for name in verdict:
         one = own[name]

@@ -82,8 +82,7 @@ class Problem:
                  stands: Vehicle | None = None, firm: bool = False) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
-        self._as_it_stands = stands
-        self._stands = np.zeros(len(self.nuisance.names)) if stands is None else self.nuisance.logs(vehicle, stands)
+        self._stands = stands or vehicle
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
         self.stretches = [Stretches(run, whole) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
@@ -91,7 +90,7 @@ class Problem:
     def entire(self) -> Problem:
         """All of the runs, finely simulated, by a car that is not held, so that it shows when it has to bend too far.
         """
-        return Problem(Runs(self.runs.runs), self.vehicle, self.tolerance, True, self._as_it_stands)
+        return Problem(Runs(self.runs.runs), self.vehicle, self.tolerance, True, self._stands)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -112,7 +111,7 @@ class Problem:
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
         """The car as it stands."""
-        return self.laid_out(tuple(effects), self._stands.copy(),
+        return self.laid_out(tuple(effects), self.nuisance.logs(self.vehicle, self._stands),
                              [np.zeros(one.count) for one in self.wander])
 
     def residuals(self, state: State) -> list[Array]:
@@ -282,6 +281,17 @@ class Weighed:
             gradient[: len(state.logs)] = 0.0
         return gradient
 
+    def effect_slopes(self, state: State, moves: Sequence[Move]) -> list[Array]:
+        """What the effects' numbers do, weighed: (m, kept) per run."""
+        return [whitener(columns) for whitener, columns in zip(
+            self.whiteners, self.problem.effect_slopes(state, moves, self.slopes.anchor), strict=True)]
+
+    def bordered(self, information: Array, own: Sequence[Array]) -> Array:
+        """The normal equations' matrix (count + m, count + m) with weighed slopes by the effects' numbers as well."""
+        mixed = self.against(own)
+        alone = np.sum([one @ one.T for one in own], axis=0)
+        return np.block([[information, mixed], [mixed.T, alone]])
+
     def information_at(self, state: State) -> Array:
         """The normal equations' matrix (count, count) where the car's numbers are those of a state."""
         information = self.information.copy()
@@ -352,8 +362,7 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
     for _ in range(most):
         kept = own is not None
         if moves and own is None:
-            own = [whitener(columns) for whitener, columns in zip(
-                weighed.whiteners, problem.effect_slopes(state, moves, weighed.slopes.anchor), strict=True)]
+            own = weighed.effect_slopes(state, moves)
         information, gradient = _normal(weighed, state, own)
         gained = promised = 0.0
         while damping < _LARGEST_DAMPING:
@@ -384,9 +393,7 @@ def _normal(weighed: Weighed, state: State, own: Sequence[Array] | None) -> tupl
     information = weighed.information_at(state)
     if own is None:
         return information, gradient
-    mixed = weighed.against(own)
-    alone = np.sum([one @ one.T for one in own], axis=0)
-    information = np.block([[information, mixed], [mixed.T, alone]])
+    information = weighed.bordered(information, own)
     pulled = np.sum([one @ rest for one, rest in zip(own, left, strict=True)], axis=0)
     sizes = np.diag(information)
     ridge = _RIDGE * np.where(sizes > 0, sizes, 1.0)  # a number that does nothing stays where it is

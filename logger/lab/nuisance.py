@@ -121,19 +121,22 @@ class Wander:
 
     def recorded(self, prediction: Array, k: Array, run: Run) -> Array:
         """A prediction (n,) as such a recorder has it."""
-        return np.asarray(prediction + k[-_RECORDER:] @ self._recorder(prediction, run))
+        rise = rate_of_change(prediction, run.rate_hz)
+        return np.asarray(prediction + k[-_RECORDER:] @ _by_recorder(prediction, rise, run))
 
     def columns(self, prediction: Array, run: Run) -> Array:
         """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
-        rise = rate_of_change(prediction, run.rate_hz) / np.maximum(run.speed_mps, _SLOWEST_MPS)
-        return np.vstack([self.basis.T * rise, self._recorder(prediction, run)])
-
-    def _recorder(self, prediction: Array, run: Run) -> Array:
-        curvature = rate_of_change(rate_of_change(prediction, run.rate_hz), run.rate_hz)
-        return np.stack([prediction, curvature / (2 * np.pi * run.rate_hz) ** 2])
+        rise = rate_of_change(prediction, run.rate_hz)
+        by_place = rise / np.maximum(run.speed_mps, _SLOWEST_MPS)
+        return np.vstack([self.basis.T * by_place, _by_recorder(prediction, rise, run)])
 
 
 _RECORDER = 2
+
+
+def _by_recorder(prediction: Array, rise: Array, run: Run) -> Array:
+    """What the recorder's numbers do to a prediction (n,) that changes at these rates (n,): (2, n)."""
+    return np.stack([prediction, rate_of_change(rise, run.rate_hz) / (2 * np.pi * run.rate_hz) ** 2])
 
 
 def rate_of_change(samples: Array, rate_hz: float) -> Array:

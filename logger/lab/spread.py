@@ -27,15 +27,10 @@ def with_spread(problem: Problem, state: State) -> tuple[tuple[Chosen, ...], Arr
     Both hold what was granted beforehand: a number that the runs say nothing of is as uncertain as it was.
     """
     moves = moves_of(state.effects)
-    slopes = problem.slopes(state)
-    weighed = Weighed(problem, slopes, problem.whiteners(state))
+    weighed = Weighed(problem, problem.slopes(state), problem.whiteners(state))
     information = weighed.information
     if moves:
-        own = [whitener(columns) for whitener, columns in zip(
-            weighed.whiteners, problem.effect_slopes(state, moves, slopes.anchor), strict=True)]
-        mixed = weighed.against(own)
-        alone = np.sum([one @ one.T for one in own], axis=0)
-        information = np.block([[information, mixed], [mixed.T, alone]])
+        information = weighed.bordered(information, weighed.effect_slopes(state, moves))
     size = np.sqrt(np.diag(information))
     seen = size > 0
     scale = np.where(seen, size, 1.0)

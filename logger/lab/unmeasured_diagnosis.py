@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from logger.identification.verdict import structural
 from logger.lab.blind import SEEN
+from logger.lab.candidates import alike_within
 from logger.lab.diagnosis import CHANCE, UNEXPLAINED, WORTH
 from logger.lab.fitting import coordinates_of
 from logger.lab.quantities import chance, finite, numbers_of
@@ -31,7 +32,6 @@ MOST_EFFECTS = 3
 TAKEN_BY_ROAD = 0.02
 """The road takes an effect of whose information it leaves no more than this share."""
 _FITTED, _STARTS, _FIRST_STEPS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 4, 0.1, 6.0
-_ALIKE, _ALIKE_SHARE = 10.0, 0.01
 _NOTHING = 1e-2
 _TINY_STEP = 1e-4
 # Of a sample's freedom the recorder's filter leaves this share.
@@ -219,7 +219,7 @@ def _accepted(one: Candidate, count: int, samples: int) -> bool:
 
 def _rivals(one: Candidate, found: Sequence[Candidate], count: int, samples: int) -> tuple[str, ...]:
     worthy = [other for other in found if _accepted(other, count, samples)]
-    near = max(_ALIKE, _ALIKE_SHARE * one.gain)
+    near = alike_within(one.gain)
     return tuple(other.one.effect.name for other in worthy
                  if one in worthy and other is not one and abs(other.gain - one.gain) < near)
 

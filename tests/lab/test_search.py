@@ -33,10 +33,6 @@ def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0) -> Runs:
         plain, Runs(plain).predict(compose(car, effects)), strict=True)], 500.0)
 
 
-def with_record(runs: Runs, change) -> Runs:  # type: ignore[no-untyped-def]
-    return Runs([measuring(run, change(run)) for run in runs.runs], 500.0)
-
-
 def searched(runs: Runs, car: Vehicle = CAR, names: tuple[str, ...] = ()) -> Diagnosis:
     effects = {name: EFFECTS[name] for name in names} if names else EFFECTS
     return diagnose(Problem(runs, car, Tolerance(), firm=True), effects)
@@ -52,21 +48,24 @@ def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics(flawless
         f_hz = np.fft.rfftfreq(run.count, 1 / run.rate_hz)
         return np.fft.irfft(np.fft.rfft(run.measured_mps2) * 0.992 * np.sinc(f_hz / run.rate_hz), run.count)
 
-    found = searched(with_record(flawless, weak))
+    found = searched(Runs([measuring(run, weak(run)) for run in flawless.runs], 500.0))
     assert found.verdict == () and not found.unexplained
 
 
-def test_a_clock_that_runs_a_little_fast_lacks_no_physics(flawless: Runs) -> None:
-    fast = Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
+@pytest.fixture(scope="module")
+def fast(flawless: Runs) -> Runs:
+    """The same with a distance that is a little long."""
+    return Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
                  for one in flawless.runs], 500.0)
+
+
+def test_a_clock_that_runs_a_little_fast_lacks_no_physics(fast: Runs) -> None:
     found = searched(fast)
     assert set(found.verdict) <= {"speed_scale"} and not found.unexplained
     assert fast.runs and found.problem.error(found.after) < 0.3 * found.baseline_error
 
 
-def test_aligning_moves_the_distance_and_leaves_the_car(flawless: Runs) -> None:
-    fast = Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
-                 for one in flawless.runs], 500.0)
+def test_aligning_moves_the_distance_and_leaves_the_car(fast: Runs) -> None:
     problem = Problem(fast, CAR, Tolerance())
     nominal = problem.start()
     state = aligned(problem, nominal)
