@@ -103,7 +103,7 @@ _ROUNDS = 3
 def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chosen:
     """Where the fit of an effect begins: as it was said, and for the rest where a search for it alone ends."""
     from logger.lab.candidates import Base, best_choice, fitted, misalignment, screened, settled_further
-    from logger.lab.fitting import aligned, settled
+    from logger.lab.settling import aligned, settled
     from logger.vehicle.effect import chosen
 
     if set(values) >= {one.name for one in effect.parameters}:

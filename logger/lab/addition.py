@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.identification.parameters import read
-from logger.lab.fitting import Problem, State, settled
+from logger.lab.fitting import Problem, State
+from logger.lab.settling import settled
 from logger.lab.spread import with_spread
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle

@@ -26,9 +26,10 @@ from logger.lab.fitting import (
     located,
     moved,
     moves_of,
-    settled,
 )
+from logger.lab.noise import left_to_explain
 from logger.lab.prediction import Run
+from logger.lab.settling import settled
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 
 Array = npt.NDArray[np.float64]
@@ -37,6 +38,9 @@ Array = npt.NDArray[np.float64]
 # next to nothing.
 _STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
 _STEPS, _ROUNDS = 5, 4
+WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
+"""In a search, a round of a fit that gains less than this share of what is left to explain is its last: little has to
+be settled where much is still to be found."""
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
 _ALIKE_SHARE = 0.01
@@ -48,6 +52,7 @@ class Base:
     the stretches that were fitted (with what is off) and of those that judge.
 
     judged_error   of the stretches that no fit saw
+    rough          predictions of a rough simulation, for comparing with others
     left           its weighed residuals
     objective      squares of the weighed residuals that the whole model leaves, and the cost of what is off
     cost           the latter alone
@@ -59,6 +64,7 @@ class Base:
     state: State
     slopes: Slopes
     weighed: Weighed
+    rough: list[Array]
     left: list[Array]
     objective: float
     cost: float
@@ -68,6 +74,7 @@ class Base:
     fitted: float
     judged: float
     judged_error: float
+    unexplained: float
 
     @staticmethod
     def of(problem: Problem, state: State, slopes: Slopes) -> Base:
@@ -77,9 +84,10 @@ class Base:
         uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
         left = weighed.residual(state)
         seen = located(problem, state, slopes)
-        return Base(state, slopes, weighed, left, weighed.objective(state), problem.cost(state), 0.0, uncertainty,
-                    uncertainty @ weighed.gradient(state, left), problem.deviance(state),
-                    problem.deviance(seen, fitted=False), problem.judged_error(seen))
+        return Base(state, slopes, weighed, _roughly(problem, state, slopes), left, weighed.objective(state),
+                    problem.cost(state), 0.0, uncertainty, uncertainty @ weighed.gradient(state, left),
+                    problem.deviance(state), problem.deviance(seen, fitted=False), problem.judged_error(seen),
+                    left_to_explain(problem, seen))
 
     def without(self, problem: Problem, names: Sequence[str]) -> Base:
         """The same with some of the car's numbers as they were given, to stay there: for effects that set them. What it
@@ -100,7 +108,8 @@ class Base:
         gradient = weighed.gradient(state, left)
         pull = uncertainty @ gradient
         within_reach = gradient @ pull - self.weighed.gradient(self.state, self.left) @ self.pull
-        return replace(self, state=state, slopes=slopes, weighed=weighed, left=left, uncertainty=uncertainty, pull=pull,
+        return replace(self, state=state, slopes=slopes, weighed=weighed, rough=_roughly(problem, state, slopes),
+                       left=left, uncertainty=uncertainty, pull=pull,
                        ahead=self.objective - weighed.objective(state) + float(within_reach))
 
     def left_by(self, better: Base) -> float:
@@ -164,6 +173,10 @@ class Screened:
         return self.trials[0].gain
 
 
+def _roughly(problem: Problem, state: State, slopes: Slopes) -> list[Array]:
+    return problem.predicted(state.effects, state.logs, state.wander, slopes, rough=True).predictions
+
+
 def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -> Screened:
     """Trials of an effect on a model."""
     trials = effect.trials(seen)
@@ -201,7 +214,8 @@ def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
         effects = (*base.state.effects, trial.one)
         if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
             start = problem.laid_out(effects, *base.weighed.parted(trial.joined))
-            tries.append(_tried(problem, base, *settled(problem, start, _ROUNDS), promise.count))
+            found = settled(problem, start, _ROUNDS, worth=_WORTH_SETTLING_AT_FIRST)
+            tries.append(_tried(problem, base, *found, promise.count))
             continue
         state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
         better = improved(base.weighed, state, moves_of(effects), _STEPS)
@@ -221,7 +235,7 @@ def best_choice(tries: Sequence[Tried]) -> Tried:
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
     """The same with slopes of its own; until it gains by them, those that it was fitted with serve."""
-    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes), one.starts)
+    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, WORTH_SETTLING), one.starts)
 
 
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:
@@ -238,9 +252,9 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
     """A trial at the strength at which it explains most."""
     weighed, state = base.weighed, base.state
     here = weighed.joined(state) + base.pull
-    there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes)
+    there = problem.predicted((*state.effects, one), state.logs, state.wander, base.slopes, rough=True)
     change = [whitener((new - old)[None]) for whitener, new, old in zip(
-        weighed.whiteners, there.predictions, state.predictions, strict=True)]
+        weighed.whiteners, there.predictions, base.rough, strict=True)]
     mixed = weighed.against(change)[:, 0]
     absorbed = base.uncertainty @ mixed
     along = sum(float(c[0] @ r) for c, r in zip(change, base.left, strict=True)) - float(mixed @ base.pull)

@@ -16,10 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.beside import Beside, Located, Part, located
-from logger.lab.fitting import Problem, settled
+from logger.lab.fitting import Problem
 from logger.lab.marks import Mark, Marks, read_marks
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Runs, error
+from logger.lab.settling import settled
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle

@@ -20,6 +20,7 @@ import numpy as np
 
 from logger.lab.candidates import (
     TOLD_APART,
+    WORTH_SETTLING,
     Base,
     Screened,
     Tried,
@@ -31,8 +32,9 @@ from logger.lab.candidates import (
     screened,
     settled_further,
 )
-from logger.lab.fitting import Problem, State, aligned, settled
-from logger.lab.noise import Noise, floor_error, noise_of
+from logger.lab.fitting import Problem, State, steps_apart
+from logger.lab.noise import UNEXPLAINED, Noise, floor_error, noise_of
+from logger.lab.settling import aligned, settled
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
 Progress = Callable[[str], None]
@@ -51,14 +53,16 @@ EASED, SHARE_EASED = 16.0, 0.002
 well: from four standard deviations on, and from this share of what those before it explain."""
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
-UNEXPLAINED = 0.10
-"""What stays above the noise is unexplained from this share of it on."""
+LEAST_OF_LEFT = 0.1
+"""An effect that explains a smaller share of what is left to explain only stands in for what is missing."""
 STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
+_HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fitted, and when only screened
+_THE_SAME_PLACE = 20.0  # steps
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 
 
@@ -194,13 +198,14 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
         tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
         first = first or tried
-        accepted = [one for one in tried if _accepted(problem, one, _starts(tried), explained)]
+        accepted = [one for one in tried if _accepted(problem, one, _starts(tried), explained)
+                    and one.whole_gain > _least_of_left(now)]
         if not accepted:
             break
         best = _simplest_of_the_best(accepted)
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes))
+        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=WORTH_SETTLING))
         for earlier_one in taken[:-1]:
             now = _sought_again(problem, now, earlier_one.tried, seen, progress)
         if best.effect.reshapes:  # what was only moved to its place was explained by nothing
@@ -237,19 +242,25 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         promises.sort(key=lambda one: -one.gain)
         if promises[0].gain < promise:
             return []
-        least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
+        needed = _least_of_left(now)
+        least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain, _SHARE_OF_NEEDED * needed)
         deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
         progress(f"fitting {len(deep)} of them")
         tried = [one for some in pool.map(
             lambda one: (fitted if one.effect.name in deep else as_screened)(problem, now, one), promises,
         ) for one in some]
         best = _best_of_each(tried)
-        finalists = {one.effect.name for one in best[:_MOST_FINALISTS] if one.effect.name in deep
-                     and one.whole_gain > _FINALIST_SHARE * best[0].whole_gain}
-        progress(f"settling {len(finalists)} of them")
-        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS),
-                                [one for one in tried if one.effect.name in finalists]))
-    return _best_of_each([*further, *(one for one in tried if one.effect.name not in finalists)])
+        names = {one.effect.name for one in best[:_MOST_FINALISTS]} & deep
+        least = max(_FINALIST_SHARE * best[0].whole_gain, _HALFWAY * needed)
+        finalists = [one for one in tried if one.effect.name in names and one.whole_gain > least]
+        progress(f"settling {len({one.effect.name for one in finalists})} of them")
+        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
+    return _best_of_each([*further, *(one for one in tried if one not in finalists)])
+
+
+def _least_of_left(now: Base) -> float:
+    """What an effect has to gain of what is left to explain."""
+    return LEAST_OF_LEFT * now.unexplained
 
 
 def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
@@ -342,7 +353,10 @@ def _sought_again(problem: Problem, now: Base, one: Tried, seen: Misalignment, p
     progress(f"is {name} still what it was?")
     without = _without(problem, now, name)
     again = best_choice(fitted(problem, without, screened(problem, without, one.effect, seen)))
-    other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes))
+    there = next(other for other in now.state.effects if other.effect.name == name)
+    if steps_apart(there, again.state.effects[-1]) < _THE_SAME_PLACE:
+        return now
+    other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes, WORTH_SETTLING))
     at_an_end = any(one.at_an_end for one in other.state.effects)
     return other if now.left_by(other) > TOLD_APART and not at_an_end else now
 
@@ -353,7 +367,7 @@ def _without(problem: Problem, now: Base, name: str) -> Base:
     away = next(one for one in now.state.effects if one.effect.name == name)
     start = problem.laid_out(rest, now.state.logs, now.state.wander)
     slopes = None if away.effect.realigns else now.slopes
-    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes))
+    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes, WORTH_SETTLING))
 
 
 def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
@@ -370,7 +384,7 @@ def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int
             effects = list(now.state.effects)
             effects[place] = rival.state.effects[-1]
             start = problem.laid_out(tuple(effects), now.state.logs, now.state.wander)
-            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes))
+            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, WORTH_SETTLING))
             most = TOLD_APART * (found[number].tried.numbers - rival.numbers)
             if other.left_by(now) < most and not other.state.effects[place].at_an_end:
                 rest = tuple(one for one in (found[number].tried, *found[number].rivals) if one is not rival)

@@ -33,12 +33,11 @@ _STEP_IN_DEVIATIONS = 5.0
 _SHARE_STEP = 0.02
 _LEAST_SHARE = 0.1
 # Far off, steps are damped; near the end they are hardly, or nothing would move along with what makes up for it.
-_FIRST_DAMPING, _LAST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 1e-9, 100.0, 30.0
+FIRST_DAMPING, LAST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 1e-9, 100.0, 30.0
+_LEAST_THAT_DAMPS = 1e-4
 # A step that gains less than this in minus twice a log-likelihood ends a fit.
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
-_SETTLING_STEPS, _SETTLED = 5, 2.0
-_ALIGNING_ROUNDS = 20
 _RIDGE = 1e-12
 
 
@@ -104,8 +103,9 @@ class Problem:
         """A state whose predictions are made anew, over the road as the wander has it."""
         return State(effects, logs, wander, self._recorded(effects, logs, wander))
 
-    def _recorded(self, effects: tuple[Chosen, ...], logs: Array, wander: Sequence[Array]) -> list[Array]:
-        predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander))
+    def _recorded(self, effects: tuple[Chosen, ...], logs: Array, wander: Sequence[Array],
+                  rough: bool = False) -> list[Array]:
+        predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander), rough)
         return [one.recorded(prediction, k, run) for one, prediction, k, run in zip(
             self.wander, predictions, wander, self.runs.runs, strict=True)]
 
@@ -174,13 +174,15 @@ class Problem:
         ]
         return Slopes(columns, [k.copy() for k in state.wander])
 
-    def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes) -> State:
-        """A state whose wander is counted to first order from the anchor of the slopes."""
+    def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes,
+                  rough: bool = False) -> State:
+        """A state whose wander is counted to first order from the anchor of the slopes; or one that is only good for
+        being compared with another such (``rough``)."""
         count = len(logs)
         predictions = [
             prediction + (k - anchor) @ columns[count:]
             for prediction, k, anchor, columns in zip(
-                self._recorded(effects, logs, slopes.anchor), wander, slopes.anchor, slopes.columns, strict=True)
+                self._recorded(effects, logs, slopes.anchor, rough), wander, slopes.anchor, slopes.columns, strict=True)
         ]
         return State(effects, logs, wander, predictions)
 
@@ -348,8 +350,19 @@ def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     return np.array(steps)
 
 
+def steps_apart(one: Chosen, other: Chosen) -> float:
+    """How far the numbers of an effect are apart at two sets of values, at most, in steps of their differences;
+    infinitely far where another choice was made."""
+    choices = [parameter.name for parameter in one.effect.parameters if parameter.choices]
+    if any(one.values[name] != other.values[name] for name in choices):
+        return np.inf
+    moves = moves_of([one])
+    here, there = (coordinates_of([each], moves) for each in (one, other))
+    return float(np.max(np.abs(there - here) / np.abs(_steps([one], moves)), initial=0.0))
+
+
 def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False,
-             first_damping: float = _FIRST_DAMPING) -> State:
+             first_damping: float = FIRST_DAMPING) -> State:
     """Levenberg and Marquardt's steps on the effects' numbers that move, the car's numbers and the wander.
 
     laid_out    lay the road out anew for every trial, instead of counting the wander to first order
@@ -368,14 +381,16 @@ def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, l
         while damping < _LARGEST_DAMPING:
             damped = information + damping * np.diag(np.diag(information))
             step = np.asarray(np.linalg.solve(damped, gradient), float)
+            promised = float(2 * gradient @ step - step @ information @ step)
+            if promised < _SMALL_GAIN:
+                break
             trial = make(*_stepped(weighed, state, moves, step))
             there = weighed.objective(trial)
             if there < now:
                 gained, now, state = now - there, there, trial
-                promised = float(2 * gradient @ step - step @ information @ step)
-                damping = max(damping / _MORE_DAMPING, _LAST_DAMPING)
+                damping = max(damping / _MORE_DAMPING, LAST_DAMPING)
                 break
-            damping *= _MORE_DAMPING
+            damping = max(damping * _MORE_DAMPING, _LEAST_THAT_DAMPS)
         # Slopes that keep what they promise serve for the next step too; those that do not are taken anew.
         if gained < _KEPT_PROMISE * promised or gained < _SMALL_GAIN:
             own = None
@@ -405,43 +420,3 @@ def _stepped(weighed: Weighed, state: State, moves: Sequence[Move],
     logs, wander = weighed.parted(weighed.joined(state) + step[: weighed.count])
     effects = moved(state.effects, moves, coordinates_of(state.effects, moves) + step[weighed.count:])
     return effects, logs, wander
-
-
-def aligned(problem: Problem, state: State) -> State:
-    """The state with the wander of the distance alone fitted, until it lies as it can: that takes many rounds where it
-    is far off, in which the car's numbers would be bent."""
-    numbers, least = len(state.logs), problem.deviance(state)
-    for _ in range(_ALIGNING_ROUNDS):
-        columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
-                   for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
-        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state), still=True)
-        trial = improved(weighed, state, [], _SETTLING_STEPS, laid_out=True)
-        gained = least - problem.deviance(trial)
-        if gained > 0:
-            least, state = least - gained, trial
-        if gained < _SETTLED:
-            break
-    return state
-
-
-def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | None = None) -> tuple[State, Slopes]:
-    """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
-
-    slopes    taken near the state before; None: they are taken now
-
-    Returns the most likely state that was met, laid out, and slopes taken near it.
-    """
-    moves = moves_of(state.effects)
-    state = problem.laid_out(state.effects, state.logs, state.wander)
-    given, least, slopes = slopes is not None, problem.deviance(state), slopes or problem.slopes(state)
-    for done in range(1, rounds + 1):
-        weighed = Weighed(problem, slopes, problem.whiteners(state))
-        trial = improved(weighed, state, moves, _SETTLING_STEPS, True, _FIRST_DAMPING if done == 1 else _LAST_DAMPING)
-        now = problem.deviance(trial)
-        gained = least - now
-        if gained > 0:  # else it was better by the weights of before
-            least, state = now, trial
-        if done == rounds or (gained < _SETTLED and not given):
-            break
-        given, slopes = False, problem.slopes(state, weighed.fine_steps)
-    return state, slopes

@@ -19,6 +19,8 @@ _LOUDER = 2.5
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
 _FILTERED = 0.6
 _LEAST_SHARE = 0.002
+UNEXPLAINED = 0.10
+"""What stays above the noise is unexplained from this share of it on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,12 @@ def noise_of(problem: Problem, state: State) -> Noise:
     counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
     power = max(power, _LEAST_SHARE**2 * float((counted**2).mean()))
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
+
+
+def left_to_explain(problem: Problem, state: State) -> float:
+    """By how much minus twice the log-likelihood of all stretches would fall if nothing unexplained were left."""
+    power = ((1 + UNEXPLAINED) * noise_of(problem, state).deviation_mps2) ** 2
+    return max(0.0, sum(float(cells.freedom @ np.log(cells.power / power)) for cells in problem.cells(state, None)))
 
 
 def floor_error(problem: Problem, noise: Noise) -> float:

@@ -10,8 +10,10 @@ all samples, the first 2 s of each run left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -70,31 +72,34 @@ class Run:
 
 
 class Runs:
-    """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time."""
+    """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
+    laws of their own are stepped in so many threads besides."""
 
-    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
+    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ, workers: int = 2) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
+        self._steppers = ThreadPoolExecutor(workers)
         self._passages: list[dict[tuple[float, bytes], Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Array]:
+    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False) -> list[Array]:
         """What would have been recorded in each run, (n,) whole [m/s2].
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
+        rough      step a car that rubs no finer than others: what a change does is told well enough by that
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = [recorded(car, passage) for passage in self._laid_out(car, moved_m)]
-        return [np.clip(np.nan_to_num(one, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2) for one in found]
+        passages = self._laid_out(car, moved_m, rough)
+        each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(partial(_recorded, car), passages)
+        return list(each)
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""
         with np.errstate(over="ignore", invalid="ignore"):
             return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None) -> list[Passage]:
-        fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs else self.fine_hz
+    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False) -> list[Passage]:
+        fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs and not rough else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
@@ -107,6 +112,12 @@ class Runs:
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)
         return found
+
+
+def _recorded(car: Car, passage: Passage) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = recorded(car, passage)
+    return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
 
 
 def bounded(predictions: Sequence[Array]) -> bool:

@@ -42,8 +42,9 @@ UNIT_M, UNIT_MPS = 0.01, 0.02
 """Tables of two variables are even in arsinh of travel and rate over these."""
 LANES = 4
 """Numbers that are summed side by side."""
-_PASSES, _SWEEPS = 2, 2
+_PASSES = 2
 _NEWTON_STEPS, _NEAR = 4, 1e-3
+_SLIDES = 8.0  # tanh is 1 from there on, but for a ten-millionth
 
 
 # Rows of the tables of one variable.
@@ -136,6 +137,8 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
     if transition <= 0.0:
         return min(max(free / ease, -most), most)
     size, pull = abs(free), ease * most
+    if size - pull > _SLIDES * transition:
+        return most if free > 0.0 else -most
     rate = max(size / (1.0 + pull / transition), size - pull)
     for _ in range(_NEWTON_STEPS):
         grown = 1.0 - 2.0 / (np.exp(2.0 * rate / transition) + 1.0)  # tanh, in half its time
@@ -149,22 +152,22 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
 
 @_compiled
 def _rub(
-    motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array, sweeps: int,
+    motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array,
 ) -> None:
     """Find the dry friction at the rates that each suspension has a little after the middle of the step, and add what
-    it does to travels and rates.
+    it does to travels and rates. What the others do to a suspension's rate is so little that theirs of the step before
+    serves for those that come after it.
 
     earlier    (w,) the rates at the beginning, as they count for that instant
     """
     w = len(numbers)
-    for _ in range(sweeps):
-        for i in range(w):
-            free = motion[m + w + i] + earlier[i]
-            for j in range(w):
-                if j != i:
-                    free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
-            forces[2 * w + i] = _friction(free, -by_force[2 * w + i, m + w + i], numbers[i, FRICTION_N],
-                                          numbers[i, FRICTION_MPS] / numbers[i, FRICTION_AT])
+    for i in range(w):
+        free = motion[m + w + i] + earlier[i]
+        for j in range(w):
+            if j != i:
+                free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
+        forces[2 * w + i] = _friction(free, -by_force[2 * w + i, m + w + i], numbers[i, FRICTION_N],
+                                      numbers[i, FRICTION_MPS] / numbers[i, FRICTION_AT])
     for i in range(w):
         for r in range(m, m + 4 * w):
             motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]
@@ -186,14 +189,14 @@ def _settle(
     for _ in range(passes):
         _sum(motion, seen, before, forces, 2 * w, by_force)
         if rubs:
-            _rub(motion, m, forces, numbers, by_force, earlier, 1)
+            _rub(motion, m, forces, numbers, by_force, earlier)
         for i in range(w):
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
     if rubs:
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        _rub(motion, m, forces, numbers, by_force, earlier, _SWEEPS)
+        _rub(motion, m, forces, numbers, by_force, earlier)
     _sum(motion, 0, before, forces, 3 * w, by_force)
 
 

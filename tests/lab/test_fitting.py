@@ -11,9 +11,10 @@ import pytest
 from logger.identification.parameters import read
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
-from logger.lab.fitting import Problem, located, settled
+from logger.lab.fitting import Problem, located
 from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.prediction import Run, Runs
+from logger.lab.settling import settled
 from logger.store.drive_file import read_run
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle

@@ -10,9 +10,10 @@ from logger.lab import candidates, diagnosis
 from logger.lab.addition import add
 from logger.lab.candidates import Base, misalignment, screened
 from logger.lab.diagnosis import Diagnosis, diagnose
-from logger.lab.fitting import Problem, aligned, settled
+from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Run, Runs
+from logger.lab.settling import aligned, settled
 from logger.lab.verdict import as_json, told
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose

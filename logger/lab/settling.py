@@ -1,0 +1,54 @@
+"""Models settled: fitted until little is gained any more, with slopes and weights that follow the fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from logger.lab.fitting import FIRST_DAMPING, LAST_DAMPING, Problem, Slopes, State, Weighed, improved, moves_of
+from logger.lab.noise import left_to_explain
+
+_STEPS, _SETTLED = 5, 2.0
+_ALIGNING_ROUNDS = 20
+
+
+def aligned(problem: Problem, state: State) -> State:
+    """The state with the wander of the distance alone fitted, until it lies as it can: that takes many rounds where it
+    is far off, in which the car's numbers would be bent."""
+    numbers, least = len(state.logs), problem.deviance(state)
+    for _ in range(_ALIGNING_ROUNDS):
+        columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
+                   for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
+        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state), still=True)
+        trial = improved(weighed, state, [], _STEPS, laid_out=True)
+        gained = least - problem.deviance(trial)
+        if gained > 0:
+            least, state = least - gained, trial
+        if gained < _SETTLED:
+            break
+    return state
+
+
+def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | None = None,
+            worth: float = 0.0) -> tuple[State, Slopes]:
+    """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
+
+    slopes    taken near the state before; None: they are taken now
+    worth     the share of what is left to explain that a round has to gain to be worth another one
+
+    Returns the most likely state that was met, laid out, and slopes taken near it.
+    """
+    moves = moves_of(state.effects)
+    state = problem.laid_out(state.effects, state.logs, state.wander)
+    given, least, slopes = slopes is not None, problem.deviance(state), slopes or problem.slopes(state)
+    for done in range(1, rounds + 1):
+        weighed = Weighed(problem, slopes, problem.whiteners(state))
+        trial = improved(weighed, state, moves, _STEPS, True, FIRST_DAMPING if done == 1 else LAST_DAMPING)
+        now = problem.deviance(trial)
+        gained = least - now
+        if gained > 0:  # else it was better by the weights of before
+            least, state = now, trial
+        enough = max(_SETTLED, worth * left_to_explain(problem, state)) if worth else _SETTLED
+        if done == rounds or (gained < enough and not given):
+            break
+        given, slopes = False, problem.slopes(state, weighed.fine_steps)
+    return state, slopes
