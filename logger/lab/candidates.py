@@ -238,6 +238,22 @@ def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tr
     return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, WORTH_SETTLING), one.starts)
 
 
+def simpler(one: Tried, effects: Sequence[Effect]) -> list[Effect]:
+    """Effects that have some of the numbers of the one that was tried, and no others: each may explain the same where
+    that one does, and be missed elsewhere."""
+    own = {parameter.name for parameter in one.effect.parameters}
+    return [effect for effect in effects
+            if effect.parameters and {parameter.name for parameter in effect.parameters} < own]
+
+
+def in_place_of(problem: Problem, base: Base, one: Tried, effect: Effect) -> Tried:
+    """The model with a simpler effect, begun at the numbers of the one that was tried."""
+    values = one.state.effects[-1].values
+    there = chosen(effect, {each.name: min(max(values[each.name], each.low), each.high) for each in effect.parameters})
+    start = problem.laid_out((*one.state.effects[:-1], there), one.state.logs, one.state.wander)
+    return _tried(problem, base, *settled(problem, start, _ROUNDS, worth=WORTH_SETTLING), starts=1)
+
+
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:
     effect = state.effects[-1].effect
     numbers = sum(not parameter.choices for parameter in effect.parameters)

@@ -28,12 +28,14 @@ from logger.lab.candidates import (
     as_screened,
     best_choice,
     fitted,
+    in_place_of,
     misalignment,
     screened,
     settled_further,
+    simpler,
 )
 from logger.lab.fitting import Problem, State, steps_apart
-from logger.lab.noise import UNEXPLAINED, Noise, floor_error, noise_of
+from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import aligned, settled
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
@@ -63,6 +65,7 @@ _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is no
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
 _HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fitted, and when only screened
 _THE_SAME_PLACE = 20.0  # steps
+_UNDECIDED = 0.05  # of what is left to explain
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 
 
@@ -202,7 +205,7 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
                     and one.whole_gain > _least_of_left(now)]
         if not accepted:
             break
-        best = _simplest_of_the_best(accepted)
+        best = _simplest_of_the_best(accepted, left_to_explain(problem, accepted[0].state))
         taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=WORTH_SETTLING))
@@ -255,7 +258,10 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         finalists = [one for one in tried if one.effect.name in names and one.whole_gain > least]
         progress(f"settling {len({one.effect.name for one in finalists})} of them")
         further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
-    return _best_of_each([*further, *(one for one in tried if one not in finalists)])
+        best = _best_of_each([*further, *(one for one in tried if one not in finalists)])
+        if finalists:
+            best += pool.map(lambda effect: in_place_of(problem, now, best[0], effect), simpler(best[0], effects))
+    return _best_of_each(best)
 
 
 def _least_of_left(now: Base) -> float:
@@ -271,10 +277,18 @@ def _best_of_each(tried: Sequence[Tried]) -> list[Tried]:
     return list(found.values())
 
 
-def _simplest_of_the_best(accepted: Sequence[Tried]) -> Tried:
-    """Of those that explain about as much as the best one, the one with the fewest numbers."""
-    best = accepted[0].whole_gain
-    return min((one for one in accepted if one.whole_gain > best - alike_within(best)), key=lambda one: one.numbers)
+def _simplest_of_the_best(accepted: Sequence[Tried], left: float) -> Tried:
+    """Of those that explain about as much as the best one, the one with the fewest numbers.
+
+    left    what the best one leaves to explain: where that is much, it may make all the difference between the best one
+            and one that has some of its numbers
+    """
+    best = accepted[0]
+    near = alike_within(best.whole_gain)
+    part = max(near, _UNDECIDED * left)
+    parts = simpler(best, [one.effect for one in accepted])
+    return min((one for one in accepted if one.whole_gain > best.whole_gain - (part if one.effect in parts else near)),
+               key=lambda one: one.numbers)
 
 
 def _merit(one: Tried) -> float:

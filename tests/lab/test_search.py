@@ -168,5 +168,8 @@ def test_an_effect_that_was_taken_for_what_it_is_not_is_sought_again() -> None:
 def test_of_two_that_explain_alike_the_simpler_is_taken() -> None:
     first = candidates.Tried(EFFECTS["occupant"], None, 6000.0, 2000.0, 0.1, 3, 1, 0.0, None)  # type: ignore[arg-type]
     simpler = replace(first, effect=EFFECTS["tire_damping"], numbers=1, gain=5950.0)
-    assert diagnosis._simplest_of_the_best([first, simpler]) is simpler
-    assert diagnosis._simplest_of_the_best([first, replace(simpler, gain=5800.0)]) is first
+    assert diagnosis._simplest_of_the_best([first, simpler], 0.0) is simpler
+    assert diagnosis._simplest_of_the_best([first, replace(simpler, gain=5800.0)], 5000.0) is first
+    part = replace(simpler, effect=EFFECTS["payload"], gain=5800.0)
+    assert diagnosis._simplest_of_the_best([first, part], 0.0) is first
+    assert diagnosis._simplest_of_the_best([first, part], 5000.0) is part  # has a number of the first, and no other
