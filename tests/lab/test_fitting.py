@@ -11,7 +11,7 @@ import pytest
 from logger.identification.parameters import read
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
-from logger.lab.fitting import Problem, located
+from logger.lab.fitting import Problem, located, steps_apart
 from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.prediction import Run, Runs
 from logger.lab.settling import settled
@@ -134,3 +134,39 @@ def test_a_late_clock_and_a_wrong_wheel_are_seen_before_any_fit() -> None:
                    for one in runs.runs], 500.0)
     problem = Problem(scaled, vehicle, Tolerance())
     assert misalignment(problem, problem.start()).scale == pytest.approx(1.02, abs=0.004)
+
+
+def test_how_far_two_sets_of_values_are_apart() -> None:
+    bending = EFFECTS["body_bending"]
+    here = {"frequency_hz": 20.0, "damping_ratio": 0.05, "participation": 0.5, "ends_move": 0.0}
+    one = chosen(bending, here)
+    assert steps_apart(one, one) == 0.0
+    near = steps_apart(one, chosen(bending, here | {"frequency_hz": 20.2}))
+    assert 0 < near < steps_apart(one, chosen(bending, here | {"frequency_hz": 21.0}))
+    assert steps_apart(one, chosen(bending, here | {"ends_move": 1.0})) == np.inf
+    assert steps_apart(chosen(EFFECTS["wheel_lift"], {}), chosen(EFFECTS["wheel_lift"], {})) == 0.0
+
+
+def test_a_search_does_not_settle_what_is_far_from_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    vehicle, runs, _ = examined("one", 3, "damper_asymmetry")
+    problem = Problem(runs, vehicle, Tolerance())
+    plain, rounds = Problem.slopes, []
+    monkeypatch.setattr(Problem, "slopes", lambda *given: (rounds.append(1), plain(*given))[1])
+    state, _ = settled(problem, problem.start())
+    thoroughly = len(rounds)
+    rounds.clear()
+    early, _ = settled(problem, problem.start(), worth=0.1)
+    assert len(rounds) < thoroughly
+    assert problem.deviance(state) <= problem.deviance(early) + 1.0
+
+
+def test_a_rough_simulation_of_friction_tells_what_a_change_does() -> None:
+    vehicle, runs, _ = examined("none", 3)
+    problem = Problem(runs, vehicle, Tolerance())
+    weak, strong = (problem.car(
+        [chosen(EFFECTS["dry_friction"], {"friction_force_n": force_n})], np.zeros(len(problem.nuisance.names))) for force_n in (60.0, 90.0))
+    fine, rough = ([there - here for here, there in zip(runs.predict(weak, rough=one), runs.predict(strong, rough=one),
+                                                        strict=True)] for one in (False, True))
+    off, size = (np.sqrt(np.mean(np.square(np.concatenate(one)))) for one in (
+        [a - b for a, b in zip(fine, rough, strict=True)], fine))
+    assert 0 < off < 0.2 * size

@@ -173,3 +173,36 @@ def test_of_two_that_explain_alike_the_simpler_is_taken() -> None:
     part = replace(simpler, effect=EFFECTS["payload"], gain=5800.0)
     assert diagnosis._simplest_of_the_best([first, part], 0.0) is first
     assert diagnosis._simplest_of_the_best([first, part], 5000.0) is part  # has a number of the first, and no other
+
+
+def test_what_explains_little_of_what_is_left_only_stands_in_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    friction = chosen(EFFECTS["dry_friction"], {"friction_force_n": 200.0})
+    problem = Problem(runs_of(CAR, [friction]), CAR, Tolerance(), firm=True)
+    few = {name: EFFECTS[name] for name in ("tire_damping", "sensor_gain")}
+    found = diagnose(problem, few)
+    assert found.verdict == () and found.left_over
+    assert any("less than 10% of what is left is not named" in one for one in as_json(told(found, few))["sentences"])
+    monkeypatch.setattr(diagnosis, "LEAST_OF_LEFT", 0.0)
+    assert diagnose(problem, few).verdict != ()
+
+
+def test_a_bracket_and_a_bending_body_are_told_apart_though_one_can_take_the_others_place() -> None:
+    bracket = chosen(EFFECTS["sensor_mount_resonance"], {"frequency_hz": 29.6, "damping_ratio": 0.05})
+    bending = chosen(EFFECTS["body_bending"], {"frequency_hz": 14.7, "damping_ratio": 0.057, "participation": -0.15})
+    found = searched(runs_of(CAR, [bracket, bending]), names=("sensor_mount_resonance", "body_bending", "sensor_gain"))
+    assert set(found.verdict) == {"sensor_mount_resonance", "body_bending"} and not found.unexplained
+    values = {one.effect.name: one.values["frequency_hz"] for one in found.after.effects}
+    assert values == pytest.approx({"sensor_mount_resonance": 29.6, "body_bending": 14.7}, rel=0.01)
+
+
+def test_a_simpler_effect_begins_where_one_with_its_numbers_stands() -> None:
+    bracket = chosen(EFFECTS["sensor_mount_resonance"], {"frequency_hz": 29.6, "damping_ratio": 0.05})
+    problem = Problem(runs_of(CAR, [bracket]), CAR, Tolerance(), firm=True)
+    base = Base.of(problem, *settled(problem, problem.start()))
+    bending = chosen(EFFECTS["body_bending"], {"frequency_hz": 29.0, "damping_ratio": 0.06, "participation": 0.7})
+    there = problem.start([bending])
+    as_bending = candidates.Tried(EFFECTS["body_bending"], there, 0.0, 0.0, 0.0, 3, 1, 0.0, base.slopes)
+    assert [one.name for one in candidates.simpler(as_bending, [*EFFECTS.values()])] == ["sensor_mount_resonance"]
+    found = candidates.in_place_of(problem, base, as_bending, EFFECTS["sensor_mount_resonance"])
+    assert found.state.effects[-1].values["frequency_hz"] == pytest.approx(29.6, rel=0.01)
+    assert found.whole_gain > 100
