@@ -85,16 +85,12 @@ def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, fl
     if effect.name in [one.effect.name for one in given.model.effects]:
         raise BadInput(f"{given.word}: expected a vehicle without {effect.name}, which it has")
     try:
-        whole = effect.checked(_usual(effect) | values)
+        whole = effect.checked(effect.usual | values)
     except ValueError as error:
         raise BadInput(f"{text}: {error}") from None
     given.try_out(chosen(effect, whole, file=file))
     tell_slow([effect])
     return effect, file, values
-
-
-def _usual(effect: Effect) -> dict[str, float]:
-    return {one.name: one.start if one.default is None else one.default for one in effect.parameters}
 
 
 _ROUNDS = 3

@@ -198,9 +198,8 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
         if effect.name in asked:
             raise BadInput(f"--effect {text}: expected each effect once")
         asked[effect.name] = f"--effect {text}"
-        usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
         try:
-            effects = with_effect(effects, chosen(effect, usual | values, file=file))
+            effects = with_effect(effects, chosen(effect, effect.usual | values, file=file))
         except ValueError as error:
             raise BadInput(f"--effect {text}: {error}") from None
     return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked

@@ -47,8 +47,7 @@ class _Sight:
     def of(self, effect: Effect) -> float:
         """At its usual strength; where it has none, or the vehicle has just that, at the most telling values that a
         search begins at."""
-        usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
-        found = self._deviations(chosen(effect, usual))
+        found = self._deviations(chosen(effect, effect.usual))
         strengthless = all(one.null is None for one in effect.parameters)
         if isinstance(effect, VehicleEffect) and (strengthless or found < _NOTHING):
             found = max(self._deviations(chosen(effect, values)) for values in effect.trials())

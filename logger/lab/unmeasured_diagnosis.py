@@ -125,7 +125,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         del left[best.one.effect.name]
     listed = [*taken, *(one for one in fits if one.one.effect.name not in [own.one.effect.name for own in taken])]
     listed += _promises(first, {one.one.effect.name for one in listed}, len(effects) - len(untried))
-    usual = trials(base.problem, base, [_usual(one) for one in left.values()])
+    usual = trials(base.problem, base, [chosen(one, one.usual) for one in left.values()])
     road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
     return Found(
         tuple(listed), _with_errors(base, len(present)), tuple(steps),
@@ -151,16 +151,12 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None:
             try:
-                problem.response((*present, _usual(effect)), logs)
+                problem.response((*present, chosen(effect, effect.usual)), logs)
             except ValueError:
                 why = "a car with it does not answer in proportion to the road, which takes a measured road"
         if why is not None:
             found[name] = why
     return found
-
-
-def _usual(effect: Effect) -> Chosen:
-    return chosen(effect, {one.name: one.start if one.default is None else one.default for one in effect.parameters})
 
 
 def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:

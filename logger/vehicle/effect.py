@@ -133,6 +133,11 @@ class Effect(ABC):
     replaces: tuple[str, ...] = ()
     stage: int = 0
 
+    @property
+    def usual(self) -> dict[str, float]:
+        """All its parameters as they are when nothing is said of them: at their defaults, or else at their starts."""
+        return {one.name: one.start if one.default is None else one.default for one in self.parameters}
+
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         """Why it cannot be there in this vehicle on this road; None if it can."""
         return None

@@ -51,8 +51,7 @@ def main() -> int:
 
 def usual(effect: Effect, values: Mapping[str, float]) -> Chosen:
     """With what is not given at its start."""
-    start = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
-    return chosen(effect, start | dict(values))
+    return chosen(effect, effect.usual | dict(values))
 
 
 def passage_of(speed_mps: float, seed: int) -> Passage:

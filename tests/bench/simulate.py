@@ -144,8 +144,7 @@ def effects(figures: Figures) -> None:
     passage = Passage(track, 100.0, SPEED_MPS * np.arange(MINUTE_S * 100 + 1) / 100)
     vehicle, bending = vehicle_of("half"), []
     for name, effect in shipped_effects().items():
-        usual = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
-        one = chosen(effect, usual | STRONG.get(name, {}))
+        one = chosen(effect, effect.usual | STRONG.get(name, {}))
         if effect.obstacle(vehicle, two_tracks=False) is None and compose(vehicle, [one]).bends_laws:
             bending.append(one)
     for name, some in {**{one.effect.name: [one] for one in bending}, "all of them": bending}.items():

@@ -163,10 +163,10 @@ def test_a_search_does_not_settle_what_is_far_from_explained(monkeypatch: pytest
 def test_a_rough_simulation_of_friction_tells_what_a_change_does() -> None:
     vehicle, runs, _ = examined("none", 3)
     problem = Problem(runs, vehicle, Tolerance())
-    weak, strong = (problem.car(
-        [chosen(EFFECTS["dry_friction"], {"friction_force_n": force_n})], np.zeros(len(problem.nuisance.names))) for force_n in (60.0, 90.0))
-    fine, rough = ([there - here for here, there in zip(runs.predict(weak, rough=one), runs.predict(strong, rough=one),
-                                                        strict=True)] for one in (False, True))
-    off, size = (np.sqrt(np.mean(np.square(np.concatenate(one)))) for one in (
-        [a - b for a, b in zip(fine, rough, strict=True)], fine))
-    assert 0 < off < 0.2 * size
+    as_given = np.zeros(len(problem.nuisance.names))
+    weak, strong = (problem.car([chosen(EFFECTS["dry_friction"], {"friction_force_n": force_n})], as_given)
+                    for force_n in (60.0, 90.0))
+    changes = [[there - here for here, there in zip(runs.predict(weak, rough=rough), runs.predict(strong, rough=rough),
+                                                    strict=True)] for rough in (False, True)]
+    fine, rough = (np.concatenate(one) for one in changes)
+    assert 0 < np.sqrt(np.mean((rough - fine) ** 2)) < 0.2 * np.sqrt(np.mean(fine**2))

@@ -39,8 +39,7 @@ HUGE = 1e13
 
 def usual(effect: Effect, **values: float) -> Chosen:
     """With what is not given at its start, or at its default."""
-    start = {one.name: one.start if one.default is None else one.default for one in effect.parameters}
-    return Chosen(effect, start | values)
+    return Chosen(effect, effect.usual | values)
 
 
 def record(car: Vehicle, *effects: Chosen) -> np.ndarray:
