@@ -8,7 +8,7 @@ out, and the trial that explains most, at the strength at which it explains most
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,9 +38,6 @@ Array = npt.NDArray[np.float64]
 # next to nothing.
 _STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
 _STEPS, _ROUNDS = 5, 4
-WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
-"""In a search, a round of a fit that gains less than this share of what is left to explain is its last: little has to
-be settled where much is still to be found."""
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
 _ALIKE_SHARE = 0.01
@@ -52,8 +49,8 @@ class Base:
     the stretches that were fitted (with what is off) and of those that judge.
 
     judged_error   of the stretches that no fit saw
+    left           weighed residuals that it leaves
     rough          predictions of a rough simulation, for comparing with others
-    left           its weighed residuals
     objective      squares of the weighed residuals that the whole model leaves, and the cost of what is off
     cost           the latter alone
     ahead          what that falls by when numbers that an effect sets go back to what was given (``without``)
@@ -205,16 +202,19 @@ def as_screened(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
     return [_tried(problem, base, state, base.slopes, promise.count)]
 
 
-def fitted(problem: Problem, base: Base, promise: Screened) -> list[Tried]:
+def fitted(problem: Problem, base: Base, promise: Screened, worth: float = 0.0) -> list[Tried]:
     """The model of ``base`` with an effect, fitted with all the others, on the slopes of ``base``: one for each choice
-    that no fit moves."""
+    that no fit moves.
+
+    worth    as ``settled`` has it, for an effect that takes slopes of its own
+    """
     tries = []
     base = base.without(problem, promise.effect.replaces)
     for trial in promise.trials:
         effects = (*base.state.effects, trial.one)
         if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
             start = problem.laid_out(effects, *base.weighed.parted(trial.joined))
-            found = settled(problem, start, _ROUNDS, worth=_WORTH_SETTLING_AT_FIRST)
+            found = settled(problem, start, _ROUNDS, worth=worth)
             tries.append(_tried(problem, base, *found, promise.count))
             continue
         state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
@@ -233,25 +233,31 @@ def best_choice(tries: Sequence[Tried]) -> Tried:
     return max(tries, key=lambda one: one.whole_gain + (TOLD_APART if one is tries[0] else 0.0))
 
 
-def settled_further(problem: Problem, base: Base, one: Tried, rounds: int) -> Tried:
+def settled_further(problem: Problem, base: Base, one: Tried, rounds: int, worth: float = 0.0) -> Tried:
     """The same with slopes of its own; until it gains by them, those that it was fitted with serve."""
-    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, WORTH_SETTLING), one.starts)
+    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, worth), one.starts)
 
 
 def simpler(one: Tried, effects: Sequence[Effect]) -> list[Effect]:
-    """Effects that have some of the numbers of the one that was tried, and no others: each may explain the same where
-    that one does, and be missed elsewhere."""
+    """Effects that have some of the numbers of the one that was tried, by their names, and no others: each may explain
+    the same where that one does, and be missed elsewhere."""
     own = {parameter.name for parameter in one.effect.parameters}
     return [effect for effect in effects
-            if effect.parameters and {parameter.name for parameter in effect.parameters} < own]
+            if effect.parameters and {parameter.name for parameter in effect.parameters} < own
+            and not any(parameter.choices for parameter in effect.parameters)]
 
 
-def in_place_of(problem: Problem, base: Base, one: Tried, effect: Effect) -> Tried:
-    """The model with a simpler effect, begun at the numbers of the one that was tried."""
+def in_place_of(problem: Problem, base: Base, one: Tried, counts: Mapping[str, int], worth: float,
+                effect: Effect) -> Tried:
+    """The model with a simpler effect, begun at the numbers of the one that was tried.
+
+    counts    at how many values each effect was tried before, by name
+    worth     as ``settled`` has it
+    """
     values = one.state.effects[-1].values
     there = chosen(effect, {each.name: min(max(values[each.name], each.low), each.high) for each in effect.parameters})
     start = problem.laid_out((*one.state.effects[:-1], there), one.state.logs, one.state.wander)
-    return _tried(problem, base, *settled(problem, start, _ROUNDS, worth=WORTH_SETTLING), starts=1)
+    return _tried(problem, base, *settled(problem, start, _ROUNDS, worth=worth), counts[effect.name] + 1)
 
 
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:

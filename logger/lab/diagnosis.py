@@ -2,11 +2,12 @@
 
 Problem: something differs, and twenty effects, alone or together, might be why; or none of them; or nothing. Solution,
 in rounds: the car's own numbers and the wander of the distance are refitted within what is granted; every effect is
-screened; the promising ones are fitted in full; the best is taken when it passes three tests: its gain in likelihood
-would hardly come by chance in so many trials, it explains stretches that no fit saw, and what it explains is worth
-naming. Then the next round begins, on the model with it. At the end every effect that was taken must still be needed by
-the others. What is left then is compared with the noise that the sensor has where no car moves it: what stays above it
-is unexplained, and so is what takes numbers of the car to explain that nobody granted.
+screened; the promising ones are fitted; the best is taken when it passes four tests: its gain in likelihood would
+hardly come by chance in so many trials, it explains stretches that no fit saw, what it explains is worth naming, and it
+is no small part of what is left to explain. Then the next round begins, on the model with it. At the end every effect
+that was taken must still be needed by the others. What is left then is compared with the noise that the sensor has
+where no car moves it: what stays above it is unexplained, and so is what takes numbers of the car to explain that
+nobody granted.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ import numpy as np
 
 from logger.lab.candidates import (
     TOLD_APART,
-    WORTH_SETTLING,
     Base,
     Screened,
     Tried,
@@ -34,7 +34,7 @@ from logger.lab.candidates import (
     settled_further,
     simpler,
 )
-from logger.lab.fitting import Problem, State, steps_apart
+from logger.lab.fitting import Problem, State, located, steps_apart
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import aligned, settled
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
@@ -56,9 +56,13 @@ well: from four standard deviations on, and from this share of what those before
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 LEAST_OF_LEFT = 0.1
-"""An effect that explains a smaller share of what is left to explain only stands in for what is missing."""
+"""An effect that gains a smaller share of what a full explanation would may only stand in for what is missing. One that
+moves the runs against the model is spared that: where two such are wrong, either alone gains little."""
 STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
+WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
+"""A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
+where much is still to be found."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
 _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
@@ -166,6 +170,9 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
              Step("its numbers refitted within what is granted", before.judged_error)]
     now, taken, first, further = _found(problem, before, left, seen, progress, workers)
+    if taken:  # on the way it was settled roughly
+        now = Base.of(problem, *settled(problem, now.state, slopes=now.slopes))
+        further[-1] = Step(further[-1].words, now.judged_error)
     on_the_way = now
     now, taken = _simplest(problem, now, taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
@@ -173,7 +180,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         further.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
     whole = problem.entire()
-    after, _ = settled(whole, now.state, _FINAL_ROUNDS)
+    after, _ = settled(whole, now.state, worth=WORTH_SETTLING)
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
@@ -201,12 +208,14 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         least = max(_LEAST_PROMISE, _SHARE_PROMISED * explained)
         tried = _round(problem, now, left, seen, progress, 0.0 if number == 1 else least, workers)
         first = first or tried
-        accepted = [one for one in tried if _accepted(problem, one, _starts(tried), explained)
-                    and one.whole_gain > _least_of_left(now)]
+        accepted = [one for one in tried if _accepted(problem, one, _starts(tried), explained, now)]
         if not accepted:
             break
-        best = _simplest_of_the_best(accepted, left_to_explain(problem, accepted[0].state))
-        taken.append(_Taken(best, _rivals(best, tried, problem), _starts(tried)))
+        seen_best = located(problem, accepted[0].state, accepted[0].slopes)
+        best = _simplest_of_the_best(accepted, left_to_explain(problem, seen_best))
+        rivals = _rivals(best, tried, problem)
+        beaten = [accepted[0]] if accepted[0] not in (best, *rivals) else []
+        taken.append(_Taken(best, (*beaten, *rivals), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=WORTH_SETTLING))
         for earlier_one in taken[:-1]:
@@ -246,22 +255,32 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         if promises[0].gain < promise:
             return []
         needed = _least_of_left(now)
-        least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain, _SHARE_OF_NEEDED * needed)
-        deep = {one.effect.name for one in promises[:_MOST_FITTED] if one.gain >= least}
+        least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
+        deep = {one.effect.name for one in promises[:_MOST_FITTED]
+                if one.gain >= max(least, 0.0 if _only_moves(one) else _SHARE_OF_NEEDED * needed)}
         progress(f"fitting {len(deep)} of them")
         tried = [one for some in pool.map(
-            lambda one: (fitted if one.effect.name in deep else as_screened)(problem, now, one), promises,
+            lambda one: fitted(problem, now, one, _WORTH_SETTLING_AT_FIRST) if one.effect.name in deep
+            else as_screened(problem, now, one), promises,
         ) for one in some]
         best = _best_of_each(tried)
         names = {one.effect.name for one in best[:_MOST_FINALISTS]} & deep
         least = max(_FINALIST_SHARE * best[0].whole_gain, _HALFWAY * needed)
-        finalists = [one for one in tried if one.effect.name in names and one.whole_gain > least]
+        finalists = [one for one in tried if one.effect.name in names and (one.whole_gain > least or _only_moves(one))]
         progress(f"settling {len({one.effect.name for one in finalists})} of them")
-        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS), finalists))
-        best = _best_of_each([*further, *(one for one in tried if one not in finalists)])
+        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS, WORTH_SETTLING),
+                                finalists))
+        tried = _best_of_each([*further, *(one for one in tried if one not in finalists)])
         if finalists:
-            best += pool.map(lambda effect: in_place_of(problem, now, best[0], effect), simpler(best[0], effects))
-    return _best_of_each(best)
+            counts = {one.effect.name: one.count for one in promises}
+            tried += pool.map(partial(in_place_of, problem, now, tried[0], counts, WORTH_SETTLING),
+                              simpler(tried[0], effects))
+    return _best_of_each(tried)
+
+
+def _only_moves(one: Screened | Tried) -> bool:
+    """Whether the effect does no more than to move the runs against the model."""
+    return not one.effect.reshapes
 
 
 def _least_of_left(now: Base) -> float:
@@ -310,10 +329,11 @@ def _starts(tried: Sequence[Tried]) -> int:
     return sum(one.starts for one in tried)
 
 
-def _accepted(problem: Problem, one: Tried, count: int, before: float) -> bool:
-    """Whether an effect is there: not by chance, worth naming beside what was explained before, and no harm to what no
-    fit saw."""
-    return (not one.state.effects[-1].at_an_end
+def _accepted(problem: Problem, one: Tried, count: int, before: float, now: Base | None = None) -> bool:
+    """Whether an effect is there: not by chance, worth naming beside what was explained before, no harm to what no fit
+    saw, and no small part of what is left to explain by ``now``, if that is asked."""
+    return ((now is None or _only_moves(one) or one.whole_gain > _least_of_left(now))
+            and not one.state.effects[-1].at_an_end
             and _p_value(one.gain, one.numbers, count) < CHANCE
             and _worthy(problem, one.state, one.whole_gain, one.eased, before)
             and one.judged_gain > -HARM * one.gain)
@@ -366,7 +386,8 @@ def _sought_again(problem: Problem, now: Base, one: Tried, seen: Misalignment, p
     name = one.effect.name
     progress(f"is {name} still what it was?")
     without = _without(problem, now, name)
-    again = best_choice(fitted(problem, without, screened(problem, without, one.effect, seen)))
+    promise = screened(problem, without, one.effect, seen)
+    again = best_choice(fitted(problem, without, promise, _WORTH_SETTLING_AT_FIRST))
     there = next(other for other in now.state.effects if other.effect.name == name)
     if steps_apart(there, again.state.effects[-1]) < _THE_SAME_PLACE:
         return now

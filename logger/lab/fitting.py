@@ -35,7 +35,7 @@ _LEAST_SHARE = 0.1
 # Far off, steps are damped; near the end they are hardly, or nothing would move along with what makes up for it.
 FIRST_DAMPING, LAST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 1e-9, 100.0, 30.0
 _LEAST_THAT_DAMPS = 1e-4
-# A step that gains less than this in minus twice a log-likelihood ends a fit.
+# A step that gains or promises less than this in minus twice a log-likelihood ends a fit.
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _RIDGE = 1e-12

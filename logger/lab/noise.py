@@ -53,7 +53,8 @@ def noise_of(problem: Problem, state: State) -> Noise:
 
 
 def left_to_explain(problem: Problem, state: State) -> float:
-    """By how much minus twice the log-likelihood of all stretches would fall if nothing unexplained were left."""
+    """By how much minus twice the log-likelihood of all stretches would fall if what is left were just not enough to be
+    unexplained; at least 0. Bands that are quiet make up for those that are not."""
     power = ((1 + UNEXPLAINED) * noise_of(problem, state).deviation_mps2) ** 2
     return max(0.0, sum(float(cells.freedom @ np.log(cells.power / power)) for cells in problem.cells(state, None)))
 

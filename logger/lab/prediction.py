@@ -29,6 +29,7 @@ SKIP_S = 2.0
 MOST_MPS2 = 1e6
 """Predictions end here: those of a car whose motion grows without bound, which effects may make."""
 _KEPT_PASSAGES = 4
+_STEPPERS = 2
 # Dry friction changes at once: it needs so many times the steps that other laws need.
 _FINER_IF_IT_RUBS = 2
 
@@ -73,11 +74,11 @@ class Run:
 
 class Runs:
     """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
-    laws of their own are stepped in so many threads besides."""
+    laws of their own are stepped in two threads besides."""
 
-    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ, workers: int = 2) -> None:
+    def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
-        self._steppers = ThreadPoolExecutor(workers)
+        self._steppers = ThreadPoolExecutor(_STEPPERS)
         self._passages: list[dict[tuple[float, bytes], Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:

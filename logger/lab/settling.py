@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.lab.fitting import FIRST_DAMPING, LAST_DAMPING, Problem, Slopes, State, Weighed, improved, moves_of
+from logger.lab.fitting import (
+    FIRST_DAMPING,
+    LAST_DAMPING,
+    Problem,
+    Slopes,
+    State,
+    Weighed,
+    improved,
+    located,
+    moves_of,
+)
 from logger.lab.noise import left_to_explain
 
 _STEPS, _SETTLED = 5, 2.0
@@ -47,7 +57,7 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
         gained = least - now
         if gained > 0:  # else it was better by the weights of before
             least, state = now, trial
-        enough = max(_SETTLED, worth * left_to_explain(problem, state)) if worth else _SETTLED
+        enough = max(_SETTLED, worth * left_to_explain(problem, located(problem, state, slopes))) if worth else _SETTLED
         if done == rounds or (gained < enough and not given):
             break
         given, slopes = False, problem.slopes(state, weighed.fine_steps)

@@ -19,8 +19,9 @@ import numpy.typing as npt
 from logger.identification.verdict import structural
 from logger.lab.blind import SEEN
 from logger.lab.candidates import alike_within
-from logger.lab.diagnosis import CHANCE, UNEXPLAINED, WORTH
+from logger.lab.diagnosis import CHANCE, WORTH
 from logger.lab.fitting import coordinates_of
+from logger.lab.noise import UNEXPLAINED
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.unmeasured import Fitted, SameRoad, State, Trial, fitted, inverse, trials
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen

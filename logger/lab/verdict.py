@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from logger.lab.blind import Blind, blind
-from logger.lab.diagnosis import LEAST_OF_LEFT, Candidate, Diagnosis
+from logger.lab.diagnosis import CHANCE, LEAST_OF_LEFT, Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
 from logger.lab.stretches import Stretches
@@ -85,9 +85,10 @@ def summary(found: Verdict) -> list[str]:
                      "hardly more than the sensor's noise.")
     if diagnosis.left_over:
         lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: what is left is "
-                     f"{1 + diagnosis.excess:.3g} times the sensor's noise in the run where it is most. A candidate "
-                     f"that explains less than {LEAST_OF_LEFT:.0%} of what is left is not named: it would only stand "
-                     "in for what is missing.")
+                     f"{1 + diagnosis.excess:.3g} times the sensor's noise in the run where it is most.")
+        if any(one.p_value < CHANCE and one.effect.name not in diagnosis.verdict for one in diagnosis.candidates):
+            lines.append(f"Candidates that improve the fit by less than {LEAST_OF_LEFT:.0%} of what a full explanation "
+                         "would are not named: they may only stand in for what is missing.")
     if diagnosis.strained:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
         lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "

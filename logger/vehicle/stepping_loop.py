@@ -44,7 +44,7 @@ LANES = 4
 """Numbers that are summed side by side."""
 _PASSES = 2
 _NEWTON_STEPS, _NEAR = 4, 1e-3
-_SLIDES = 8.0  # tanh is 1 from there on, but for a ten-millionth
+_SLIDES = 8.0  # tanh is 1 from there on, but for some ten-millionths
 
 
 # Rows of the tables of one variable.
@@ -155,7 +155,7 @@ def _rub(
     motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array,
 ) -> None:
     """Find the dry friction at the rates that each suspension has a little after the middle of the step, and add what
-    it does to travels and rates. What the others do to a suspension's rate is so little that theirs of the step before
+    it does to travels and rates. What the others do to a suspension's rate is so little that theirs of before
     serves for those that come after it.
 
     earlier    (w,) the rates at the beginning, as they count for that instant

@@ -181,7 +181,8 @@ def test_what_explains_little_of_what_is_left_only_stands_in_for_it(monkeypatch:
     few = {name: EFFECTS[name] for name in ("tire_damping", "sensor_gain")}
     found = diagnose(problem, few)
     assert found.verdict == () and found.left_over
-    assert any("less than 10% of what is left is not named" in one for one in as_json(told(found, few))["sentences"])
+    said = as_json(told(found, few))["sentences"]
+    assert any("less than 10% of what a full explanation would" in one for one in said)
     monkeypatch.setattr(diagnosis, "LEAST_OF_LEFT", 0.0)
     assert diagnose(problem, few).verdict != ()
 
@@ -203,6 +204,18 @@ def test_a_simpler_effect_begins_where_one_with_its_numbers_stands() -> None:
     there = problem.start([bending])
     as_bending = candidates.Tried(EFFECTS["body_bending"], there, 0.0, 0.0, 0.0, 3, 1, 0.0, base.slopes)
     assert [one.name for one in candidates.simpler(as_bending, [*EFFECTS.values()])] == ["sensor_mount_resonance"]
-    found = candidates.in_place_of(problem, base, as_bending, EFFECTS["sensor_mount_resonance"])
+    found = candidates.in_place_of(problem, base, as_bending, {"sensor_mount_resonance": 14}, 0.0,
+                                   EFFECTS["sensor_mount_resonance"])
     assert found.state.effects[-1].values["frequency_hz"] == pytest.approx(29.6, rel=0.01)
-    assert found.whole_gain > 100
+    assert found.whole_gain > 100 and found.starts == 15
+
+
+@pytest.mark.parametrize(("scale", "delay_s"), [(1.01, 0.05), (1.02, 0.08)])
+def test_a_wrong_speed_and_a_late_clock_are_both_found_though_either_alone_gains_little(
+        scale: float, delay_s: float) -> None:
+    both = [chosen(EFFECTS["speed_scale"], {"scale": scale}), chosen(EFFECTS["time_offset"], {"delay_s": delay_s})]
+    found = searched(runs_of(CAR, both), names=("speed_scale", "time_offset", "sensor_gain"))
+    assert set(found.verdict) == {"speed_scale", "time_offset"} and not found.unexplained
+    values = {one.effect.name: one.p for one in found.after.effects}
+    assert values["speed_scale"].scale == pytest.approx(scale, abs=1e-3)
+    assert values["time_offset"].delay_s == pytest.approx(delay_s, abs=2e-3)
