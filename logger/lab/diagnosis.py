@@ -52,7 +52,8 @@ SHARE = 0.006
 """The least share that an effect has to add to what those before it explain: their laws are never quite the car's."""
 EASED, SHARE_EASED = 16.0, 0.002
 """An effect of which these data tell only that the car's numbers would be off too far without it is worth naming as
-well: from four standard deviations on, and from this share of what those before it explain."""
+well: from four standard deviations on, and from this share of what those before it explain, where little is left to
+explain besides."""
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 LEAST_OF_LEFT = 0.1

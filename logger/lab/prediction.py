@@ -90,7 +90,8 @@ class Runs:
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         rough      step a car that rubs no finer than others: what a change does is told well enough by that
         """
-        passages = self._laid_out(car, moved_m, rough)
+        with np.errstate(over="ignore", invalid="ignore"):
+            passages = self._laid_out(car, moved_m, rough)
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(partial(_recorded, car), passages)
         return list(each)
 
