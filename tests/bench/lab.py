@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -111,11 +112,12 @@ def minutes(figures: Figures) -> None:
 
 
 def minute_ms(car: Car, passage: Passage) -> float:
-    """The best of some."""
+    """The best of some; of a body that has not passed before, as a passage keeps the motions of those that have."""
     taken = []
     for _ in range(5):
+        fresh = replace(car, body=object())
         started_s = time.process_time()
-        recorded(car, passage)
+        recorded(fresh, passage)
         taken.append(time.process_time() - started_s)
     return 1e3 * min(taken)
 
