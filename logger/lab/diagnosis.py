@@ -61,7 +61,7 @@ LEAST_OF_LEFT = 0.1
 moves the runs against the model is spared that: where two such are wrong, either alone gains little."""
 STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
-WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
+_WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
 """A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
 where much is still to be found."""
 _WORTH_FITTING = 0.03
@@ -181,7 +181,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         further.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
     whole = problem.entire()
-    after, _ = settled(whole, now.state, worth=WORTH_SETTLING)
+    after, _ = settled(whole, now.state, worth=_WORTH_SETTLING)
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
@@ -218,7 +218,7 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         beaten = [accepted[0]] if accepted[0] not in (best, *rivals) else []
         taken.append(_Taken(best, (*beaten, *rivals), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=WORTH_SETTLING))
+        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING))
         for earlier_one in taken[:-1]:
             now = _sought_again(problem, now, earlier_one.tried, seen, progress)
         if best.effect.reshapes:  # what was only moved to its place was explained by nothing
@@ -269,12 +269,12 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         least = max(_FINALIST_SHARE * best[0].whole_gain, _HALFWAY * needed)
         finalists = [one for one in tried if one.effect.name in names and (one.whole_gain > least or _only_moves(one))]
         progress(f"settling {len({one.effect.name for one in finalists})} of them")
-        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS, WORTH_SETTLING),
+        further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS, _WORTH_SETTLING),
                                 finalists))
         tried = _best_of_each([*further, *(one for one in tried if one not in finalists)])
         if finalists:
             counts = {one.effect.name: one.count for one in promises}
-            tried += pool.map(partial(in_place_of, problem, now, tried[0], counts, WORTH_SETTLING),
+            tried += pool.map(partial(in_place_of, problem, now, tried[0], counts, _WORTH_SETTLING),
                               simpler(tried[0], effects))
     return _best_of_each(tried)
 
@@ -392,7 +392,7 @@ def _sought_again(problem: Problem, now: Base, one: Tried, seen: Misalignment, p
     there = next(other for other in now.state.effects if other.effect.name == name)
     if steps_apart(there, again.state.effects[-1]) < _THE_SAME_PLACE:
         return now
-    other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes, WORTH_SETTLING))
+    other = Base.of(problem, *settled(problem, again.state, _FINAL_ROUNDS, again.slopes, _WORTH_SETTLING))
     at_an_end = any(one.at_an_end for one in other.state.effects)
     return other if now.left_by(other) > TOLD_APART and not at_an_end else now
 
@@ -403,7 +403,7 @@ def _without(problem: Problem, now: Base, name: str) -> Base:
     away = next(one for one in now.state.effects if one.effect.name == name)
     start = problem.laid_out(rest, now.state.logs, now.state.wander)
     slopes = None if away.effect.realigns else now.slopes
-    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes, WORTH_SETTLING))
+    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes, _WORTH_SETTLING))
 
 
 def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
@@ -420,7 +420,7 @@ def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int
             effects = list(now.state.effects)
             effects[place] = rival.state.effects[-1]
             start = problem.laid_out(tuple(effects), now.state.logs, now.state.wander)
-            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, WORTH_SETTLING))
+            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, _WORTH_SETTLING))
             most = TOLD_APART * (found[number].tried.numbers - rival.numbers)
             if other.left_by(now) < most and not other.state.effects[place].at_an_end:
                 rest = tuple(one for one in (found[number].tried, *found[number].rivals) if one is not rival)

@@ -57,8 +57,14 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
         gained = least - now
         if gained > 0:  # else it was better by the weights of before
             least, state = now, trial
-        enough = max(_SETTLED, worth * left_to_explain(problem, located(problem, state, slopes))) if worth else _SETTLED
-        if done == rounds or (gained < enough and not given):
+        if done == rounds or (not given and gained < _enough(problem, state, slopes, worth)):
             break
         given, slopes = False, problem.slopes(state, weighed.fine_steps)
     return state, slopes
+
+
+def _enough(problem: Problem, state: State, slopes: Slopes, worth: float) -> float:
+    """What a round has to gain to be worth another one."""
+    if worth == 0:
+        return _SETTLED
+    return max(_SETTLED, worth * left_to_explain(problem, located(problem, state, slopes)))
