@@ -70,10 +70,10 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
     # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
     starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
               problem.start((*present, *added)))
-    after, _ = settled(problem, min(starts, key=problem.deviance))
-    bent, _ = settled(loose, before)
-    _, spread_before = with_spread(loose, bent)
-    effects, spread = with_spread(problem, after)
+    after, slopes = settled(problem, min(starts, key=problem.deviance))
+    bent, slopes_before = settled(loose, before)
+    _, spread_before = with_spread(loose, bent, slopes_before)
+    effects, spread = with_spread(problem, after, slopes)
     vehicle = problem.nuisance.vehicle(problem.vehicle, after.logs)
     earlier = problem.nuisance.vehicle(problem.vehicle, bent.logs)
     numbers = tuple(

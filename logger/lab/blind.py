@@ -11,9 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from logger.lab.fitting import Problem, State, Weighed
+from logger.lab.fitting import Problem, Slopes, State, Weighed
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
+
+Array = npt.NDArray[np.float64]
 
 SEEN = 6.0
 """An effect that stands out by fewer standard deviations would hardly be found among twenty."""
@@ -28,9 +31,10 @@ class Blind:
     deviations: float
 
 
-def blind(problem: Problem, state: State, effects: Sequence[Effect]) -> tuple[Blind, ...]:
-    """Those of the effects that the runs could not show beside a fitted model, the most hidden first."""
-    sight = _Sight(problem, state)
+def blind(problem: Problem, state: State, slopes: Slopes, effects: Sequence[Effect]) -> tuple[Blind, ...]:
+    """Those of the effects that the runs could not show beside a fitted model, by slopes that were taken near it; the
+    most hidden first."""
+    sight = _Sight(problem, state, slopes)
     found = [Blind(effect, sight.of(effect)) for effect in effects]
     return tuple(sorted((one for one in found if one.deviations < SEEN), key=lambda one: one.deviations))
 
@@ -38,11 +42,11 @@ def blind(problem: Problem, state: State, effects: Sequence[Effect]) -> tuple[Bl
 class _Sight:
     """By how much effects would stand out beside a model that was laid out."""
 
-    def __init__(self, problem: Problem, state: State) -> None:
-        self._problem, self._state = problem, state
-        self._slopes = problem.slopes(state)
+    def __init__(self, problem: Problem, state: State, slopes: Slopes) -> None:
+        self._problem, self._state, self._slopes = problem, state, slopes.around(state)
         self._weighed = Weighed(problem, self._slopes, problem.whiteners(state))
         self._uncertainty = np.linalg.inv(self._weighed.information)
+        self._here = self._predicted(state.effects)
 
     def of(self, effect: Effect) -> float:
         """At its usual strength; where it has none, or the vehicle has just that, at the most telling values that a
@@ -54,10 +58,14 @@ class _Sight:
         return found
 
     def _deviations(self, one: Chosen) -> float:
-        state, weighed = self._state, self._weighed
-        there = self._problem.predicted((*state.effects, one), state.logs, state.wander, self._slopes)
+        weighed = self._weighed
+        there = self._predicted((*self._state.effects, one))
         change = [whitener((new - old)[None]) for whitener, new, old in zip(
-            weighed.whiteners, there.predictions, state.predictions, strict=True)]
+            weighed.whiteners, there, self._here, strict=True)]
         mixed = weighed.against(change)[:, 0]
         own = sum(float(part[0] @ part[0]) for part in change) - float(mixed @ self._uncertainty @ mixed)
         return float(np.sqrt(max(own, 0.0)))
+
+    def _predicted(self, effects: tuple[Chosen, ...]) -> list[Array]:
+        state = self._state
+        return self._problem.predicted(effects, state.logs, state.wander, self._slopes, rough=True).predictions

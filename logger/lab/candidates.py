@@ -76,7 +76,7 @@ class Base:
     @staticmethod
     def of(problem: Problem, state: State, slopes: Slopes) -> Base:
         """From a state that was laid out, and slopes taken near it."""
-        slopes = Slopes(slopes.columns, state.wander)  # so that the state is predicted as it was laid out
+        slopes = slopes.around(state)
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
         left = weighed.residual(state)
@@ -97,7 +97,7 @@ class Base:
         columns = [one.copy() for one in self.slopes.columns]
         for one in columns:
             one[away] = 0.0
-        slopes = Slopes(columns, self.slopes.anchor)
+        slopes = replace(self.slopes, columns=columns)
         state = problem.predicted(self.state.effects, logs, self.state.wander, slopes)
         weighed = Weighed(problem, slopes, self.weighed.whiteners)
         uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
@@ -214,7 +214,7 @@ def fitted(problem: Problem, base: Base, promise: Screened, worth: float = 0.0) 
         effects = (*base.state.effects, trial.one)
         if trial.one.effect.realigns:  # the slopes of a model that lies elsewhere are worth nothing
             start = problem.laid_out(effects, *base.weighed.parted(trial.joined))
-            found = settled(problem, start, _ROUNDS, worth=worth)
+            found = settled(problem, start, _ROUNDS, worth=worth, beside=base.fitted)
             tries.append(_tried(problem, base, *found, promise.count))
             continue
         state = problem.predicted(effects, *base.weighed.parted(trial.joined), base.slopes)
@@ -235,7 +235,7 @@ def best_choice(tries: Sequence[Tried]) -> Tried:
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int, worth: float = 0.0) -> Tried:
     """The same with slopes of its own; until it gains by them, those that it was fitted with serve."""
-    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, worth), one.starts)
+    return _tried(problem, base, *settled(problem, one.state, rounds, one.slopes, worth, base.fitted), one.starts)
 
 
 def simpler(one: Tried, effects: Sequence[Effect]) -> list[Effect]:
@@ -257,7 +257,8 @@ def in_place_of(problem: Problem, base: Base, one: Tried, counts: Mapping[str, i
     values = one.state.effects[-1].values
     there = chosen(effect, {each.name: min(max(values[each.name], each.low), each.high) for each in effect.parameters})
     start = problem.laid_out((*one.state.effects[:-1], there), one.state.logs, one.state.wander)
-    return _tried(problem, base, *settled(problem, start, _ROUNDS, worth=worth), counts[effect.name] + 1)
+    found = settled(problem, start, _ROUNDS, worth=worth, beside=base.fitted)
+    return _tried(problem, base, *found, counts[effect.name] + 1)
 
 
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:

@@ -34,7 +34,7 @@ from logger.lab.candidates import (
     settled_further,
     simpler,
 )
-from logger.lab.fitting import Problem, State, located, steps_apart
+from logger.lab.fitting import Problem, Slopes, State, located, steps_apart
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import aligned, settled
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
@@ -111,6 +111,7 @@ class Diagnosis:
     verdict        effects that the model lacks, the most certain first
     excess         the share by which what is left is above the noise in the run where it is most
     strained       numbers of the car that have to be off too far, by which share
+    slopes         taken near ``after``
     judged         some stretches were kept from the fits
     """
 
@@ -125,6 +126,7 @@ class Diagnosis:
     steps: tuple[Step, ...]
     before: State
     after: State
+    slopes: Slopes
     problem: Problem
     judged: bool
 
@@ -181,14 +183,14 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         further.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
     whole = problem.entire()
-    after, _ = settled(whole, now.state, worth=_WORTH_SETTLING)
+    after, slopes = settled(whole, now.state, slopes=now.slopes, worth=_WORTH_SETTLING)
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
         baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
         excess=_excess(whole, after, noise), strained=_strained(whole, after), steps=(*steps, *further),
-        before=before.state, after=after, problem=whole,
+        before=before.state, after=after, slopes=slopes, problem=whole,
         judged=any(one.judges for one in problem.stretches),
     )
 
@@ -218,7 +220,8 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         beaten = [accepted[0]] if accepted[0] not in (best, *rivals) else []
         taken.append(_Taken(best, (*beaten, *rivals), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING))
+        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING,
+                                                      beside=now.fitted))
         for earlier_one in taken[:-1]:
             now = _sought_again(problem, now, earlier_one.tried, seen, progress)
         if best.effect.reshapes:  # what was only moved to its place was explained by nothing

@@ -56,6 +56,11 @@ class State:
     wander: list[Array]
     predictions: list[Array]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects, in order."""
+        return tuple(one.effect.name for one in self.effects)
+
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
@@ -63,10 +68,16 @@ class Slopes:
 
     columns    (p + k, n) per run
     anchor     the wander over which runs are laid out, (k,) per run
+    effects    names of the effects that the model had
     """
 
     columns: list[Array]
     anchor: list[Array]
+    effects: tuple[str, ...]
+
+    def around(self, state: State) -> Slopes:
+        """The same for a state nearby that was laid out, which is then predicted as it was laid out."""
+        return replace(self, anchor=state.wander)
 
 
 class Problem:
@@ -172,7 +183,7 @@ class Problem:
             for numbers, one, prediction, run in zip(by_number, self.wander, state.predictions, self.runs.runs,
                                                      strict=True)
         ]
-        return Slopes(columns, [k.copy() for k in state.wander])
+        return Slopes(columns, [k.copy() for k in state.wander], state.names)
 
     def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes,
                   rough: bool = False) -> State:

@@ -28,7 +28,7 @@ def aligned(problem: Problem, state: State) -> State:
     for _ in range(_ALIGNING_ROUNDS):
         columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
                    for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
-        weighed = Weighed(problem, Slopes(columns, state.wander), problem.whiteners(state), still=True)
+        weighed = Weighed(problem, Slopes(columns, state.wander, state.names), problem.whiteners(state), still=True)
         trial = improved(weighed, state, [], _STEPS, laid_out=True)
         gained = least - problem.deviance(trial)
         if gained > 0:
@@ -39,17 +39,19 @@ def aligned(problem: Problem, state: State) -> State:
 
 
 def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | None = None,
-            worth: float = 0.0) -> tuple[State, Slopes]:
+            worth: float = 0.0, beside: float | None = None) -> tuple[State, Slopes]:
     """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
 
     slopes    taken near the state before; None: they are taken now
-    worth     the share of what is left to explain that a round has to gain to be worth another one
+    worth     the share of what there is to explain that a round has to gain to be worth another one: of what is left,
+    beside    and of what was gained over a model of this deviance
 
     Returns the most likely state that was met, laid out, and slopes taken near it.
     """
     moves = moves_of(state.effects)
     state = problem.laid_out(state.effects, state.logs, state.wander)
-    given, least, slopes = slopes is not None, problem.deviance(state), slopes or problem.slopes(state)
+    fresh, least = slopes is None or _serves(slopes, state), problem.deviance(state)
+    slopes = slopes or problem.slopes(state)
     for done in range(1, rounds + 1):
         weighed = Weighed(problem, slopes, problem.whiteners(state))
         trial = improved(weighed, state, moves, _STEPS, True, FIRST_DAMPING if done == 1 else LAST_DAMPING)
@@ -57,14 +59,20 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
         gained = least - now
         if gained > 0:  # else it was better by the weights of before
             least, state = now, trial
-        if done == rounds or (not given and gained < _enough(problem, state, slopes, worth)):
+        if done == rounds or (fresh and gained < _enough(problem, state, slopes, worth, beside)):
             break
-        given, slopes = False, problem.slopes(state, weighed.fine_steps)
+        fresh, slopes = True, problem.slopes(state, weighed.fine_steps)
     return state, slopes
 
 
-def _enough(problem: Problem, state: State, slopes: Slopes, worth: float) -> float:
+def _serves(slopes: Slopes, state: State) -> bool:
+    """Whether little is to be gained by others: not so where the model was another, or may have lain elsewhere."""
+    return slopes.effects == state.names and not any(one.effect.realigns for one in state.effects)
+
+
+def _enough(problem: Problem, state: State, slopes: Slopes, worth: float, beside: float | None) -> float:
     """What a round has to gain to be worth another one."""
     if worth == 0:
         return _SETTLED
-    return max(_SETTLED, worth * left_to_explain(problem, located(problem, state, slopes)))
+    explained = 0.0 if beside is None else max(0.0, beside - problem.deviance(state))
+    return max(_SETTLED, worth * (explained + left_to_explain(problem, located(problem, state, slopes))))

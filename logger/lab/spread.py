@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import Move, Problem, State, Weighed, coordinates_of, moves_of
+from logger.lab.fitting import Move, Problem, Slopes, State, Weighed, coordinates_of, moves_of
 from logger.vehicle.effect import Chosen
 
 Array = npt.NDArray[np.float64]
@@ -21,13 +21,14 @@ _TINY_STEP = 1e-4
 _SINGULAR = 1e-10
 
 
-def with_spread(problem: Problem, state: State) -> tuple[tuple[Chosen, ...], Array]:
-    """The effects of a fitted state with standard errors, and those of the logarithms of the car's numbers (p,).
+def with_spread(problem: Problem, state: State, slopes: Slopes) -> tuple[tuple[Chosen, ...], Array]:
+    """The effects of a fitted state with standard errors, and those of the logarithms of the car's numbers (p,), by
+    slopes that were taken near it.
 
     Both hold what was granted beforehand: a number that the runs say nothing of is as uncertain as it was.
     """
     moves = moves_of(state.effects)
-    weighed = Weighed(problem, problem.slopes(state), problem.whiteners(state))
+    weighed = Weighed(problem, slopes.around(state), problem.whiteners(state))
     information = weighed.information
     if moves:
         information = weighed.bordered(information, weighed.effect_slopes(state, moves))

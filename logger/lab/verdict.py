@@ -63,11 +63,11 @@ def told(diagnosis: Diagnosis, catalogue: Mapping[str, Effect],
     """What it takes to tell a diagnosis."""
     problem, after = diagnosis.problem, diagnosis.after
     progress("how certain the numbers are")
-    effects, _ = with_spread(problem, after)
+    effects, _ = with_spread(problem, after, diagnosis.slopes)
     progress("what these runs could not show")
     taken = {one.effect.name for one in after.effects}
     others = [effect for name, effect in catalogue.items() if name not in diagnosis.obstacles and name not in taken]
-    hidden = blind(problem, after, others)
+    hidden = blind(problem, after, diagnosis.slopes, others)
     if diagnosis.left_over:
         progress("the shape of what is left")
     return Verdict(diagnosis, effects, catalogue, hidden, shape_of(problem, after) if diagnosis.left_over else None)

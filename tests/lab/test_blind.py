@@ -25,7 +25,7 @@ def test_another_contact_length_than_the_cars_own_shows_on_a_rough_road_driven_s
     logs = np.where(np.array(problem.nuisance.names) == "contact_patch_m", 0.003, 0.0)
     assert logs.any()
     state = problem.laid_out((), logs, problem.start().wander)
-    assert blind(problem, state, EFFECTS) == ()
+    assert blind(problem, state, problem.slopes(state), EFFECTS) == ()
 
 
 def test_a_road_that_hardly_moves_the_car_hides_them_all() -> None:
@@ -33,6 +33,7 @@ def test_a_road_that_hardly_moves_the_car_hides_them_all() -> None:
     quiet = Runs([run]).predict(compose(CAR))[0]
     noise = np.random.default_rng(1).normal(0, 40 * float(np.abs(quiet).max()), run.count)
     problem = Problem(Runs([measuring(run, noise)]), CAR, Tolerance(), whole=True)
-    hidden = blind(problem, problem.start(), EFFECTS)
+    state = problem.start()
+    hidden = blind(problem, state, problem.slopes(state), EFFECTS)
     assert {one.effect.name for one in hidden} == {one.name for one in EFFECTS}
     assert [one.deviations for one in hidden] == sorted(one.deviations for one in hidden)
