@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -231,6 +232,13 @@ def alike_within(gain: float) -> float:
 def best_choice(tries: Sequence[Tried]) -> Tried:
     """Of one effect with other choices, the likeliest; that which promised most unless another is clearly so."""
     return max(tries, key=lambda one: one.whole_gain + (TOLD_APART if one is tries[0] else 0.0))
+
+
+def every_choice(one: Chosen) -> list[Chosen]:
+    """An effect at its values, with each of the choices that no fit moves."""
+    choices = {parameter.name: parameter.choices for parameter in one.effect.parameters if parameter.choices}
+    return [replace(one, values={**one.values, **dict(zip(choices, picked, strict=True))})
+            for picked in product(*choices.values())]
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int, worth: float = 0.0) -> Tried:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -27,6 +27,7 @@ from logger.lab.candidates import (
     alike_within,
     as_screened,
     best_choice,
+    every_choice,
     fitted,
     in_place_of,
     misalignment,
@@ -57,17 +58,19 @@ explain besides."""
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 LEAST_OF_LEFT = 0.1
-"""An effect that gains a smaller share of what a full explanation would may only stand in for what is missing. One that
-moves the runs against the model is spared that: where two such are wrong, either alone gains little."""
+"""An effect that gains a smaller share of what a full explanation would may only stand in for what is missing."""
+ASTRAY = 0.7
+"""A model with a larger error, so that it explains less than half of the power, may lie elsewhere than the runs do. One
+that moves it is spared that share then: where two such are wrong, either alone gains little."""
 STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
 _WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
 """A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
 where much is still to be found."""
 _WORTH_FITTING = 0.03
-_LEAST_PROMISE, _SHARE_PROMISED = 12.0, 0.001
+_LEAST_PROMISE, _SHARE_PROMISED = 6.0, 0.001
 _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
-_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.3, 3
+_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.5, 3
 _HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fitted, and when only screened
 _THE_SAME_PLACE = 20.0  # steps
 _UNDECIDED = 0.05  # of what is left to explain
@@ -148,11 +151,15 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Taken:
-    """An effect that was taken, as it was tried in its round, which had so many trials; and those that explain as much.
+    """An effect that was taken, as it was tried in its round, which had so many trials.
+
+    rivals         those that explain as much
+    passed_over    those that explain more, or have numbers of its own and more, which may yet matter
     """
 
     tried: Tried
     rivals: tuple[Tried, ...]
+    passed_over: tuple[Tried, ...]
     count: int
 
     @property
@@ -177,7 +184,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
         now = Base.of(problem, *settled(problem, now.state, slopes=now.slopes))
         further[-1] = Step(further[-1].words, now.judged_error)
     on_the_way = now
-    now, taken = _simplest(problem, now, taken, len(present), progress)
+    now, taken = _reconsidered(problem, now, taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
     if now is not on_the_way:
         further.append(Step("as it ends", now.judged_error))
@@ -217,8 +224,7 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         seen_best = located(problem, accepted[0].state, accepted[0].slopes)
         best = _simplest_of_the_best(accepted, left_to_explain(problem, seen_best))
         rivals = _rivals(best, tried, problem)
-        beaten = [accepted[0]] if accepted[0] not in (best, *rivals) else []
-        taken.append(_Taken(best, (*beaten, *rivals), _starts(tried)))
+        taken.append(_Taken(best, rivals, _passed_over(best, accepted), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
         earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING,
                                                       beside=now.fitted))
@@ -258,10 +264,9 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         promises.sort(key=lambda one: -one.gain)
         if promises[0].gain < promise:
             return []
-        needed = _least_of_left(now)
         least = max(_LEAST_PROMISE, _WORTH_FITTING * promises[0].gain)
         deep = {one.effect.name for one in promises[:_MOST_FITTED]
-                if one.gain >= max(least, 0.0 if _only_moves(one) else _SHARE_OF_NEEDED * needed)}
+                if one.gain >= max(least, _SHARE_OF_NEEDED * _least_of_left(now, one.effect))}
         progress(f"fitting {len(deep)} of them")
         tried = [one for some in pool.map(
             lambda one: fitted(problem, now, one, _WORTH_SETTLING_AT_FIRST) if one.effect.name in deep
@@ -269,26 +274,24 @@ def _round(problem: Problem, now: Base, effects: Sequence[Effect], seen: Misalig
         ) for one in some]
         best = _best_of_each(tried)
         names = {one.effect.name for one in best[:_MOST_FINALISTS]} & deep
-        least = max(_FINALIST_SHARE * best[0].whole_gain, _HALFWAY * needed)
-        finalists = [one for one in tried if one.effect.name in names and (one.whole_gain > least or _only_moves(one))]
+        least = _FINALIST_SHARE * best[0].whole_gain
+        finalists = [one for one in tried if one.effect.name in names
+                     and one.whole_gain > max(least, _HALFWAY * _least_of_left(now, one.effect))]
         progress(f"settling {len({one.effect.name for one in finalists})} of them")
         further = list(pool.map(lambda one: settled_further(problem, now, one, _FINAL_ROUNDS, _WORTH_SETTLING),
                                 finalists))
         tried = _best_of_each([*further, *(one for one in tried if one not in finalists)])
-        if finalists:
+        if finalists and tried[0].whole_gain > _least_of_left(now, tried[0].effect):
             counts = {one.effect.name: one.count for one in promises}
             tried += pool.map(partial(in_place_of, problem, now, tried[0], counts, _WORTH_SETTLING),
                               simpler(tried[0], effects))
     return _best_of_each(tried)
 
 
-def _only_moves(one: Screened | Tried) -> bool:
-    """Whether the effect does no more than to move the runs against the model."""
-    return not one.effect.reshapes
-
-
-def _least_of_left(now: Base) -> float:
+def _least_of_left(now: Base, effect: Effect) -> float:
     """What an effect has to gain of what is left to explain."""
+    if not effect.reshapes and now.judged_error > ASTRAY:
+        return 0.0
     return LEAST_OF_LEFT * now.unexplained
 
 
@@ -336,7 +339,7 @@ def _starts(tried: Sequence[Tried]) -> int:
 def _accepted(problem: Problem, one: Tried, count: int, before: float, now: Base | None = None) -> bool:
     """Whether an effect is there: not by chance, worth naming beside what was explained before, no harm to what no fit
     saw, and no small part of what is left to explain by ``now``, if that is asked."""
-    return ((now is None or _only_moves(one) or one.whole_gain > _least_of_left(now))
+    return ((now is None or one.whole_gain > _least_of_left(now, one.effect))
             and not one.state.effects[-1].at_an_end
             and _p_value(one.gain, one.numbers, count) < CHANCE
             and _worthy(problem, one.state, one.whole_gain, one.eased, before)
@@ -358,6 +361,12 @@ def _rivals(one: Tried, tried: Sequence[Tried], problem: Problem) -> tuple[Tried
         return ()
     near = alike_within(one.whole_gain)
     return tuple(other for other in worthy if other is not one and abs(other.whole_gain - one.whole_gain) < near)
+
+
+def _passed_over(best: Tried, accepted: Sequence[Tried]) -> tuple[Tried, ...]:
+    """Effects for which a simpler one was taken, or that have its numbers and more: what only they could explain may
+    show when the others are known."""
+    return tuple(one for one in accepted if one is not best and (one is accepted[0] or simpler(one, [best.effect])))
 
 
 def _needed(problem: Problem, before: Base, now: Base, taken: Sequence[_Taken], present: int,
@@ -409,26 +418,34 @@ def _without(problem: Problem, now: Base, name: str) -> Base:
     return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes, _WORTH_SETTLING))
 
 
-def _simplest(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
-              progress: Progress) -> tuple[Base, list[_Taken]]:
-    """The model with simpler effects in place of those that explain no more, now that the others are known too."""
+def _reconsidered(problem: Problem, now: Base, taken: Sequence[_Taken], present: int,
+                  progress: Progress) -> tuple[Base, list[_Taken]]:
+    """The model with simpler effects in place of those that explain no more, and with those that were passed over for
+    simpler ones if they explain clearly more, now that the others are known too."""
     found = list(taken)
     for place in range(present, len(now.state.effects)):
         number = next(i for i, one in enumerate(found) if one.name == now.state.effects[place].effect.name)
         there = {one.effect.name for one in now.state.effects}
-        for rival in found[number].rivals:
-            if rival.numbers >= found[number].tried.numbers or rival.effect.name in there:
+        for rival in (*found[number].rivals, *found[number].passed_over):
+            here = found[number]
+            more = rival.numbers - here.tried.numbers
+            if (more >= 0 and rival in here.rivals) or rival.effect.name in there:
                 continue
-            progress(f"would {rival.effect.name} do for {found[number].name}?")
-            effects = list(now.state.effects)
-            effects[place] = rival.state.effects[-1]
-            start = problem.laid_out(tuple(effects), now.state.logs, now.state.wander)
-            other = Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, _WORTH_SETTLING))
-            most = TOLD_APART * (found[number].tried.numbers - rival.numbers)
-            if other.left_by(now) < most and not other.state.effects[place].at_an_end:
-                rest = tuple(one for one in (found[number].tried, *found[number].rivals) if one is not rival)
-                now, found[number] = other, _Taken(rival, rest, found[number].count)
+            progress(f"would {rival.effect.name} do for {here.name}?")
+            other = min((_with_other(problem, now, place, one) for one in every_choice(rival.state.effects[-1])),
+                        key=lambda one: (one.state.effects[place].at_an_end, one.fitted))
+            least = TOLD_APART * more if more < 0 else max(TOLD_APART * more, alike_within(here.tried.whole_gain))
+            if now.left_by(other) > least and not other.state.effects[place].at_an_end:
+                alike = tuple(one for one in (here.tried, *here.rivals) if one is not rival) if more < 0 else ()
+                now, found[number] = other, replace(here, tried=rival, rivals=alike)
     return now, found
+
+
+def _with_other(problem: Problem, now: Base, place: int, one: Chosen) -> Base:
+    """The model with another effect at a place in the order of its effects, refitted."""
+    effects = (*now.state.effects[:place], one, *now.state.effects[place + 1 :])
+    start = problem.laid_out(effects, now.state.logs, now.state.wander)
+    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, _WORTH_SETTLING))
 
 
 def _strained(problem: Problem, state: State) -> dict[str, float]:

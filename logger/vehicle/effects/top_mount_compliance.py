@@ -17,7 +17,7 @@ class TopMountCompliance(ForceEffect):
     name = "top_mount_compliance"
     title = "a rubber mount in series with each damper"
     parameters = (
-        Parameter("mount_stiffness_n_per_m", 2e5, 5e3, 1e8, float("inf"), Scale.RECIPROCAL, (6e4, 3e5),
+        Parameter("mount_stiffness_n_per_m", 2e5, 5e3, 1e8, float("inf"), Scale.RECIPROCAL, (6e4, 3e5, 1.5e6),
                   "of the mount of each damper"),
     )
     source = "J. C. Maxwell's series of spring and damper; J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1"
