@@ -99,7 +99,8 @@ _ROUNDS = 3
 def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chosen:
     """Where the fit of an effect begins: as it was said, and for the rest where a search for it alone ends."""
     from logger.lab.candidates import Base, best_choice, fitted, misalignment, screened, settled_further
-    from logger.lab.settling import aligned, settled
+    from logger.lab.settling import settled
+    from logger.lab.wandering import lying
     from logger.vehicle.effect import chosen
 
     if set(values) >= {one.name for one in effect.parameters}:
@@ -109,7 +110,8 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         problem = given.problem(whole=False, firm=True)
         tell("refitting the car's own numbers")
         nominal = problem.start(given.model.effects)
-        base = Base.of(problem, *settled(problem, aligned(problem, nominal)))
+        problem, start = lying(problem, nominal)
+        base = Base.of(problem, *settled(problem, start))
         tell(f"searching for {effect.name}")
         tries = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
     except ValueError as error:
@@ -129,7 +131,7 @@ def added(given: Bench, start: Chosen, starts: int) -> Gained:
     problem = given.problem(whole=True, firm=True)
     try:
         found = add(problem, given.problem(whole=True, firm=False), given.model.effects, [given.filed(start)])
-        return gained(problem, found, [start.effect.name], starts)
+        return gained(found, [start.effect.name], starts)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
 

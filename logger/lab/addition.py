@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.identification.parameters import read
-from logger.lab.fitting import Problem, State
+from logger.lab.fitting import Problem, Slopes, State
 from logger.lab.settling import settled
 from logger.lab.spread import with_spread
+from logger.lab.wandering import relaid
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
@@ -45,6 +46,7 @@ class Added:
     error_refitted     of those with their numbers refitted and the distance's wander taken out
     error_after        of the model with the effects, fitted in the same way
     error_as_written   of that model without the wander taken out: what a comparison with it begins at
+    problem            with its runs where they lie beside that model
     """
 
     vehicle: Vehicle
@@ -54,6 +56,7 @@ class Added:
     error_refitted: float
     error_after: float
     error_as_written: float
+    problem: Problem
     before: State
     after: State
 
@@ -65,12 +68,12 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
     problem    firm, so that what is still missing beside these effects does not bend the car, and they not with it
     loose      the same, not firm: it shows how far the car would have to bend without the added effects
     """
-    nominal = problem.start(present)
-    before, _ = settled(problem, nominal)
-    # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
-    starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
-              problem.start((*present, *added)))
-    after, slopes = settled(problem, min(starts, key=problem.deviance))
+    recorded = problem
+    before, after, slopes = _without_and_with(problem, present, added)
+    laid = relaid(problem, after, problem)
+    if laid is not problem:
+        problem, loose = laid, loose.over(laid.runs)
+        before, after, slopes = _without_and_with(problem, present, added)
     bent, slopes_before = settled(loose, before)
     _, spread_before = with_spread(loose, bent, slopes_before)
     effects, spread = with_spread(problem, after, slopes)
@@ -81,7 +84,17 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
                read(vehicle, name), read(vehicle, name) * float(now))
         for name, was, now in zip(problem.nuisance.names, spread_before, spread, strict=True)
     )
-    written = problem.laid_out(after.effects, after.logs, [np.zeros_like(k) for k in after.wander])
-    return Added(vehicle, effects, numbers, problem.error(nominal), problem.error(before), problem.error(after),
-                 problem.error(written), before, after)
+    written = recorded.laid_out(after.effects, after.logs, [np.zeros_like(k) for k in after.wander])
+    return Added(vehicle, effects, numbers, recorded.error(recorded.start(present)), problem.error(before),
+                 problem.error(after), recorded.error(written), problem, before, after)
+
+
+def _without_and_with(problem: Problem, present: Sequence[Chosen],
+                      added: Sequence[Chosen]) -> tuple[State, State, Slopes]:
+    """The car fitted without and with the effects, and slopes near the latter."""
+    before, _ = settled(problem, problem.start(present))
+    # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
+    starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
+              problem.start((*present, *added)))
+    return before, *settled(problem, min(starts, key=problem.deviance))
 

@@ -70,6 +70,16 @@ def aligned(beside: Beside) -> Alignment:
     return Alignment(table[0].astype(np.intp), *table[1:])
 
 
+def followed_m(run: Run, prediction: Array) -> Array:
+    """By how much the car seems to have been farther than a model of it (n,) [m], straight between windows in which
+    both are alike; nothing where there are none."""
+    rows = np.array(_windows(0, run, prediction)).reshape(-1, 5).T
+    if not rows.size:
+        return np.zeros(run.count)
+    _, along_m, lag_s, _, speed_mps = rows
+    return np.asarray(np.interp(run.distance_m - run.distance_m[0], along_m, -lag_s * speed_mps))
+
+
 def drift(windows: Alignment) -> Trend:
     """By how much the model gets ahead per length of road [m/m], each run beginning where it will."""
     runs = np.unique(windows.run)

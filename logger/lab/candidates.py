@@ -95,10 +95,10 @@ class Base:
             return self
         logs = self.state.logs.copy()
         logs[away] = 0.0
-        columns = [one.copy() for one in self.slopes.columns]
-        for one in columns:
+        numbers = [one.copy() for one in self.slopes.numbers]
+        for one in numbers:
             one[away] = 0.0
-        slopes = replace(self.slopes, columns=columns)
+        slopes = replace(self.slopes, numbers=numbers)
         state = problem.predicted(self.state.effects, logs, self.state.wander, slopes)
         weighed = Weighed(problem, slopes, self.weighed.whiteners)
         uncertainty = np.asarray(np.linalg.inv(weighed.information_at(state)), float)
@@ -235,10 +235,11 @@ def best_choice(tries: Sequence[Tried]) -> Tried:
 
 
 def every_choice(one: Chosen) -> list[Chosen]:
-    """An effect at its values, with each of the choices that no fit moves."""
+    """An effect at its values, with each of the choices that no fit moves, its own first."""
     choices = {parameter.name: parameter.choices for parameter in one.effect.parameters if parameter.choices}
-    return [replace(one, values={**one.values, **dict(zip(choices, picked, strict=True))})
-            for picked in product(*choices.values())]
+    own = tuple(one.values[name] for name in choices)
+    picked = sorted(product(*choices.values()), key=lambda values: values != own)
+    return [replace(one, values={**one.values, **dict(zip(choices, values, strict=True))}) for values in picked]
 
 
 def settled_further(problem: Problem, base: Base, one: Tried, rounds: int, worth: float = 0.0) -> Tried:

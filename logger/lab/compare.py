@@ -21,6 +21,7 @@ from logger.lab.marks import Mark, Marks, read_marks
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Runs, error
 from logger.lab.settling import settled
+from logger.lab.wandering import relaid
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -90,6 +91,10 @@ def _refitted(
     problem = Problem(runs, given or vehicle, Tolerance(), whole=True, stands=vehicle)
     names = problem.nuisance.names
     state, _ = settled(problem, problem.start(effects))
+    laid = relaid(problem, state, problem)
+    if laid is not problem:
+        problem, runs = laid, laid.runs
+        state, _ = settled(problem, problem.start(effects))
     if problem.error(state) > plain.error:
         return plain, dict.fromkeys(names, 0.0), ()
     car = problem.car(state.effects, state.logs)

@@ -4,8 +4,9 @@ Problem: something differs, and twenty effects, alone or together, might be why;
 in rounds: the car's own numbers and the wander of the distance are refitted within what is granted; every effect is
 screened; the promising ones are fitted; the best is taken when it passes four tests: its gain in likelihood would
 hardly come by chance in so many trials, it explains stretches that no fit saw, what it explains is worth naming, and it
-is no small part of what is left to explain. Then the next round begins, on the model with it. At the end every effect
-that was taken must still be needed by the others. What is left then is compared with the noise that the sensor has
+is no small part of what is left to explain. Then the next round begins, on the model with it. At the end those that
+explained as much as one that was taken, or were passed over for a simpler one, are tried in its place, and every effect
+must still be needed by the others. What is left then is compared with the noise that the sensor has
 where no car moves it: what stays above it is unexplained, and so is what takes numbers of the car to explain that
 nobody granted.
 """
@@ -37,7 +38,8 @@ from logger.lab.candidates import (
 )
 from logger.lab.fitting import Problem, Slopes, State, located, steps_apart
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
-from logger.lab.settling import aligned, settled
+from logger.lab.settling import settled
+from logger.lab.wandering import ASTRAY, lying, moved_m, on_recorded, relaid
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
 Progress = Callable[[str], None]
@@ -58,10 +60,8 @@ explain besides."""
 HARM = 0.1
 """What share of its gain an effect may cost on stretches that no fit saw, which may hold nothing that would show it."""
 LEAST_OF_LEFT = 0.1
-"""An effect that gains a smaller share of what a full explanation would may only stand in for what is missing."""
-ASTRAY = 0.7
-"""A model with a larger error, so that it explains less than half of the power, may lie elsewhere than the runs do. One
-that moves it is spared that share then: where two such are wrong, either alone gains little."""
+"""An effect that gains a smaller share of what a full explanation would may only stand in for what is missing. One that
+moves a model that is astray is spared that: where two such are wrong, either alone gains little."""
 STRAINED = 4.0
 """A number of the car that has to be off by more deviations of what is granted than this explains nothing."""
 _WORTH_SETTLING, _WORTH_SETTLING_AT_FIRST = 0.02, 0.1
@@ -114,8 +114,9 @@ class Diagnosis:
     verdict        effects that the model lacks, the most certain first
     excess         the share by which what is left is above the noise in the run where it is most
     strained       numbers of the car that have to be off too far, by which share
-    slopes         taken near ``after``
+    slopes         taken near ``after``, maybe by the coarser simulation of the search
     judged         some stretches were kept from the fits
+    moved_m        by how much a run was laid elsewhere than it was recorded, at most
     """
 
     baseline_error: float
@@ -132,6 +133,7 @@ class Diagnosis:
     slopes: Slopes
     problem: Problem
     judged: bool
+    moved_m: float
 
     @property
     def left_over(self) -> bool:
@@ -176,10 +178,12 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     progress("refitting the car's own numbers")
     nominal = problem.start(present)
     seen = misalignment(problem, nominal)
-    before = Base.of(problem, *settled(problem, aligned(problem, nominal)))
-    steps = [Step("the vehicle as its file says", problem.judged_error(nominal)),
+    said_error, said_judged_error = problem.error(nominal), problem.judged_error(nominal)
+    recorded = problem
+    problem, before = _before(recorded, nominal)
+    steps = [Step("the vehicle as its file says", said_judged_error),
              Step("its numbers refitted within what is granted", before.judged_error)]
-    now, taken, first, further = _found(problem, before, left, seen, progress, workers)
+    problem, before, now, taken, first, further = _found(problem, recorded, before, left, seen, progress, workers)
     if taken:  # on the way it was settled roughly
         now = Base.of(problem, *settled(problem, now.state, slopes=now.slopes))
         further[-1] = Step(further[-1].words, now.judged_error)
@@ -194,17 +198,40 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
-        baseline_error=problem.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
+        baseline_error=said_error, noise=noise, noise_floor_error=floor_error(whole, noise),
         candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
         excess=_excess(whole, after, noise), strained=_strained(whole, after), steps=(*steps, *further),
         before=before.state, after=after, slopes=slopes, problem=whole,
-        judged=any(one.judges for one in problem.stretches),
+        judged=any(one.judges for one in problem.stretches), moved_m=moved_m(recorded, problem),
     )
 
 
-def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misalignment, progress: Progress,
-           workers: int) -> tuple[Base, list[_Taken], list[Tried], list[Step]]:
-    """The model with the effects that were taken one after the other, these, what the first round tried, and the steps.
+def _before(problem: Problem, nominal: State) -> tuple[Problem, Base]:
+    """The car's own numbers refitted, with the runs where they lie: beside the car as it stands, and once more beside
+    the one that was refitted."""
+    laid, start = lying(problem, nominal)
+    return _where_it_lies(problem, laid, Base.of(laid, *settled(laid, start)))
+
+
+def _where_it_lies(recorded: Problem, problem: Problem, now: Base) -> tuple[Problem, Base]:
+    """The problem and a model with the runs where they lie beside it, if it leaves anything where they lie now, and
+    explains enough to tell."""
+    tells = now.unexplained > 0 and now.judged_error < ASTRAY
+    laid = relaid(problem, now.state, recorded) if tells else problem
+    return (problem, now) if laid is problem else (laid, _on(laid, now))
+
+
+def _on(problem: Problem, now: Base) -> Base:
+    """A model refitted over runs that lie elsewhere."""
+    return Base.of(problem, *settled(problem, on_recorded(problem, now.state)))
+
+
+def _found(problem: Problem, recorded: Problem, before: Base, effects: Sequence[Effect], seen: Misalignment,
+           progress: Progress, workers: int) -> tuple[Problem, Base, Base, list[_Taken], list[Tried], list[Step]]:
+    """The problem with its runs where they lie at last, the model there without effects and with those that were taken
+    one after the other, these, what the first round tried, and the steps.
+
+    recorded    the problem with the runs where they were recorded
     """
     now, left = before, list(effects)
     first: list[Tried] = []
@@ -226,15 +253,17 @@ def _found(problem: Problem, before: Base, effects: Sequence[Effect], seen: Misa
         rivals = _rivals(best, tried, problem)
         taken.append(_Taken(best, rivals, _passed_over(best, accepted), _starts(tried)))
         progress(f"round {number}: {best.effect.name} is missing; fitting the car with it")
-        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING,
-                                                      beside=now.fitted))
+        earlier, now = now, Base.of(problem, *settled(problem, best.state, slopes=best.slopes, worth=_WORTH_SETTLING))
+        laid, now = _where_it_lies(recorded, problem, now)
+        if laid is not problem:
+            problem, before, earlier = laid, _on(laid, before), _on(laid, earlier)
         for earlier_one in taken[:-1]:
             now = _sought_again(problem, now, earlier_one.tried, seen, progress)
         if best.effect.reshapes:  # what was only moved to its place was explained by nothing
             explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
-    return now, taken, first, steps
+    return problem, before, now, taken, first, steps
 
 
 def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -426,26 +455,44 @@ def _reconsidered(problem: Problem, now: Base, taken: Sequence[_Taken], present:
     for place in range(present, len(now.state.effects)):
         number = next(i for i, one in enumerate(found) if one.name == now.state.effects[place].effect.name)
         there = {one.effect.name for one in now.state.effects}
-        for rival in (*found[number].rivals, *found[number].passed_over):
+        for rival in dict.fromkeys((*found[number].rivals, *found[number].passed_over)):
             here = found[number]
             more = rival.numbers - here.tried.numbers
-            if (more >= 0 and rival in here.rivals) or rival.effect.name in there:
+            if (more >= 0 and rival not in here.passed_over) or rival.effect.name in there:
                 continue
             progress(f"would {rival.effect.name} do for {here.name}?")
-            other = min((_with_other(problem, now, place, one) for one in every_choice(rival.state.effects[-1])),
-                        key=lambda one: (one.state.effects[place].at_an_end, one.fitted))
-            least = TOLD_APART * more if more < 0 else max(TOLD_APART * more, alike_within(here.tried.whole_gain))
-            if now.left_by(other) > least and not other.state.effects[place].at_an_end:
-                alike = tuple(one for one in (here.tried, *here.rivals) if one is not rival) if more < 0 else ()
-                now, found[number] = other, replace(here, tried=rival, rivals=alike)
+            other = _with_other(problem, now, place, rival)
+            near = alike_within(here.tried.whole_gain)
+            gained, at_an_end = now.left_by(other), other.state.effects[place].at_an_end
+            if gained > (TOLD_APART * more if more < 0 else max(TOLD_APART * more, near)) and not at_an_end:
+                now, found[number] = other, _taken_instead(here, rival)
+            elif abs(gained) < near and not at_an_end and rival not in here.rivals:
+                found[number] = replace(here, rivals=(*here.rivals, rival))
     return now, found
 
 
-def _with_other(problem: Problem, now: Base, place: int, one: Chosen) -> Base:
-    """The model with another effect at a place in the order of its effects, refitted."""
-    effects = (*now.state.effects[:place], one, *now.state.effects[place + 1 :])
-    start = problem.laid_out(effects, now.state.logs, now.state.wander)
-    return Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, now.slopes, _WORTH_SETTLING))
+def _taken_instead(here: _Taken, rival: Tried) -> _Taken:
+    """Another effect in the place of one that was taken; which of those around explain as much as it does."""
+    near = alike_within(rival.whole_gain)
+    others = [here.tried] if rival.numbers < here.tried.numbers else []
+    others += [one for one in dict.fromkeys((*here.rivals, *here.passed_over))
+               if one is not rival and abs(one.whole_gain - rival.whole_gain) < near]
+    return replace(here, tried=rival, rivals=tuple(others))
+
+
+def _with_other(problem: Problem, now: Base, place: int, rival: Tried) -> Base:
+    """The model with another effect at a place in the order of its effects, refitted; with another of the choices that
+    no fit moves where that explains clearly more."""
+    old, new = now.state.effects[place], rival.state.effects[-1]
+    slopes = None if old.effect.realigns or new.effect.realigns else now.slopes
+    logs = np.where(np.isin(problem.nuisance.names, new.effect.replaces), 0.0, now.state.logs)
+    found = []
+    for one in every_choice(new):
+        effects = (*now.state.effects[:place], one, *now.state.effects[place + 1 :])
+        start = problem.laid_out(effects, logs, now.state.wander)
+        found.append(Base.of(problem, *settled(problem, start, _FINAL_ROUNDS, slopes, _WORTH_SETTLING)))
+    return max(found, key=lambda base: now.left_by(base) + (TOLD_APART if base is found[0] else 0.0)
+               - (np.inf if base.state.effects[place].at_an_end else 0.0))
 
 
 def _strained(problem: Problem, state: State) -> dict[str, float]:

@@ -10,7 +10,7 @@ is part of what is fitted (``stretches``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -66,12 +66,14 @@ class State:
 class Slopes:
     """What the car's numbers and the wander do to the predictions of a model.
 
-    columns    (p + k, n) per run
-    anchor     the wander over which runs are laid out, (k,) per run
-    effects    names of the effects that the model had
+    numbers        by the car's numbers: (p, n) per run
+    predictions    (n,) per run; what the wander does follows from them
+    anchor         the wander over which runs are laid out, (k,) per run
+    effects        names of the effects that the model had
     """
 
-    columns: list[Array]
+    numbers: list[Array]
+    predictions: list[Array]
     anchor: list[Array]
     effects: tuple[str, ...]
 
@@ -101,6 +103,15 @@ class Problem:
         """All of the runs, finely simulated, by a car that is not held, so that it shows when it has to bend too far.
         """
         return Problem(Runs(self.runs.runs), self.vehicle, self.tolerance, True, self._stands)
+
+    def granting(self, tolerance: Tolerance) -> Problem:
+        """All of the runs, with another tolerance."""
+        return Problem(self.runs, self.vehicle, tolerance, True, self._stands, self.nuisance.firm)
+
+    def over(self, runs: Runs) -> Problem:
+        """The same over other runs."""
+        whole = not any(one.judges for one in self.stretches)
+        return Problem(runs, self.vehicle, self.tolerance, whole, self._stands, self.nuisance.firm)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -178,22 +189,23 @@ class Problem:
             shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
             for column, there, here in zip(by_number, shifted, unmoved, strict=True):
                 column[index] = (there - here) / step[index]
-        columns = [
-            np.vstack([numbers, one.columns(prediction, run)])
-            for numbers, one, prediction, run in zip(by_number, self.wander, state.predictions, self.runs.runs,
-                                                     strict=True)
-        ]
-        return Slopes(columns, [k.copy() for k in state.wander], state.names)
+        return Slopes(by_number, state.predictions, [k.copy() for k in state.wander], state.names)
+
+    def columns(self, slopes: Slopes) -> Iterator[Array]:
+        """Slopes by the car's numbers, then by the wander (p + k, n), run by run: they take much memory."""
+        for numbers, wander, prediction, run in zip(slopes.numbers, self.wander, slopes.predictions, self.runs.runs,
+                                                    strict=True):
+            yield np.vstack([numbers, wander.columns(prediction, run)])
 
     def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes,
                   rough: bool = False) -> State:
         """A state whose wander is counted to first order from the anchor of the slopes; or one that is only good for
         being compared with another such (``rough``)."""
-        count = len(logs)
         predictions = [
-            prediction + (k - anchor) @ columns[count:]
-            for prediction, k, anchor, columns in zip(
-                self._recorded(effects, logs, slopes.anchor, rough), wander, slopes.anchor, slopes.columns, strict=True)
+            prediction + one.does(k - anchor, before, run)
+            for prediction, one, k, anchor, before, run in zip(
+                self._recorded(effects, logs, slopes.anchor, rough), self.wander, wander, slopes.anchor,
+                slopes.predictions, self.runs.runs, strict=True)
         ]
         return State(effects, logs, wander, predictions)
 
@@ -218,18 +230,27 @@ class Problem:
 def located(problem: Problem, state: State, slopes: Slopes) -> State:
     """The state with the wander of all stretches, also of those that judge: where the car was is no part of what is
     judged. One step, to first order."""
-    count, wander, predictions = len(state.logs), [], []
-    for stretches, prior, k, prediction, columns, measured in zip(
-            problem.stretches, problem.wander, state.wander, state.predictions, slopes.columns, problem.measured,
-            strict=True):
+    wander, predictions = [], []
+    for stretches, prior, k, prediction, around, measured, run in zip(
+            problem.stretches, problem.wander, state.wander, state.predictions, slopes.predictions, problem.measured,
+            problem.runs.runs, strict=True):
         left = measured - prediction
+        columns = prior.columns(around, run)
         whitener = Whitener(stretches, stretches.cells(left, None), whole=True)
-        white = whitener(columns[count:])
+        white = whitener(columns)
         pull = white @ whitener(left) - prior.precision @ k
         step = np.linalg.solve(white @ white.T + prior.precision, pull)
         wander.append(k + step)
-        predictions.append(prediction + step @ columns[count:])
+        predictions.append(prediction + step @ columns)
     return State(state.effects, state.logs, wander, predictions)
+
+
+def wander_information(problem: Problem, state: State) -> Iterator[Array]:
+    """What the fitted stretches and the prior tell of the wander beside a state (k, k), run by run."""
+    for one, prediction, run, whitener in zip(problem.wander, state.predictions, problem.runs.runs,
+                                              problem.whiteners(state), strict=True):
+        white = whitener(one.columns(prediction, run))
+        yield white @ white.T + one.precision
 
 
 class Weighed:
@@ -240,7 +261,7 @@ class Weighed:
 
     def __init__(self, problem: Problem, slopes: Slopes, whiteners: Sequence[Whitener], still: bool = False) -> None:
         self.problem, self.slopes, self.whiteners, self._still = problem, slopes, list(whiteners), still
-        self.white = [whitener(columns) for whitener, columns in zip(whiteners, slopes.columns, strict=True)]
+        self.white = [whitener(columns) for whitener, columns in zip(whiteners, problem.columns(slopes), strict=True)]
         p = len(problem.nuisance.names)
         sizes = [one.count for one in problem.wander]
         ends = p + np.cumsum([0, *sizes])

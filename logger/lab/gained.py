@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from logger.lab.addition import Added
-from logger.lab.fitting import Problem, moves_of
+from logger.lab.fitting import moves_of
 from logger.lab.noise import floor_error, noise_of
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.vehicle.effect import Chosen
@@ -82,11 +82,12 @@ class Gained:
         return moved_between(self.added, self.added)
 
 
-def gained(problem: Problem, added: Added, names: Sequence[str], starts: int = 1) -> Gained:
-    """What adding the effects of these names to ``problem``'s vehicle brought (S. S. Wilks 1938). Where the fit begins
-    had been chosen of so many ``starts``."""
+def gained(added: Added, names: Sequence[str], starts: int = 1) -> Gained:
+    """What adding the effects of these names brought (S. S. Wilks 1938). Where the fit begins had been chosen of so
+    many ``starts``."""
     from scipy.special import gammaincc
 
+    problem = added.problem
     gain = problem.deviance(added.before) - problem.deviance(added.after)
     which = [index for index, one in enumerate(added.effects) if one.effect.name in names]
     numbers = max(1, len(moves_of(added.effects, which)))

@@ -31,6 +31,7 @@ class Tolerance:
     scale        of each run's distance, as a share
     start_m      of where each run begins [m]
     wander_m     of the distance signal, after one second; it grows with the root of the time [m]
+    knot_s       between knots so far apart it is straight [s]
     gain         of the acceleration, as a share
     droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
                  each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
@@ -41,12 +42,11 @@ class Tolerance:
     scale: float = 0.0003
     start_m: float = 0.004
     wander_m: float = 0.004
+    knot_s: float = 2.0
     gain: float = 0.005
     droop: float = 0.4
 
 
-KNOT_S = 2.0
-"""The wander of a distance signal is straight between knots so far apart."""
 _LENGTHS = ("cg_distance_m", "contact_patch_m")
 # Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
 _STEP, _LENGTH_STEP = 0.002, 1e-4
@@ -124,6 +124,18 @@ class Wander:
         rise = rate_of_change(prediction, run.rate_hz)
         return np.asarray(prediction + k[-_RECORDER:] @ _by_recorder(prediction, rise, run))
 
+    def through(self, moved_m: Array, run: Run) -> Array:
+        """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""
+        places = self.count - 1 - _RECORDER
+        at = np.linspace(0, run.count - 1, places)
+        return np.concatenate([np.interp(at, np.arange(run.count), moved_m), np.zeros(1 + _RECORDER)])
+
+    def does(self, k: Array, prediction: Array, run: Run) -> Array:
+        """What so much of k does to a prediction (n,), to first order: (n,) [m/s2]."""
+        rise = rate_of_change(prediction, run.rate_hz)
+        by_place = rise / np.maximum(run.speed_mps, _SLOWEST_MPS)
+        return np.asarray(self.moved_m(k) * by_place + k[-_RECORDER:] @ _by_recorder(prediction, rise, run))
+
     def columns(self, prediction: Array, run: Run) -> Array:
         """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
         rise = rate_of_change(prediction, run.rate_hz)
@@ -158,7 +170,7 @@ _DIFFERENCES = np.array([
 def wander_of(run: Run, tolerance: Tolerance) -> Wander:
     """The wander that is granted to a run."""
     time_s = np.arange(run.count) / run.rate_hz
-    knots = max(2, round(time_s[-1] / KNOT_S) + 1)
+    knots = max(2, round(time_s[-1] / tolerance.knot_s) + 1)
     place = time_s / time_s[-1] * (knots - 1)
     hats = np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(knots)))
     basis = np.column_stack([hats, run.distance_m - run.distance_m[0]])

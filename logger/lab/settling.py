@@ -26,9 +26,9 @@ def aligned(problem: Problem, state: State) -> State:
     is far off, in which the car's numbers would be bent."""
     numbers, least = len(state.logs), problem.deviance(state)
     for _ in range(_ALIGNING_ROUNDS):
-        columns = [np.vstack([np.zeros((numbers, len(prediction))), one.columns(prediction, run)])
-                   for one, prediction, run in zip(problem.wander, state.predictions, problem.runs.runs, strict=True)]
-        weighed = Weighed(problem, Slopes(columns, state.wander, state.names), problem.whiteners(state), still=True)
+        nothing = [np.zeros((numbers, len(prediction))) for prediction in state.predictions]
+        slopes = Slopes(nothing, state.predictions, state.wander, state.names)
+        weighed = Weighed(problem, slopes, problem.whiteners(state), still=True)
         trial = improved(weighed, state, [], _STEPS, laid_out=True)
         gained = least - problem.deviance(trial)
         if gained > 0:
@@ -43,8 +43,9 @@ def settled(problem: Problem, state: State, rounds: int = 6, slopes: Slopes | No
     """A model fitted in full, its effects' numbers included: slopes and weights are taken anew until little is gained.
 
     slopes    taken near the state before; None: they are taken now
-    worth     the share of what there is to explain that a round has to gain to be worth another one: of what is left,
-    beside    and of what was gained over a model of this deviance
+    worth     the share of what there is to explain that a round has to gain to be worth another one
+    beside    deviance of a model without what is fitted: what was gained over it counts as to be explained too; None:
+              only what is left does
 
     Returns the most likely state that was met, laid out, and slopes taken near it.
     """

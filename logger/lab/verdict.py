@@ -93,6 +93,9 @@ def summary(found: Verdict) -> list[str]:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
         lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "
                      "vehicle's file is wrong there, or something else is missing that no candidate explains.")
+    if diagnosis.moved_m > 0:
+        lines.append("The distances of these runs wander by more than usual: the runs were laid where the model finds "
+                     f"them, up to {diagnosis.moved_m:.2g} m from where they were recorded.")
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]

@@ -1,0 +1,177 @@
+"""By how much the distances of some runs wander: no more than it takes to lay the runs where they were driven.
+
+Problem: one recorder's distance is right to millimetres after a minute, another integrates a speed that is off by some
+centimetres a second, now more and now less. A lab that grants only the little takes the much for missing physics, and
+one that grants the much lets it swallow effects. Solution: the runs are followed along the road as a model goes there,
+and laid out with wanders of growing size, with knots as close as each size asks for. The size with the greatest
+evidence is taken: the likelihood with the wander integrated out, by Laplace's approximation (D. J. C. MacKay, Neural
+Computation 4, 1992). If that is more than usual, the runs get the distances that they then have, and what is left to
+wander is as usual. A wrong factor or a late clock, which is one for all of the runs, stays for the effects to explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.alignment import followed_m
+from logger.lab.fitting import Problem, State, wander_information
+from logger.lab.nuisance import Tolerance
+from logger.lab.prediction import Run, Runs
+from logger.lab.settling import aligned
+from logger.lab.stretches import Whitener
+
+Array = npt.NDArray[np.float64]
+
+_LARGER = ((0.012, 1.0), (0.03, 0.5), (0.08, 0.25))
+"""Wanders after one second [m], and how far apart their knots are [s]."""
+_ANY_SCALE, _ANY_START_M = 0.05, 3.0
+ASTRAY = 0.7
+"""A model with a larger error, so that it explains less than half of the power, may lie elsewhere than the runs do."""
+_SMOOTH_S = 1.0
+_CLEARLY, _MUCH = 20.0, 500.0
+"""What a larger wander, or a factor or delay for all runs, has to gain in minus twice the logarithm of likelihood; and
+what such a one has to gain beside a larger wander, as a model that lacks something seems early or late as well."""
+_PROMISING = 0.4
+_FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
+
+
+@dataclass(frozen=True, eq=False)
+class _Laid:
+    """A problem on all stretches with a size of wander, the model where its runs lie then, and what evidence that
+    lacks: minus twice its logarithm, but for a constant."""
+
+    problem: Problem
+    state: State
+    lost: float
+
+
+def lying(problem: Problem, state: State) -> tuple[Problem, State]:
+    """The problem with its runs where they lie beside a model as it was given, and the model there."""
+    there = aligned(problem, state)
+    laid = relaid(problem, there, problem)
+    return (problem, there) if laid is problem else (laid, on_recorded(laid, state))
+
+
+def on_recorded(problem: Problem, state: State) -> State:
+    """A model aligned with runs from where these have it."""
+    return aligned(problem, problem.laid_out(state.effects, state.logs, [np.zeros_like(k) for k in state.wander]))
+
+
+def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
+    """The problem with its runs where they lie beside a model, if their distances wander by more than is granted; else
+    the problem itself.
+
+    state       laid out where it lies in the problem
+    recorded    the problem with the runs where they were recorded
+    """
+    usual = problem.tolerance
+    if problem.judged_error(state) < ASTRAY and not _promises(problem, state):
+        return problem
+    own = _best_size(recorded, state, usual)
+    if own.problem.tolerance == usual:
+        return problem
+    # One factor or one delay of all runs may be what seems to wander, or be there besides.
+    anywhere = replace(usual, scale=_ANY_SCALE, start_m=_ANY_START_M)
+    moved = _best_size(recorded, state, anywhere)
+    common = _common(usual, moved)
+    if _laid(_over(recorded, moved.problem.moved_m(common)).granting(anywhere), state).lost < own.lost - _CLEARLY:
+        return problem
+    if moved.lost < own.lost - _MUCH:
+        return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
+            [k - one for k, one in zip(moved.state.wander, common, strict=True)]))
+    return _over(problem.over(own.problem.runs), own.problem.moved_m(own.state.wander))
+
+
+def _over(problem: Problem, farther_m: Sequence[Array]) -> Problem:
+    """The problem with its runs farther than they were by these (n,) [m]."""
+    runs = [replace(run, distance_m=run.distance_m + farther)
+            for run, farther in zip(problem.runs.runs, farther_m, strict=True)]
+    return problem.over(Runs(runs, problem.runs.fine_hz))
+
+
+def moved_m(recorded: Problem, problem: Problem) -> float:
+    """By how much the runs of a problem lie elsewhere than they were recorded, at most [m]."""
+    return max(float(np.abs(one.distance_m - other.distance_m).max())
+               for one, other in zip(problem.runs.runs, recorded.runs.runs, strict=True))
+
+
+def _promises(problem: Problem, state: State) -> bool:
+    """Whether a larger wander may well be worth it, to first order: that takes no simulation."""
+    wander_m, knot_s = _LARGER[1]
+    larger = problem.granting(replace(problem.tolerance, wander_m=wander_m, knot_s=knot_s))
+    gain = price = 0.0
+    for one, prediction, run, left, stretches in zip(larger.wander, state.predictions, larger.runs.runs,
+                                                     larger.residuals(state), larger.stretches, strict=True):
+        whitener = Whitener(stretches, stretches.cells(left))
+        white = whitener(one.columns(prediction, run))
+        pull, information = white @ whitener(left), white @ white.T + one.precision
+        gain += float(pull @ np.linalg.solve(information, pull))
+        price += float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(one.precision)[1])
+    return gain > _PROMISING * price
+
+
+def _best_size(problem: Problem, state: State, tolerance: Tolerance) -> _Laid:
+    """The size of wander with the most evidence beside a tolerance for the rest: the usual one unless another is
+    clearly better. The middle one comes first: where that is no better, the largest is not either."""
+    usual = _laid(problem.granting(tolerance), state)
+    smooth = problem.over(Runs([replace(run, distance_m=_smooth(run)) for run in problem.runs.runs],
+                               problem.runs.fine_hz))
+    small, middle, large = (replace(tolerance, wander_m=wander_m, knot_s=knot_s) for wander_m, knot_s in _LARGER)
+    best = _laid(smooth.granting(middle), state)
+    if best.lost < usual.lost:
+        best = min(best, _laid(smooth.granting(large), state), key=lambda one: one.lost)
+    if best.problem.tolerance != large:
+        best = min(best, _laid(smooth.granting(small), state), key=lambda one: one.lost)
+    return best if best.lost < usual.lost - _CLEARLY else usual
+
+
+def _smooth(run: Run) -> Array:
+    """The distance (n,) of a run without what no car's speed does within a second, which is the signal's own [m]."""
+    from scipy.signal import savgol_filter
+
+    size = min(round(_SMOOTH_S * run.rate_hz), run.count - 1) // 2 * 2 + 1
+    return np.asarray(savgol_filter(run.distance_m, size, 3)) if size > 3 else run.distance_m
+
+
+def _laid(problem: Problem, state: State) -> _Laid:
+    there = _laid_where_followed(problem, state)
+    lost = problem.deviance(there) + sum(
+        float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(wander.precision)[1])
+        for information, wander in zip(wander_information(problem, there), problem.wander, strict=True))
+    return _Laid(problem, there, lost)
+
+
+def _laid_where_followed(problem: Problem, state: State) -> State:
+    """A model laid out where the runs lie, beginning as they were recorded or where they are followed along the road,
+    whichever is likelier."""
+    nowhere = [np.zeros(one.count) for one in problem.wander]
+    best = aligned(problem, problem.laid_out(state.effects, state.logs, nowhere))
+    for _ in range(_FOLLOWED):
+        there = aligned(problem, problem.laid_out(state.effects, state.logs, _followed(problem, best)))
+        if problem.deviance(there) > problem.deviance(best) - _CLEARLY:
+            break
+        best = there
+    return best
+
+
+def _followed(problem: Problem, state: State) -> list[Array]:
+    """The wander with which a model goes where the runs are found to lie beside it, (k,) per run."""
+    return [wander.through(now + followed_m(run, prediction), run) for wander, now, run, prediction in zip(
+        problem.wander, problem.moved_m(state.wander), problem.runs.runs, state.predictions, strict=True)]
+
+
+def _common(tolerance: Tolerance, found: _Laid) -> list[Array]:
+    """What of the wander (k,) of each run is one factor and one delay that all runs have (generalised least squares,
+    with factors and starts as a tolerance has them)."""
+    problem = found.problem.granting(replace(found.problem.tolerance, scale=tolerance.scale, start_m=tolerance.start_m))
+    along = [np.stack([one.through(run.distance_m - run.distance_m[0], run), one.through(run.speed_mps, run)])
+             for one, run in zip(problem.wander, problem.runs.runs, strict=True)]
+    sizes = np.sum([one @ prior.precision @ one.T for one, prior in zip(along, problem.wander, strict=True)], axis=0)
+    pulls = np.sum([one @ prior.precision @ k for one, prior, k in zip(
+        along, problem.wander, found.state.wander, strict=True)], axis=0)
+    factor_and_delay = np.linalg.lstsq(sizes, pulls, rcond=None)[0]
+    return [factor_and_delay @ one for one in along]
