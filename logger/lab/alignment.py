@@ -77,7 +77,8 @@ def followed_m(run: Run, prediction: Array) -> Array:
     if not rows.size:
         return np.zeros(run.count)
     _, along_m, lag_s, _, speed_mps = rows
-    return np.asarray(np.interp(run.distance_m - run.distance_m[0], along_m, -lag_s * speed_mps))
+    places_m = np.maximum.accumulate(along_m)
+    return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -lag_s * speed_mps))
 
 
 def drift(windows: Alignment) -> Trend:

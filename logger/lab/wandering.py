@@ -26,8 +26,10 @@ from logger.lab.stretches import Whitener
 
 Array = npt.NDArray[np.float64]
 
-_LARGER = ((0.012, 1.0), (0.03, 0.5), (0.08, 0.25))
+_SMALL, _MIDDLE, _LARGE = (0.012, 1.0), (0.03, 0.5), (0.08, 0.25)
 """Wanders after one second [m], and how far apart their knots are [s]."""
+_MOST_KNOTS_BY_SAMPLES = 6e6
+"""A run with more is too long for so many knots: they would take too much memory."""
 _ANY_SCALE, _ANY_START_M = 0.05, 3.0
 ASTRAY = 0.7
 """A model with a larger error, so that it explains less than half of the power, may lie elsewhere than the runs do."""
@@ -36,6 +38,7 @@ _CLEARLY, _MUCH = 20.0, 500.0
 """What a larger wander, or a factor or delay for all runs, has to gain in minus twice the logarithm of likelihood; and
 what such a one has to gain beside a larger wander, as a model that lacks something seems early or late as well."""
 _PROMISING = 0.4
+_BLOCK_S, _LEAST_BLOCKS, _CHANCE = 10.0, 4, 1e-3
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
 
 
@@ -83,7 +86,25 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     if moved.lost < own.lost - _MUCH:
         return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
             [k - one for k, one in zip(moved.state.wander, common, strict=True)]))
-    return _over(problem.over(own.problem.runs), own.problem.moved_m(own.state.wander))
+    return _over(problem.over(own.problem.runs), _without_factor(own.problem.runs.runs,
+                                                                 own.problem.moved_m(own.state.wander)))
+
+
+def _without_factor(runs: Sequence[Run], farther_m: Sequence[Array]) -> list[Array]:
+    """By how much runs are farther than recorded (n,) [m], but for one factor of all of them, if there is one: if what
+    they gain in each length of time says so (Student's test)."""
+    from scipy.stats import ttest_1samp
+
+    shares: list[float] = []
+    for run, farther in zip(runs, farther_m, strict=True):
+        ends = np.arange(run.first, run.count, round(_BLOCK_S * run.rate_hz))
+        way = np.diff(run.distance_m[ends])
+        shares += list((np.diff(farther[ends]) / way)[way > 0])
+    if len(shares) < _LEAST_BLOCKS or not ttest_1samp(shares, 0.0).pvalue < _CHANCE:
+        return list(farther_m)
+    factor = float(np.mean(shares))
+    return [farther - factor * (run.distance_m - run.distance_m[0])
+            for run, farther in zip(runs, farther_m, strict=True)]
 
 
 def _over(problem: Problem, farther_m: Sequence[Array]) -> Problem:
@@ -101,8 +122,9 @@ def moved_m(recorded: Problem, problem: Problem) -> float:
 
 def _promises(problem: Problem, state: State) -> bool:
     """Whether a larger wander may well be worth it, to first order: that takes no simulation."""
-    wander_m, knot_s = _LARGER[1]
-    larger = problem.granting(replace(problem.tolerance, wander_m=wander_m, knot_s=knot_s))
+    if not _in_reach(problem, _MIDDLE):
+        return _in_reach(problem, _SMALL)
+    larger = problem.granting(_sized(problem.tolerance, _MIDDLE))
     gain = price = 0.0
     for one, prediction, run, left, stretches in zip(larger.wander, state.predictions, larger.runs.runs,
                                                      larger.residuals(state), larger.stretches, strict=True):
@@ -120,13 +142,22 @@ def _best_size(problem: Problem, state: State, tolerance: Tolerance) -> _Laid:
     usual = _laid(problem.granting(tolerance), state)
     smooth = problem.over(Runs([replace(run, distance_m=_smooth(run)) for run in problem.runs.runs],
                                problem.runs.fine_hz))
-    small, middle, large = (replace(tolerance, wander_m=wander_m, knot_s=knot_s) for wander_m, knot_s in _LARGER)
-    best = _laid(smooth.granting(middle), state)
-    if best.lost < usual.lost:
-        best = min(best, _laid(smooth.granting(large), state), key=lambda one: one.lost)
-    if best.problem.tolerance != large:
-        best = min(best, _laid(smooth.granting(small), state), key=lambda one: one.lost)
+    best = usual
+    for size in (_MIDDLE, _LARGE, _SMALL):
+        needless = best is usual if size is _LARGE else best.problem.tolerance == _sized(tolerance, _LARGE)
+        if not needless and _in_reach(problem, size):
+            best = min(best, _laid(smooth.granting(_sized(tolerance, size)), state), key=lambda one: one.lost)
     return best if best.lost < usual.lost - _CLEARLY else usual
+
+
+def _sized(tolerance: Tolerance, size: tuple[float, float]) -> Tolerance:
+    """A tolerance with this size of wander."""
+    return replace(tolerance, wander_m=size[0], knot_s=size[1])
+
+
+def _in_reach(problem: Problem, size: tuple[float, float]) -> bool:
+    """Whether no run is too long for the knots of a size."""
+    return all(run.count**2 / run.rate_hz / size[1] < _MOST_KNOTS_BY_SAMPLES for run in problem.runs.runs)
 
 
 def _smooth(run: Run) -> Array:
