@@ -78,7 +78,7 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     if own.problem.tolerance == usual:
         return problem
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
-    anywhere = replace(usual, scale=_ANY_SCALE, start_m=_ANY_START_M)
+    anywhere = _anywhere(usual)
     moved = _best_size(recorded, state, anywhere)
     common = _common(usual, moved)
     if _laid(_over(recorded, moved.problem.moved_m(common)).granting(anywhere), state).lost < own.lost - _CLEARLY:
@@ -121,19 +121,35 @@ def moved_m(recorded: Problem, problem: Problem) -> float:
 
 
 def _promises(problem: Problem, state: State) -> bool:
-    """Whether a larger wander may well be worth it, to first order: that takes no simulation."""
-    if not _in_reach(problem, _MIDDLE):
-        return _in_reach(problem, _SMALL)
-    larger = problem.granting(_sized(problem.tolerance, _MIDDLE))
+    """Whether a larger wander may well be worth it, and more so than a factor and a start of each run, to first order:
+    that takes no simulation."""
+    usual = problem.tolerance
+    likely, moved = False, _gain_and_price(problem, state, _anywhere(usual))
+    for size in (_SMALL, _MIDDLE):
+        if _in_reach(problem, size):
+            gain, price = _gain_and_price(problem, state, _sized(usual, size))
+            likely = likely or (gain > _PROMISING * price and gain - price > moved[0] - moved[1])
+    return likely
+
+
+def _gain_and_price(problem: Problem, state: State, tolerance: Tolerance) -> tuple[float, float]:
+    """What wander of this tolerance, from where a model lies, would gain in minus twice the logarithm of likelihood,
+    and what its freedom costs in evidence; to first order."""
+    other = problem.granting(tolerance)
     gain = price = 0.0
-    for one, prediction, run, left, stretches in zip(larger.wander, state.predictions, larger.runs.runs,
-                                                     larger.residuals(state), larger.stretches, strict=True):
+    for one, prediction, run, left, stretches in zip(other.wander, state.predictions, other.runs.runs,
+                                                     other.residuals(state), other.stretches, strict=True):
         whitener = Whitener(stretches, stretches.cells(left))
         white = whitener(one.columns(prediction, run))
         pull, information = white @ whitener(left), white @ white.T + one.precision
         gain += float(pull @ np.linalg.solve(information, pull))
         price += float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(one.precision)[1])
-    return gain > _PROMISING * price
+    return gain, price
+
+
+def _anywhere(tolerance: Tolerance) -> Tolerance:
+    """A tolerance with any factor and any start of each run."""
+    return replace(tolerance, scale=_ANY_SCALE, start_m=_ANY_START_M)
 
 
 def _best_size(problem: Problem, state: State, tolerance: Tolerance) -> _Laid:
