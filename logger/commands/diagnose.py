@@ -81,9 +81,11 @@ def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
     tell = on_screen()
     effects = {name: effect for name, effect in given.effects.items() if name not in left_out}
     try:
-        found = diagnose(given.problem(whole=False, firm=True), effects, given.model.effects, tell)
-        finely = found.problem.start(given.model.effects)  # a search simulates less finely
-        return told(replace(found, baseline_error=found.problem.error(finely)), effects, tell)
+        recorded = given.problem(whole=False, firm=True)
+        found = diagnose(recorded, effects, given.model.effects, tell)
+        finely = recorded.entire()  # a search simulates less finely
+        said_error = finely.error(finely.start(given.model.effects))
+        return told(replace(found, baseline_error=said_error), effects, tell)
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     finally:

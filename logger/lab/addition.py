@@ -17,7 +17,7 @@ from logger.identification.parameters import read
 from logger.lab.fitting import Problem, Slopes, State
 from logger.lab.settling import settled
 from logger.lab.spread import with_spread
-from logger.lab.wandering import relaid
+from logger.lab.wandering import moved_m, relaid
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
@@ -46,7 +46,7 @@ class Added:
     error_refitted     of those with their numbers refitted and the distance's wander taken out
     error_after        of the model with the effects, fitted in the same way
     error_as_written   of that model without the wander taken out: what a comparison with it begins at
-    problem            with its runs where they lie beside that model
+    problem            with its runs where they lie beside that model, and by how much they were moved for that, at most
     """
 
     vehicle: Vehicle
@@ -57,6 +57,7 @@ class Added:
     error_after: float
     error_as_written: float
     problem: Problem
+    moved_m: float
     before: State
     after: State
 
@@ -86,7 +87,7 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
     )
     written = recorded.laid_out(after.effects, after.logs, [np.zeros_like(k) for k in after.wander])
     return Added(vehicle, effects, numbers, recorded.error(recorded.start(present)), problem.error(before),
-                 problem.error(after), recorded.error(written), problem, before, after)
+                 problem.error(after), recorded.error(written), problem, moved_m(recorded, problem), before, after)
 
 
 def _without_and_with(problem: Problem, present: Sequence[Chosen],

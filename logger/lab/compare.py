@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab import wandering
 from logger.lab.beside import Beside, Located, Part, located
 from logger.lab.fitting import Problem
 from logger.lab.marks import Mark, Marks, read_marks
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Runs, error
 from logger.lab.settling import settled
-from logger.lab.wandering import relaid
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -51,6 +51,7 @@ class Comparison:
     refitted    with its numbers and the distances refitted within what they are usually off
     moves       by which share each number of the car, and of its effects, moved for that
     far         those that moved farther than such numbers are usually off, the farthest first
+    moved_m     by how much a run was laid elsewhere than it was recorded for that, at most
     marks       of what the refitted model leaves
     """
 
@@ -60,6 +61,7 @@ class Comparison:
     refitted: Standing
     moves: Mapping[str, float]
     far: tuple[str, ...]
+    moved_m: float
     marks: Marks
 
     @property
@@ -78,25 +80,26 @@ def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = (), given:
     """
     car = compose(vehicle, effects)
     plain = _standing(Beside(runs.runs, car, runs.predict(car), runs.respond(car)))
-    refitted, moves, far = _refitted(runs, vehicle, effects, plain, given)
-    return Comparison(vehicle.name, tuple(effects), plain, refitted, moves, far,
+    refitted, moves, far, farther_m = _refitted(runs, vehicle, effects, plain, given)
+    return Comparison(vehicle.name, tuple(effects), plain, refitted, moves, far, farther_m,
                       read_marks(refitted.beside, refitted.where, plain.beside))
 
 
 def _refitted(
     runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen], plain: Standing, given: Vehicle | None,
-) -> tuple[Standing, dict[str, float], tuple[str, ...]]:
-    """The model refitted, how its numbers moved, and which of them far. One that is no better than the plain model is
-    the plain one: the fit weighs every frequency by its noise, and may buy a better top with a worse body bounce."""
+) -> tuple[Standing, dict[str, float], tuple[str, ...], float]:
+    """The model refitted, how its numbers moved, which of them far, and how far the runs. One that is no better than
+    the plain model is the plain one: the fit weighs every frequency by its noise, and may buy a better top with a worse
+    body bounce."""
     problem = Problem(runs, given or vehicle, Tolerance(), whole=True, stands=vehicle)
     names = problem.nuisance.names
     state, _ = settled(problem, problem.start(effects))
-    laid = relaid(problem, state, problem)
+    recorded, laid = problem, wandering.relaid(problem, state, problem)
     if laid is not problem:
         problem, runs = laid, laid.runs
         state, _ = settled(problem, problem.start(effects))
     if problem.error(state) > plain.error:
-        return plain, dict.fromkeys(names, 0.0), ()
+        return plain, dict.fromkeys(names, 0.0), (), 0.0
     car = problem.car(state.effects, state.logs)
     responses = runs.respond(car, problem.moved_m(state.wander))
     away = np.abs(state.logs / problem.nuisance.deviations)
@@ -105,7 +108,8 @@ def _refitted(
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
-    return _standing(Beside(runs.runs, car, state.predictions, responses)), moves, far
+    refitted = _standing(Beside(runs.runs, car, state.predictions, responses))
+    return refitted, moves, far, wandering.moved_m(recorded, problem)
 
 
 def _standing(beside: Beside) -> Standing:
@@ -130,6 +134,7 @@ def headline(found: Comparison) -> list[str]:
                      "left.")
     else:
         lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
+    lines += wandering.told(found.moved_m)
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
         lines.append(f"The refit moved {named}, farther than such numbers are usually off: something missing in the "

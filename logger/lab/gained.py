@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from logger.lab import wandering
 from logger.lab.addition import Added
 from logger.lab.fitting import moves_of
 from logger.lab.noise import floor_error, noise_of
@@ -124,6 +125,7 @@ def errors(found: Gained) -> list[tuple[str, float, str]]:
 def judgement(found: Gained) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
     lines = [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
+    lines += wandering.told(found.added.moved_m)
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if not parameter.choices
               and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)

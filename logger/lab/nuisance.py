@@ -124,6 +124,11 @@ class Wander:
         rise = rate_of_change(prediction, run.rate_hz)
         return np.asarray(prediction + k[-_RECORDER:] @ _by_recorder(prediction, rise, run))
 
+    @property
+    def by_factor(self) -> Array:
+        """The numbers (k,) of a distance that is longer by one times itself."""
+        return np.asarray(np.eye(self.count)[-1 - _RECORDER])
+
     def through(self, moved_m: Array, run: Run) -> Array:
         """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""
         places = self.count - 1 - _RECORDER

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from logger.lab import wandering
 from logger.lab.blind import Blind, blind
 from logger.lab.diagnosis import CHANCE, LEAST_OF_LEFT, Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
@@ -93,9 +94,7 @@ def summary(found: Verdict) -> list[str]:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
         lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "
                      "vehicle's file is wrong there, or something else is missing that no candidate explains.")
-    if diagnosis.moved_m > 0:
-        lines.append("The distances of these runs wander by more than usual: the runs were laid where the model finds "
-                     f"them, up to {diagnosis.moved_m:.2g} m from where they were recorded.")
+    lines += wandering.told(diagnosis.moved_m)
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]

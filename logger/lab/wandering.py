@@ -28,8 +28,8 @@ Array = npt.NDArray[np.float64]
 
 _SMALL, _MIDDLE, _LARGE = (0.012, 1.0), (0.03, 0.5), (0.08, 0.25)
 """Wanders after one second [m], and how far apart their knots are [s]."""
-_MOST_KNOTS_BY_SAMPLES = 6e6
-"""A run with more is too long for so many knots: they would take too much memory."""
+_MOST_KNOTS, _MOST_KNOTS_BY_SAMPLES = 3000, 2.4e7
+"""Runs that have more, together, are too long for so close knots: they would take too much memory."""
 _ANY_SCALE, _ANY_START_M = 0.05, 3.0
 ASTRAY = 0.7
 """A model with a larger error, so that it explains less than half of the power, may lie elsewhere than the runs do."""
@@ -38,7 +38,7 @@ _CLEARLY, _MUCH = 20.0, 500.0
 """What a larger wander, or a factor or delay for all runs, has to gain in minus twice the logarithm of likelihood; and
 what such a one has to gain beside a larger wander, as a model that lacks something seems early or late as well."""
 _PROMISING = 0.4
-_BLOCK_S, _LEAST_BLOCKS, _CHANCE = 10.0, 4, 1e-3
+_BLOCK_S, _SLOWEST_MPS, _LEAST_BLOCKS, _CHANCE = 10.0, 1.0, 4, 1e-3
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
 
 
@@ -66,7 +66,7 @@ def on_recorded(problem: Problem, state: State) -> State:
 
 def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     """The problem with its runs where they lie beside a model, if their distances wander by more than is granted; else
-    the problem itself.
+    as they were recorded. The problem itself if it is good enough.
 
     state       laid out where it lies in the problem
     recorded    the problem with the runs where they were recorded
@@ -76,13 +76,13 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
         return problem
     own = _best_size(recorded, state, usual)
     if own.problem.tolerance == usual:
-        return problem
+        return recorded
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
     anywhere = _anywhere(usual)
     moved = _best_size(recorded, state, anywhere)
     common = _common(usual, moved)
     if _laid(_over(recorded, moved.problem.moved_m(common)).granting(anywhere), state).lost < own.lost - _CLEARLY:
-        return problem
+        return recorded
     if moved.lost < own.lost - _MUCH:
         return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
             [k - one for k, one in zip(moved.state.wander, common, strict=True)]))
@@ -99,7 +99,7 @@ def _without_factor(runs: Sequence[Run], farther_m: Sequence[Array]) -> list[Arr
     for run, farther in zip(runs, farther_m, strict=True):
         ends = np.arange(run.first, run.count, round(_BLOCK_S * run.rate_hz))
         way = np.diff(run.distance_m[ends])
-        shares += list((np.diff(farther[ends]) / way)[way > 0])
+        shares += list((np.diff(farther[ends]) / way)[way > _SLOWEST_MPS * _BLOCK_S])
     if len(shares) < _LEAST_BLOCKS or not ttest_1samp(shares, 0.0).pvalue < _CHANCE:
         return list(farther_m)
     factor = float(np.mean(shares))
@@ -118,6 +118,14 @@ def moved_m(recorded: Problem, problem: Problem) -> float:
     """By how much the runs of a problem lie elsewhere than they were recorded, at most [m]."""
     return max(float(np.abs(one.distance_m - other.distance_m).max())
                for one, other in zip(problem.runs.runs, recorded.runs.runs, strict=True))
+
+
+def told(farther_m: float) -> list[str]:
+    """What a person should know of runs that were laid elsewhere, by so much at most [m]."""
+    if farther_m == 0:
+        return []
+    return ["The distances of these runs wander by more than usual: the runs were laid where the model finds them, up "
+            f"to {farther_m:.2g} m from where they were recorded."]
 
 
 def _promises(problem: Problem, state: State) -> bool:
@@ -172,8 +180,10 @@ def _sized(tolerance: Tolerance, size: tuple[float, float]) -> Tolerance:
 
 
 def _in_reach(problem: Problem, size: tuple[float, float]) -> bool:
-    """Whether no run is too long for the knots of a size."""
-    return all(run.count**2 / run.rate_hz / size[1] < _MOST_KNOTS_BY_SAMPLES for run in problem.runs.runs)
+    """Whether the runs are not too long for the knots of a size."""
+    knots = [run.count / run.rate_hz / size[1] for run in problem.runs.runs]
+    by_samples = sum(number * run.count for number, run in zip(knots, problem.runs.runs, strict=True))
+    return sum(knots) < _MOST_KNOTS and by_samples < _MOST_KNOTS_BY_SAMPLES
 
 
 def _smooth(run: Run) -> Array:
@@ -212,10 +222,10 @@ def _followed(problem: Problem, state: State) -> list[Array]:
 
 
 def _common(tolerance: Tolerance, found: _Laid) -> list[Array]:
-    """What of the wander (k,) of each run is one factor and one delay that all runs have (generalised least squares,
-    with factors and starts as a tolerance has them)."""
+    """What of the wander (k,) of each run is one factor, of the scale that was fitted, and one delay that all runs have
+    (generalised least squares, with factors and starts as a tolerance has them)."""
     problem = found.problem.granting(replace(found.problem.tolerance, scale=tolerance.scale, start_m=tolerance.start_m))
-    along = [np.stack([one.through(run.distance_m - run.distance_m[0], run), one.through(run.speed_mps, run)])
+    along = [np.stack([one.by_factor, one.through(run.speed_mps, run)])
              for one, run in zip(problem.wander, problem.runs.runs, strict=True)]
     sizes = np.sum([one @ prior.precision @ one.T for one, prior in zip(along, problem.wander, strict=True)], axis=0)
     pulls = np.sum([one @ prior.precision @ k for one, prior, k in zip(

@@ -87,6 +87,17 @@ def test_an_effect_is_added_where_the_runs_lie() -> None:
     assert abs(tires.values[name] - 300.0) < 3 * tires.standard_errors[name] < 150.0
 
 
+@pytest.mark.parametrize("factor", [0.01, 0.04])
+def test_one_factor_of_all_runs_is_told_from_their_wander(factor: float) -> None:
+    problem = problem_of([with_wrong_speed(run, 0.05, 1.0, 3 + i) for i, run in enumerate(driven([]))])
+    runs = [replace(run, distance_m=(1 + factor) * run.distance_m) for run in problem.runs.runs]
+    wrong = problem.over(Runs(runs, 500.0))
+    laid, _ = wandering.lying(wrong, wrong.start())
+    for one, run in zip(laid.runs.runs, driven([]), strict=True):
+        left_m = one.distance_m - (1 + factor) * run.distance_m
+        assert abs(np.polyfit(run.distance_m, left_m, 1)[0]) < 0.15 * factor
+
+
 @pytest.mark.parametrize("effects", [[], [TIRES], [chosen(EFFECTS["speed_scale"], {"scale": 1.01})],
                                      [chosen(EFFECTS["time_offset"], {"delay_s": 0.06})]],
                          ids=["nothing", "an effect", "a factor", "a delay"])
@@ -117,6 +128,6 @@ def test_knots_go_through_what_is_straight_between_them() -> None:
 
 
 def test_a_run_too_long_for_close_knots_is_tried_with_fewer() -> None:
-    long = a_run("run", 5.0, 200.0, 1)
+    long = a_run("run", 5.0, 400.0, 1)
     assert not wandering._in_reach(problem_of([long]), (0.03, 0.5))
     assert wandering._in_reach(problem_of([long]), (0.012, 1.0))
