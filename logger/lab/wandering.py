@@ -72,8 +72,8 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     recorded    the problem with the runs where they were recorded
     """
     usual = problem.tolerance
-    if problem.judged_error(state) < ASTRAY and not _promises(problem, state):
-        return problem
+    if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
+        return problem  # runs that were laid beside a model that lacked more are looked at again in any case
     own = _best_size(recorded, state, usual)
     if own.problem.tolerance == usual:
         return recorded
