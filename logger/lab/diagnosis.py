@@ -214,9 +214,9 @@ def _before(problem: Problem, nominal: State) -> tuple[Problem, Base]:
 
 
 def _where_it_lies(recorded: Problem, problem: Problem, now: Base) -> tuple[Problem, Base]:
-    """The problem and a model with the runs where they lie beside it, if it leaves anything where they lie now, and
-    explains enough to tell."""
-    tells = now.unexplained > 0 and now.judged_error < ASTRAY
+    """The problem and a model with the runs where they lie beside it, if it leaves anything where they lie now, or they
+    do so only beside a model that lacked more; and if it explains enough to tell."""
+    tells = (now.unexplained > 0 or problem is not recorded) and now.judged_error < ASTRAY
     laid = relaid(problem, now.state, recorded) if tells else problem
     return (problem, now) if laid is problem else (laid, _on(laid, now))
 
