@@ -110,10 +110,11 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         problem = given.problem(whole=False, firm=True)
         tell("refitting the car's own numbers")
         nominal = problem.start(given.model.effects)
+        seen = misalignment(problem, nominal)
         problem, start = lying(problem, nominal)
         base = Base.of(problem, *settled(problem, start))
         tell(f"searching for {effect.name}")
-        tries = fitted(problem, base, screened(problem, base, effect, misalignment(problem, nominal)))
+        tries = fitted(problem, base, screened(problem, base, effect, seen))
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     choices = {one.name for one in effect.parameters if one.choices} & set(values)

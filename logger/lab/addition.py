@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from logger.identification.parameters import read
 from logger.lab.fitting import Problem, Slopes, State
 from logger.lab.settling import settled
@@ -85,7 +83,7 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
                read(vehicle, name), read(vehicle, name) * float(now))
         for name, was, now in zip(problem.nuisance.names, spread_before, spread, strict=True)
     )
-    written = recorded.laid_out(after.effects, after.logs, [np.zeros_like(k) for k in after.wander])
+    written = recorded.unmoved(after.effects, after.logs)
     return Added(vehicle, effects, numbers, recorded.error(recorded.start(present)), problem.error(before),
                  problem.error(after), recorded.error(written), problem, moved_m(recorded, problem), before, after)
 

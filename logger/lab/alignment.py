@@ -8,6 +8,7 @@ that is one time is a clock's, one that is one length is a position's, one that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,8 +64,12 @@ UNKNOWN = Trend(0.0, 0.0, float("nan"))
 
 def aligned(beside: Beside) -> Alignment:
     """The windows of a model beside its measurements."""
+    return _aligned(beside.runs, beside.predictions)
+
+
+def _aligned(runs: Sequence[Run], predictions: Sequence[Array]) -> Alignment:
     rows: list[tuple[float, ...]] = []
-    for number, (run, prediction) in enumerate(zip(beside.runs, beside.predictions, strict=True)):
+    for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
         rows += _windows(number, run, prediction)
     table = np.array(rows).reshape(-1, 5).T
     return Alignment(table[0].astype(np.intp), *table[1:])
@@ -73,12 +78,11 @@ def aligned(beside: Beside) -> Alignment:
 def followed_m(run: Run, prediction: Array) -> Array:
     """By how much the car seems to have been farther than a model of it (n,) [m], straight between windows in which
     both are alike; nothing where there are none."""
-    rows = np.array(_windows(0, run, prediction)).reshape(-1, 5).T
-    if not rows.size:
+    windows = _aligned([run], [prediction])
+    if not len(windows.run):
         return np.zeros(run.count)
-    _, along_m, lag_s, _, speed_mps = rows
-    places_m = np.maximum.accumulate(along_m)
-    return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -lag_s * speed_mps))
+    places_m = np.maximum.accumulate(windows.along_m)
+    return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))
 
 
 def drift(windows: Alignment) -> Trend:

@@ -39,7 +39,7 @@ from logger.lab.candidates import (
 from logger.lab.fitting import Problem, Slopes, State, located, steps_apart
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import settled
-from logger.lab.wandering import ASTRAY, lying, moved_m, on_recorded, relaid
+from logger.lab.wandering import ASTRAY, aligned_anew, lying, moved_m, relaid
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
 
 Progress = Callable[[str], None]
@@ -170,6 +170,19 @@ class _Taken:
         return self.tried.effect.name
 
 
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """How effects were taken: the problem with its runs where they lie at last, the model there without effects and
+    with those that were taken, these, what the first round tried, and the steps."""
+
+    problem: Problem
+    before: Base
+    now: Base
+    taken: list[_Taken]
+    first: list[Tried]
+    steps: list[Step]
+
+
 def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
              progress: Progress = lambda words: None, workers: int = 2) -> Diagnosis:
     """Find the effects of ``effects`` that the model, with those that are ``present``, lacks, in so many threads."""
@@ -178,29 +191,30 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     progress("refitting the car's own numbers")
     nominal = problem.start(present)
     seen = misalignment(problem, nominal)
-    said_error, said_judged_error = problem.error(nominal), problem.judged_error(nominal)
     recorded = problem
     problem, before = _before(recorded, nominal)
-    steps = [Step("the vehicle as its file says", said_judged_error),
+    steps = [Step("the vehicle as its file says", recorded.judged_error(nominal)),
              Step("its numbers refitted within what is granted", before.judged_error)]
-    problem, before, now, taken, first, further = _found(problem, recorded, before, left, seen, progress, workers)
-    if taken:  # on the way it was settled roughly
+    way = _way(problem, recorded, before, left, seen, progress, workers)
+    problem, before, now = way.problem, way.before, way.now
+    steps += way.steps
+    if way.taken:  # on the way it was settled roughly
         now = Base.of(problem, *settled(problem, now.state, slopes=now.slopes))
-        further[-1] = Step(further[-1].words, now.judged_error)
+        steps[-1] = Step(steps[-1].words, now.judged_error)
     on_the_way = now
-    now, taken = _reconsidered(problem, now, taken, len(present), progress)
+    now, taken = _reconsidered(problem, now, way.taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
     if now is not on_the_way:
-        further.append(Step("as it ends", now.judged_error))
+        steps.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
     whole = problem.entire()
     after, slopes = settled(whole, now.state, slopes=now.slopes, worth=_WORTH_SETTLING)
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
-        baseline_error=said_error, noise=noise, noise_floor_error=floor_error(whole, noise),
-        candidates=_listed(problem, after, first, taken, verdict), obstacles=obstacles, verdict=verdict,
-        excess=_excess(whole, after, noise), strained=_strained(whole, after), steps=(*steps, *further),
+        baseline_error=recorded.error(nominal), noise=noise, noise_floor_error=floor_error(whole, noise),
+        candidates=_listed(problem, after, way.first, taken, verdict), obstacles=obstacles, verdict=verdict,
+        excess=_excess(whole, after, noise), strained=_strained(whole, after), steps=tuple(steps),
         before=before.state, after=after, slopes=slopes, problem=whole,
         judged=any(one.judges for one in problem.stretches), moved_m=moved_m(recorded, problem),
     )
@@ -223,13 +237,12 @@ def _where_it_lies(recorded: Problem, problem: Problem, now: Base) -> tuple[Prob
 
 def _on(problem: Problem, now: Base) -> Base:
     """A model refitted over runs that lie elsewhere."""
-    return Base.of(problem, *settled(problem, on_recorded(problem, now.state)))
+    return Base.of(problem, *settled(problem, aligned_anew(problem, now.state)))
 
 
-def _found(problem: Problem, recorded: Problem, before: Base, effects: Sequence[Effect], seen: Misalignment,
-           progress: Progress, workers: int) -> tuple[Problem, Base, Base, list[_Taken], list[Tried], list[Step]]:
-    """The problem with its runs where they lie at last, the model there without effects and with those that were taken
-    one after the other, these, what the first round tried, and the steps.
+def _way(problem: Problem, recorded: Problem, before: Base, effects: Sequence[Effect], seen: Misalignment,
+         progress: Progress, workers: int) -> _Way:
+    """Effects taken one after the other, until none is there any more.
 
     recorded    the problem with the runs where they were recorded
     """
@@ -263,7 +276,7 @@ def _found(problem: Problem, recorded: Problem, before: Base, effects: Sequence[
             explained += earlier.left_by(now)
         steps.append(Step(f"with {best.effect.name}", now.judged_error))
         left = [one for one in left if one.name != best.effect.name]
-    return problem, before, now, taken, first, steps
+    return _Way(problem, before, now, taken, first, steps)
 
 
 def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:

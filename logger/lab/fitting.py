@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.nuisance import Nuisance, Tolerance, Wander, nuisance_of, wander_of
+from logger.lab.nuisance import Nuisance, Tolerance, Wander, WanderSlopes, nuisance_of, wander_of
 from logger.lab.prediction import Runs, error
 from logger.lab.stretches import Cells, Stretches, Whitener, deviance
 from logger.vehicle.compose import Car, compose
@@ -66,14 +66,14 @@ class State:
 class Slopes:
     """What the car's numbers and the wander do to the predictions of a model.
 
-    numbers        by the car's numbers: (p, n) per run
-    predictions    (n,) per run; what the wander does follows from them
-    anchor         the wander over which runs are laid out, (k,) per run
-    effects        names of the effects that the model had
+    numbers    by the car's numbers: (p, n) per run
+    wander     by the wander, per run
+    anchor     the wander over which runs are laid out, (k,) per run
+    effects    names of the effects that the model had
     """
 
     numbers: list[Array]
-    predictions: list[Array]
+    wander: list[WanderSlopes]
     anchor: list[Array]
     effects: tuple[str, ...]
 
@@ -92,7 +92,7 @@ class Problem:
 
     def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
                  stands: Vehicle | None = None, firm: bool = False) -> None:
-        self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
+        self.runs, self.vehicle, self.tolerance, self.whole = runs, vehicle, tolerance, whole
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
         self._stands = stands or vehicle
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
@@ -110,8 +110,7 @@ class Problem:
 
     def over(self, runs: Runs) -> Problem:
         """The same over other runs."""
-        whole = not any(one.judges for one in self.stretches)
-        return Problem(runs, self.vehicle, self.tolerance, whole, self._stands, self.nuisance.firm)
+        return Problem(runs, self.vehicle, self.tolerance, self.whole, self._stands, self.nuisance.firm)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -125,6 +124,10 @@ class Problem:
         """A state whose predictions are made anew, over the road as the wander has it."""
         return State(effects, logs, wander, self._recorded(effects, logs, wander))
 
+    def unmoved(self, effects: Sequence[Chosen], logs: Array) -> State:
+        """The same over the road as the runs have it."""
+        return self.laid_out(tuple(effects), logs, [np.zeros(one.count) for one in self.wander])
+
     def _recorded(self, effects: tuple[Chosen, ...], logs: Array, wander: Sequence[Array],
                   rough: bool = False) -> list[Array]:
         predictions = self.runs.predict(self.car(effects, logs), self.moved_m(wander), rough)
@@ -133,8 +136,7 @@ class Problem:
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
         """The car as it stands."""
-        return self.laid_out(tuple(effects), self.nuisance.logs(self.vehicle, self._stands),
-                             [np.zeros(one.count) for one in self.wander])
+        return self.unmoved(effects, self.nuisance.logs(self.vehicle, self._stands))
 
     def residuals(self, state: State) -> list[Array]:
         """Measured minus predicted (n,), per run."""
@@ -189,23 +191,20 @@ class Problem:
             shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
             for column, there, here in zip(by_number, shifted, unmoved, strict=True):
                 column[index] = (there - here) / step[index]
-        return Slopes(by_number, state.predictions, [k.copy() for k in state.wander], state.names)
+        return Slopes(by_number, self.wander_slopes(state), [k.copy() for k in state.wander], state.names)
 
-    def columns(self, slopes: Slopes) -> Iterator[Array]:
-        """Slopes by the car's numbers, then by the wander (p + k, n), run by run: they take much memory."""
-        for numbers, wander, prediction, run in zip(slopes.numbers, self.wander, slopes.predictions, self.runs.runs,
-                                                    strict=True):
-            yield np.vstack([numbers, wander.columns(prediction, run)])
+    def wander_slopes(self, state: State) -> list[WanderSlopes]:
+        """Beside a state."""
+        return [one.slopes(prediction, run)
+                for one, prediction, run in zip(self.wander, state.predictions, self.runs.runs, strict=True)]
 
     def predicted(self, effects: tuple[Chosen, ...], logs: Array, wander: list[Array], slopes: Slopes,
                   rough: bool = False) -> State:
         """A state whose wander is counted to first order from the anchor of the slopes; or one that is only good for
         being compared with another such (``rough``)."""
         predictions = [
-            prediction + one.does(k - anchor, before, run)
-            for prediction, one, k, anchor, before, run in zip(
-                self._recorded(effects, logs, slopes.anchor, rough), self.wander, wander, slopes.anchor,
-                slopes.predictions, self.runs.runs, strict=True)
+            prediction + one.times(k - anchor) for prediction, one, k, anchor in zip(
+                self._recorded(effects, logs, slopes.anchor, rough), slopes.wander, wander, slopes.anchor, strict=True)
         ]
         return State(effects, logs, wander, predictions)
 
@@ -231,26 +230,21 @@ def located(problem: Problem, state: State, slopes: Slopes) -> State:
     """The state with the wander of all stretches, also of those that judge: where the car was is no part of what is
     judged. One step, to first order."""
     wander, predictions = [], []
-    for stretches, prior, k, prediction, around, measured, run in zip(
-            problem.stretches, problem.wander, state.wander, state.predictions, slopes.predictions, problem.measured,
-            problem.runs.runs, strict=True):
-        left = measured - prediction
-        columns = prior.columns(around, run)
-        whitener = Whitener(stretches, stretches.cells(left, None), whole=True)
-        white = whitener(columns)
-        pull = white @ whitener(left) - prior.precision @ k
-        step = np.linalg.solve(white @ white.T + prior.precision, pull)
+    for one, k, prediction, (pull, information) in zip(slopes.wander, state.wander, state.predictions,
+                                                       wander_seen(problem, state, slopes.wander), strict=True):
+        step = np.asarray(np.linalg.solve(information, pull - one.wander.precision @ k), float)
         wander.append(k + step)
-        predictions.append(prediction + step @ columns)
+        predictions.append(prediction + one.times(step))
     return State(state.effects, state.logs, wander, predictions)
 
 
-def wander_information(problem: Problem, state: State) -> Iterator[Array]:
-    """What the fitted stretches and the prior tell of the wander beside a state (k, k), run by run."""
-    for one, prediction, run, whitener in zip(problem.wander, state.predictions, problem.runs.runs,
-                                              problem.whiteners(state), strict=True):
-        white = whitener(one.columns(prediction, run))
-        yield white @ white.T + one.precision
+def wander_seen(problem: Problem, state: State, slopes: Sequence[WanderSlopes]) -> Iterator[tuple[Array, Array]]:
+    """What all stretches tell of the wander beside a state, run by run: which way what is left pulls it (k,), and the
+    information with that of the prior (k, k)."""
+    for stretches, left, one in zip(problem.stretches, problem.residuals(state), slopes, strict=True):
+        whitener = Whitener(stretches, stretches.cells(left, None), whole=True)
+        white = whitener(one.columns())
+        yield white @ whitener(left), white @ white.T + one.wander.precision
 
 
 class Weighed:
@@ -261,7 +255,8 @@ class Weighed:
 
     def __init__(self, problem: Problem, slopes: Slopes, whiteners: Sequence[Whitener], still: bool = False) -> None:
         self.problem, self.slopes, self.whiteners, self._still = problem, slopes, list(whiteners), still
-        self.white = [whitener(columns) for whitener, columns in zip(whiteners, problem.columns(slopes), strict=True)]
+        self.white = [whitener(np.vstack([numbers, wander.columns()])) for whitener, numbers, wander in zip(
+            whiteners, slopes.numbers, slopes.wander, strict=True)]
         p = len(problem.nuisance.names)
         sizes = [one.count for one in problem.wander]
         ends = p + np.cumsum([0, *sizes])

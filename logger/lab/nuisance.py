@@ -135,17 +135,28 @@ class Wander:
         at = np.linspace(0, run.count - 1, places)
         return np.concatenate([np.interp(at, np.arange(run.count), moved_m), np.zeros(1 + _RECORDER)])
 
-    def does(self, k: Array, prediction: Array, run: Run) -> Array:
-        """What so much of k does to a prediction (n,), to first order: (n,) [m/s2]."""
+    def slopes(self, prediction: Array, run: Run) -> WanderSlopes:
+        """What k does to a prediction (n,)."""
         rise = rate_of_change(prediction, run.rate_hz)
-        by_place = rise / np.maximum(run.speed_mps, _SLOWEST_MPS)
-        return np.asarray(self.moved_m(k) * by_place + k[-_RECORDER:] @ _by_recorder(prediction, rise, run))
+        return WanderSlopes(self, rise / np.maximum(run.speed_mps, _SLOWEST_MPS), _by_recorder(prediction, rise, run))
 
-    def columns(self, prediction: Array, run: Run) -> Array:
-        """What each of k does to a prediction (n,), to first order: (k, n) [m/s2 per unit]."""
-        rise = rate_of_change(prediction, run.rate_hz)
-        by_place = rise / np.maximum(run.speed_mps, _SLOWEST_MPS)
-        return np.vstack([self.basis.T * by_place, _by_recorder(prediction, rise, run)])
+
+@dataclass(frozen=True, eq=False)
+class WanderSlopes:
+    """What the wander of a run does to a prediction, to first order: by the place (n,) [m/s2 per m], and by the
+    recorder's numbers (2, n). What each of k does is made from these when it is asked for, as it takes much memory."""
+
+    wander: Wander
+    by_place: Array
+    by_recorder: Array
+
+    def times(self, k: Array) -> Array:
+        """What so much of k does (n,) [m/s2]."""
+        return np.asarray(self.wander.moved_m(k) * self.by_place + k[-_RECORDER:] @ self.by_recorder)
+
+    def columns(self) -> Array:
+        """What each of k does: (k, n) [m/s2 per unit]."""
+        return np.vstack([self.wander.basis.T * self.by_place, self.by_recorder])
 
 
 _RECORDER = 2

@@ -27,7 +27,7 @@ def aligned(problem: Problem, state: State) -> State:
     numbers, least = len(state.logs), problem.deviance(state)
     for _ in range(_ALIGNING_ROUNDS):
         nothing = [np.zeros((numbers, len(prediction))) for prediction in state.predictions]
-        slopes = Slopes(nothing, state.predictions, state.wander, state.names)
+        slopes = Slopes(nothing, problem.wander_slopes(state), state.wander, state.names)
         weighed = Weighed(problem, slopes, problem.whiteners(state), still=True)
         trial = improved(weighed, state, [], _STEPS, laid_out=True)
         gained = least - problem.deviance(trial)

@@ -18,11 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.alignment import followed_m
-from logger.lab.fitting import Problem, State, wander_information
-from logger.lab.nuisance import Tolerance
+from logger.lab.fitting import Problem, State, wander_seen
+from logger.lab.nuisance import Tolerance, Wander
 from logger.lab.prediction import Run, Runs
 from logger.lab.settling import aligned
-from logger.lab.stretches import Whitener
 
 Array = npt.NDArray[np.float64]
 
@@ -56,12 +55,12 @@ def lying(problem: Problem, state: State) -> tuple[Problem, State]:
     """The problem with its runs where they lie beside a model as it was given, and the model there."""
     there = aligned(problem, state)
     laid = relaid(problem, there, problem)
-    return (problem, there) if laid is problem else (laid, on_recorded(laid, state))
+    return (problem, there) if laid is problem else (laid, aligned_anew(laid, state))
 
 
-def on_recorded(problem: Problem, state: State) -> State:
-    """A model aligned with runs from where these have it."""
-    return aligned(problem, problem.laid_out(state.effects, state.logs, [np.zeros_like(k) for k in state.wander]))
+def aligned_anew(problem: Problem, state: State) -> State:
+    """A model of other runs aligned with these, from where they have it."""
+    return aligned(problem, problem.unmoved(state.effects, state.logs))
 
 
 def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
@@ -74,12 +73,13 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     usual = problem.tolerance
     if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
         return problem  # runs that were laid beside a model that lacked more are looked at again in any case
-    own = _best_size(recorded, state, usual)
+    smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
+    own = _best_size(recorded, smooth, state, usual)
     if own.problem.tolerance == usual:
         return recorded
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
     anywhere = _anywhere(usual)
-    moved = _best_size(recorded, state, anywhere)
+    moved = _best_size(recorded, smooth, state, anywhere)
     common = _common(usual, moved)
     if _laid(_over(recorded, moved.problem.moved_m(common)).granting(anywhere), state).lost < own.lost - _CLEARLY:
         return recorded
@@ -109,8 +109,12 @@ def _without_factor(runs: Sequence[Run], farther_m: Sequence[Array]) -> list[Arr
 
 def _over(problem: Problem, farther_m: Sequence[Array]) -> Problem:
     """The problem with its runs farther than they were by these (n,) [m]."""
-    runs = [replace(run, distance_m=run.distance_m + farther)
-            for run, farther in zip(problem.runs.runs, farther_m, strict=True)]
+    return _at(problem, [run.distance_m + one for run, one in zip(problem.runs.runs, farther_m, strict=True)])
+
+
+def _at(problem: Problem, distances_m: Sequence[Array]) -> Problem:
+    """The problem with other distances (n,) of its runs [m]."""
+    runs = [replace(run, distance_m=one) for run, one in zip(problem.runs.runs, distances_m, strict=True)]
     return problem.over(Runs(runs, problem.runs.fine_hz))
 
 
@@ -145,14 +149,16 @@ def _gain_and_price(problem: Problem, state: State, tolerance: Tolerance) -> tup
     and what its freedom costs in evidence; to first order."""
     other = problem.granting(tolerance)
     gain = price = 0.0
-    for one, prediction, run, left, stretches in zip(other.wander, state.predictions, other.runs.runs,
-                                                     other.residuals(state), other.stretches, strict=True):
-        whitener = Whitener(stretches, stretches.cells(left))
-        white = whitener(one.columns(prediction, run))
-        pull, information = white @ whitener(left), white @ white.T + one.precision
+    for wander, (pull, information) in zip(other.wander, wander_seen(other, state, other.wander_slopes(state)),
+                                           strict=True):
         gain += float(pull @ np.linalg.solve(information, pull))
-        price += float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(one.precision)[1])
+        price += _price(wander, information)
     return gain, price
+
+
+def _price(wander: Wander, information: Array) -> float:
+    """What the freedom of a wander costs in evidence, by what is known of it at last (k, k) (Occam's factor)."""
+    return float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(wander.precision)[1])
 
 
 def _anywhere(tolerance: Tolerance) -> Tolerance:
@@ -160,12 +166,11 @@ def _anywhere(tolerance: Tolerance) -> Tolerance:
     return replace(tolerance, scale=_ANY_SCALE, start_m=_ANY_START_M)
 
 
-def _best_size(problem: Problem, state: State, tolerance: Tolerance) -> _Laid:
-    """The size of wander with the most evidence beside a tolerance for the rest: the usual one unless another is
-    clearly better. The middle one comes first: where that is no better, the largest is not either."""
+def _best_size(problem: Problem, smooth: Problem, state: State, tolerance: Tolerance) -> _Laid:
+    """The size of wander with the most evidence beside a tolerance for the rest: the usual one, of the runs as they
+    are, unless another, of smooth ones, is clearly better. The middle one comes first: where that is no better, the
+    largest is not either."""
     usual = _laid(problem.granting(tolerance), state)
-    smooth = problem.over(Runs([replace(run, distance_m=_smooth(run)) for run in problem.runs.runs],
-                               problem.runs.fine_hz))
     best = usual
     for size in (_MIDDLE, _LARGE, _SMALL):
         needless = best is usual if size is _LARGE else best.problem.tolerance == _sized(tolerance, _LARGE)
@@ -196,17 +201,15 @@ def _smooth(run: Run) -> Array:
 
 def _laid(problem: Problem, state: State) -> _Laid:
     there = _laid_where_followed(problem, state)
-    lost = problem.deviance(there) + sum(
-        float(np.linalg.slogdet(information)[1] - np.linalg.slogdet(wander.precision)[1])
-        for information, wander in zip(wander_information(problem, there), problem.wander, strict=True))
-    return _Laid(problem, there, lost)
+    seen = wander_seen(problem, there, problem.wander_slopes(there))
+    price = sum(_price(wander, information) for wander, (_, information) in zip(problem.wander, seen, strict=True))
+    return _Laid(problem, there, problem.deviance(there) + price)
 
 
 def _laid_where_followed(problem: Problem, state: State) -> State:
     """A model laid out where the runs lie, beginning as they were recorded or where they are followed along the road,
     whichever is likelier."""
-    nowhere = [np.zeros(one.count) for one in problem.wander]
-    best = aligned(problem, problem.laid_out(state.effects, state.logs, nowhere))
+    best = aligned_anew(problem, state)
     for _ in range(_FOLLOWED):
         there = aligned(problem, problem.laid_out(state.effects, state.logs, _followed(problem, best)))
         if problem.deviance(there) > problem.deviance(best) - _CLEARLY:

@@ -40,7 +40,7 @@ def test_a_record_that_is_off_by_little_is_off_by_its_columns() -> None:
     wave = run.measured_mps2
     alone = np.zeros_like(k)
     alone[-2:] = k[-2:]
-    assert wander.recorded(wave, alone, run) - wave == pytest.approx(k[-2:] @ wander.columns(wave, run)[-2:])
+    assert wander.recorded(wave, alone, run) - wave == pytest.approx(k[-2:] @ wander.slopes(wave, run).columns()[-2:])
 
 
 def test_firm_numbers_cost_more_and_more_beyond_what_is_granted() -> None:

@@ -123,8 +123,8 @@ def test_knots_go_through_what_is_straight_between_them() -> None:
     line_m = 0.3 - 0.002 * np.arange(run.count)
     k = wander.through(line_m, run)
     assert wander.moved_m(k) == pytest.approx(line_m, abs=1e-12)
-    wave = np.sin(np.arange(run.count) / 7.0)
-    assert wander.does(k, wave, run) == pytest.approx(k @ wander.columns(wave, run), abs=1e-9)
+    slopes = wander.slopes(np.sin(np.arange(run.count) / 7.0), run)
+    assert slopes.times(k) == pytest.approx(k @ slopes.columns(), abs=1e-9)
 
 
 def test_a_run_too_long_for_close_knots_is_tried_with_fewer() -> None:
