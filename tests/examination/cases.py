@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from cars import STEP_S, Axle, Car
 from effects import EFFECTS, NEVER_TOGETHER, Effect
@@ -26,12 +27,15 @@ from scene import Drive, Scene, clean_acceleration, measured
 Array = NDArray[np.float64]
 Parameters = dict[str, float]
 
-KINDS = ("none", "one", "two", "outsider", "two_outsider")
+KINDS = ("none", "one", "two", "outsider", "two_outsider", "wandering")
 SKIPPED_S = 2.0  # at the start of every run, left out of every error
 VISIBLE = 2.0
 NUMBERS_OFF = 0.04
 LENGTHS_OFF = (0.005, 0.02, 0.04)
 """By what shares a data sheet may be wrong, drawn evenly up to them; a case has one of those for its lengths."""
+WRONG_MPS, WRONG_FOR_S = (0.02, 0.1), (0.05, 5.0)
+"""By what the speed signal of a ``wandering`` case is wrong, and how long an error of it lasts."""
+OF_THE_DISTANCE = ("speed_scale", "time_offset")
 _SEARCH_STEP_S = 1 / 1000
 _TRIES = 8
 
@@ -246,6 +250,10 @@ def _choose(rng: np.random.Generator, kind: str, seed: int, effect: str | None) 
     first = (EFFECTS | OUTSIDERS)[effect] if effect else None
     if kind == "none":
         return []
+    if kind == "wandering":
+        asked = [None, *(name for name in names if name not in OF_THE_DISTANCE)]
+        name = effect or asked[seed % len(asked)]
+        return [(EFFECTS[name], _log_uniform(rng, 2.2, 15.0), VISIBLE)] if name else []
     if kind == "one":
         return [(first or EFFECTS[names[seed % len(names)]], _log_uniform(rng, 0.5, 20.0), 0.0)]
     if kind == "outsider":
@@ -301,7 +309,11 @@ def _record(
     full = with_effects(scene, hidden)
     clean = measured(full)
     plain = measured(without(scene, hidden, *range(len(hidden))), STEP_S * 2)
-    recordings = tuple(_recording(rng, drive, noise, one) for drive, one in zip(scene.drives, clean, strict=True))
+    wrong = (0.0, 1.0)
+    if kind == "wandering":
+        wrong = _log_uniform(rng, *WRONG_MPS), _log_uniform(rng, *WRONG_FOR_S)
+    recordings = tuple(
+        _recording(rng, drive, noise, one, *wrong) for drive, one in zip(scene.drives, clean, strict=True))
     by_way = tuple(
         clean_acceleration(full, drive, STEP_S * 2, (run.distance_m, run.speed_mps))
         for drive, run in zip(scene.drives, recordings, strict=True))
@@ -322,15 +334,26 @@ def _record(
     )
 
 
-def _recording(rng: np.random.Generator, drive: Drive, noise: Noise, clean: Array) -> Recording:
+def _recording(
+    rng: np.random.Generator, drive: Drive, noise: Noise, clean: Array, wrong_mps: float, wrong_for_s: float,
+) -> Recording:
     """What the recorder writes: the speed signal is noisy and rounded, the distance is its integral.
 
     The noise is large enough for the rounding to leave no lasting error: after a minute the distance is wrong by a
-    millimetre to two centimetres.
+    millimetre to two centimetres, and by more where the speed is wrong by ``wrong_mps`` (coloured noise).
     """
     t = drive.times_s
     step = _log_uniform(rng, 0.002, 0.02)
     speed = drive.speed_at_mps(t) + rng.uniform(0.5, 0.7) * step * rng.standard_normal(t.size)
+    if wrong_mps:
+        speed = speed + wrong_mps * _coloured(rng, t.size, np.exp(-1 / RATE_HZ / wrong_for_s))
     speed = step * np.round(speed / step)
     wrong = np.concatenate([[0.0], np.cumsum((speed - drive.speed_at_mps(t))[:-1])]) / RATE_HZ
     return Recording(t, noise.add(clean, rng), speed, drive.distance_m(t) + wrong, clean)
+
+
+def _coloured(rng: np.random.Generator, count: int, kept: float) -> Array:
+    """Noise of deviation 1 of which so much is kept from one sample to the next."""
+    fresh = np.sqrt(1 - kept**2) * rng.standard_normal(count)
+    fresh[0] = rng.standard_normal()
+    return lfilter([1.0], [1.0, -kept], fresh)

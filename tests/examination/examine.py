@@ -23,8 +23,8 @@ from marking import hidden, right, said
 from sitting import Question, Record, sit
 
 ROOT = Path(__file__).resolve().parents[2]
-COUNTS = {"none": 40, "one": 100, "two": 40, "outsider": 39, "two_outsider": 0}
-"""Five of each effect of the list, three of each off it."""
+COUNTS = {"none": 40, "one": 100, "two": 40, "outsider": 39, "two_outsider": 0, "wandering": 38}
+"""Five of each effect of the list, three of each off it; two of each that distances that wander do not imitate."""
 FIRST_SEED = 2000
 
 

@@ -111,11 +111,18 @@ def first_said(record: Record) -> str:
     return verdict(record)[0] if verdict(record) else NOTHING
 
 
+def right_on_wandering(record: Record) -> bool:
+    """Where the distance wanders: the effect first, or nothing said where nothing is missing; and all explained."""
+    if not record["truth"]["effects"]:
+        return not alarm(record)
+    return first_right(record) and not unexplained(record)
+
+
 def right(record: Record) -> bool:
     """The answer that its kind asks for."""
     kinds: dict[str, Callable[[Record], bool]] = {
         "none": lambda one: not alarm(one), "one": first_right, "two": all_named, "outsider": unexplained,
-        "two_outsider": unexplained,
+        "two_outsider": unexplained, "wandering": right_on_wandering,
     }
     return kinds[record["kind"]](record)
 
@@ -243,6 +250,8 @@ def goals(records: Sequence[Record]) -> list[Goal]:
         Goal("Two effects: both named", 0.75, True, share(of_kind(records, "two"), all_named)),
         Goal("Off the list: unexplained", 0.80, True, share(of_kind(records, "outsider", "two_outsider"), unexplained)),
         Goal("Nothing off the list: unexplained", 0.05, False, share(others, unexplained)),
+        Goal("Distances that wander, one effect or nothing missing: right one first (or confused) or nothing, and "
+             "nothing unexplained", 0.80, True, share(of_kind(records, "wandering"), right_on_wandering)),
         Goal("Effects found: error after adding within 10 % of the noise floor", 0.85, True, share(found, near)),
         Goal("Effects found: numbers within 10 % or three standard errors", 0.85, True, share(found, numbers_right)),
         Goal("Effects found: both of these", 0.85, True,
