@@ -105,8 +105,8 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
              "shares nothing with ridelog: other equations, another integrator, roads, cars, speeds and noise of its "
              "own, the car's file off by up to 4 %, distances right to two centimetres but where they wander: there "
              f"they are integrals of a speed that is wrong by {WRONG_MPS[0]:g} to {WRONG_MPS[1]:g} m/s for "
-             f"{WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s on end. Each was put before `ridelog diagnose`, and what that "
-             f"named was added by `ridelog add-effect`. Made by `{COMMAND}`."]
+             f"{WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s on end. Each was put before `ridelog diagnose`, and what "
+             f"that named was added by `ridelog add-effect`. Made by `{COMMAND}`."]
     if len(records) < asked:
         lines.append(f"The examination is not over: {len(records)} of {asked} cases sat.")
     if (programs := len({record["source"] for record in records})) > 1:
