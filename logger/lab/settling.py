@@ -21,10 +21,14 @@ _STEPS, _SETTLED = 5, 2.0
 _ALIGNING_ROUNDS = 20
 
 
-def aligned(problem: Problem, state: State) -> State:
+def aligned(problem: Problem, state: State, worth: float = 0.0) -> State:
     """The state with the wander of the distance alone fitted, until it lies as it can: that takes many rounds where it
-    is far off, in which the car's numbers would be bent."""
-    numbers, least = len(state.logs), problem.deviance(state)
+    is far off, in which the car's numbers would be bent.
+
+    worth    the share of what was gained so far that a round has to gain to be worth another one
+    """
+    numbers = len(state.logs)
+    first = least = problem.deviance(state)
     for _ in range(_ALIGNING_ROUNDS):
         nothing = [np.zeros((numbers, len(prediction))) for prediction in state.predictions]
         slopes = Slopes(nothing, problem.wander_slopes(state), state.wander, state.names)
@@ -33,7 +37,7 @@ def aligned(problem: Problem, state: State) -> State:
         gained = least - problem.deviance(trial)
         if gained > 0:
             least, state = least - gained, trial
-        if gained < _SETTLED:
+        if gained < max(_SETTLED, worth * (first - least)):
             break
     return state
 

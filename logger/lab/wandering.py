@@ -38,6 +38,7 @@ _CLEARLY, _MUCH = 20.0, 500.0
 what such a one has to gain beside a larger wander, as a model that lacks something seems early or late as well."""
 _PROMISING = 0.4
 _BLOCK_S, _SLOWEST_MPS, _LEAST_BLOCKS, _CHANCE = 10.0, 1.0, 4, 1e-3
+_WORTH_ALIGNING = 0.01
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
 
 
@@ -49,6 +50,11 @@ class _Laid:
     problem: Problem
     state: State
     lost: float
+
+    @property
+    def places(self) -> list[Array]:
+        """Where the model lies beside the runs (n,) [m]."""
+        return _places(self.problem, self.state)
 
 
 def lying(problem: Problem, state: State) -> tuple[Problem, State]:
@@ -73,15 +79,15 @@ def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
     usual = problem.tolerance
     if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
         return problem  # runs that were laid beside a model that lacked more are looked at again in any case
-    smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
-    own = _best_size(recorded, smooth, state, usual)
+    own = _best_size(recorded, state, _places(problem, state))
     if own.problem.tolerance == usual:
         return recorded
+    own = _finished(own)
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
-    anywhere = _anywhere(usual)
-    moved = _best_size(recorded, smooth, state, anywhere)
+    moved = _laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places)
     common = _common(usual, moved)
-    if _laid(_over(recorded, moved.problem.moved_m(common)).granting(anywhere), state).lost < own.lost - _CLEARLY:
+    unmoved = _over(recorded, moved.problem.moved_m(common)).granting(_anywhere(usual))
+    if _laid(unmoved, state, _places(unmoved)).lost < own.lost - _CLEARLY:
         return recorded
     if moved.lost < own.lost - _MUCH:
         return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
@@ -166,17 +172,29 @@ def _anywhere(tolerance: Tolerance) -> Tolerance:
     return replace(tolerance, scale=_ANY_SCALE, start_m=_ANY_START_M)
 
 
-def _best_size(problem: Problem, smooth: Problem, state: State, tolerance: Tolerance) -> _Laid:
-    """The size of wander with the most evidence beside a tolerance for the rest: the usual one, of the runs as they
-    are, unless another, of smooth ones, is clearly better. The middle one comes first: where that is no better, the
-    largest is not either."""
-    usual = _laid(problem.granting(tolerance), state)
+def _best_size(recorded: Problem, state: State, places: list[Array]) -> _Laid:
+    """The size of wander with the most evidence: the usual one, of the runs as they were recorded, unless another, of
+    smooth ones, is clearly better. The middle one comes first: where that is no better, the largest is not either.
+
+    places    where the model lies beside the runs (n,) [m], or near it
+    """
+    smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
+    usual = _laid(recorded.granting(recorded.tolerance), state, _places(recorded))
     best = usual
     for size in (_MIDDLE, _LARGE, _SMALL):
-        needless = best is usual if size is _LARGE else best.problem.tolerance == _sized(tolerance, _LARGE)
-        if not needless and _in_reach(problem, size):
-            best = min(best, _laid(smooth.granting(_sized(tolerance, size)), state), key=lambda one: one.lost)
+        sized = _sized(recorded.tolerance, size)
+        needless = best is usual if size is _LARGE else best.problem.tolerance.knot_s == _LARGE[1]
+        if not needless and _in_reach(recorded, size):
+            there = places if best is usual else best.places
+            best = min(best, _laid(smooth.granting(sized), state, there), key=lambda one: one.lost)
     return best if best.lost < usual.lost - _CLEARLY else usual
+
+
+def _places(problem: Problem, state: State | None = None) -> list[Array]:
+    """Where a model lies beside the runs of a problem (n,) [m]; None: where they have it."""
+    nowhere = [np.zeros(run.count) for run in problem.runs.runs]
+    moved_m = nowhere if state is None else problem.moved_m(state.wander)
+    return [run.distance_m + moved for run, moved in zip(problem.runs.runs, moved_m, strict=True)]
 
 
 def _sized(tolerance: Tolerance, size: tuple[float, float]) -> Tolerance:
@@ -199,29 +217,38 @@ def _smooth(run: Run) -> Array:
     return np.asarray(savgol_filter(run.distance_m, size, 3)) if size > 3 else run.distance_m
 
 
-def _laid(problem: Problem, state: State) -> _Laid:
-    there = _laid_where_followed(problem, state)
-    seen = wander_seen(problem, there, problem.wander_slopes(there))
-    price = sum(_price(wander, information) for wander, (_, information) in zip(problem.wander, seen, strict=True))
-    return _Laid(problem, there, problem.deviance(there) + price)
-
-
-def _laid_where_followed(problem: Problem, state: State) -> State:
-    """A model laid out where the runs lie, beginning as they were recorded or where they are followed along the road,
-    whichever is likelier."""
-    best = aligned_anew(problem, state)
+def _laid(problem: Problem, state: State, places: list[Array]) -> _Laid:
+    """A model laid out where the runs lie, beginning at places (n,) [m] or where they are followed along the road from
+    there, whichever is likelier."""
+    best = _aligned_from(problem, state, places)
     for _ in range(_FOLLOWED):
-        there = aligned(problem, problem.laid_out(state.effects, state.logs, _followed(problem, best)))
+        followed = [place + followed_m(run, prediction) for place, run, prediction in zip(
+            _places(problem, best), problem.runs.runs, best.predictions, strict=True)]
+        there = _aligned_from(problem, state, followed)
         if problem.deviance(there) > problem.deviance(best) - _CLEARLY:
             break
         best = there
-    return best
+    return _Laid(problem, best, _lost(problem, best))
 
 
-def _followed(problem: Problem, state: State) -> list[Array]:
-    """The wander with which a model goes where the runs are found to lie beside it, (k,) per run."""
-    return [wander.through(now + followed_m(run, prediction), run) for wander, now, run, prediction in zip(
-        problem.wander, problem.moved_m(state.wander), problem.runs.runs, state.predictions, strict=True)]
+def _aligned_from(problem: Problem, state: State, places: list[Array]) -> State:
+    """A model aligned from places (n,) of the runs [m], well enough to tell how likely it can be there."""
+    wander = [one.through(place - run.distance_m, run)
+              for one, place, run in zip(problem.wander, places, problem.runs.runs, strict=True)]
+    return aligned(problem, problem.laid_out(state.effects, state.logs, wander), _WORTH_ALIGNING)
+
+
+def _finished(laid: _Laid) -> _Laid:
+    """The same aligned as well as it can be."""
+    state = aligned(laid.problem, laid.state)
+    return _Laid(laid.problem, state, _lost(laid.problem, state))
+
+
+def _lost(problem: Problem, state: State) -> float:
+    """What evidence a model lacks beside runs that it is aligned with."""
+    seen = wander_seen(problem, state, problem.wander_slopes(state))
+    price = sum(_price(wander, information) for wander, (_, information) in zip(problem.wander, seen, strict=True))
+    return problem.deviance(state) + price
 
 
 def _common(tolerance: Tolerance, found: _Laid) -> list[Array]:
