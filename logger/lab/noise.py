@@ -14,8 +14,9 @@ import numpy as np
 
 from logger.lab.fitting import Problem, State
 
-# A band is louder than the noise from so many deviations of the difference on.
-_LOUDER = 2.5
+# A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty, which is
+# two deviations below the others by chance, from so many.
+_LOUDER, _LOUDER_THAN_QUIETEST = 2.5, 4.5
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
 _FILTERED = 0.6
 _LEAST_SHARE = 0.002
@@ -41,11 +42,12 @@ def noise_of(problem: Problem, state: State) -> Noise:
     freedoms = [sum(float(one.freedom[band]) for one in cells) for band in bands]
     levels = [sum(float(one.freedom[band] * one.power[band]) for one in cells) / freedoms[band] for band in bands]
     quietest = min(bands, key=lambda band: levels[band])
+    louder = _LOUDER
     if power < _FILTERED * levels[quietest]:
-        power, freedom = levels[quietest], freedoms[quietest]
+        power, freedom, louder = levels[quietest], freedoms[quietest], _LOUDER_THAN_QUIETEST
     for band in reversed(bands):
         level, n = levels[band], freedoms[band]
-        if level < power * (1 + _LOUDER * np.sqrt(2 / n + 2 / freedom)):
+        if level < power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
     counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
     power = max(power, _LEAST_SHARE**2 * float((counted**2).mean()))

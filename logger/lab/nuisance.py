@@ -115,6 +115,11 @@ class Wander:
         """How many numbers there are."""
         return len(self.precision)
 
+    @property
+    def knots(self) -> int:
+        """How many of the numbers, the first ones, are of knots."""
+        return self.count - 1 - _RECORDER
+
     def moved_m(self, k: Array) -> Array:
         """By how much the car was farther than its distance signal said (n,)."""
         return np.asarray(self.basis @ k[:-_RECORDER])
@@ -131,8 +136,7 @@ class Wander:
 
     def through(self, moved_m: Array, run: Run) -> Array:
         """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""
-        places = self.count - 1 - _RECORDER
-        at = np.linspace(0, run.count - 1, places)
+        at = np.linspace(0, run.count - 1, self.knots)
         return np.concatenate([np.interp(at, np.arange(run.count), moved_m), np.zeros(1 + _RECORDER)])
 
     def slopes(self, prediction: Array, run: Run) -> WanderSlopes:

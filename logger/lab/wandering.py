@@ -25,8 +25,10 @@ from logger.lab.settling import aligned
 
 Array = npt.NDArray[np.float64]
 
-_SMALL, _MIDDLE, _LARGE = (0.012, 1.0), (0.03, 0.5), (0.08, 0.25)
+_SMALL, _MIDDLE = (0.012, 1.0), (0.03, 0.5)
 """Wanders after one second [m], and how far apart their knots are [s]."""
+_CLOSE_S, _TIMES_SIZED = 0.25, 2
+"""How close knots are in the end, and how often the size is found anew with them, at most."""
 _MOST_KNOTS, _MOST_KNOTS_BY_SAMPLES = 3000, 2.4e7
 """Runs that have more, together, are too long for so close knots: they would take too much memory."""
 _ANY_SCALE, _ANY_START_M = 0.05, 3.0
@@ -58,9 +60,9 @@ class _Laid:
 
 
 def lying(problem: Problem, state: State) -> tuple[Problem, State]:
-    """The problem with its runs where they lie beside a model as it was given, and the model there."""
+    """The problem with its runs about where they lie beside a model as it was given, and the model there."""
     there = aligned(problem, state)
-    laid = relaid(problem, there, problem)
+    laid = relaid(problem, there, problem, roughly=True)
     return (problem, there) if laid is problem else (laid, aligned_anew(laid, state))
 
 
@@ -69,20 +71,21 @@ def aligned_anew(problem: Problem, state: State) -> State:
     return aligned(problem, problem.unmoved(state.effects, state.logs))
 
 
-def relaid(problem: Problem, state: State, recorded: Problem) -> Problem:
+def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = False) -> Problem:
     """The problem with its runs where they lie beside a model, if their distances wander by more than is granted; else
     as they were recorded. The problem itself if it is good enough.
 
     state       laid out where it lies in the problem
     recorded    the problem with the runs where they were recorded
+    roughly     near enough for a model that is to be refitted, and the runs laid anew beside that
     """
     usual = problem.tolerance
     if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
         return problem  # runs that were laid beside a model that lacked more are looked at again in any case
-    own = _best_size(recorded, state, _places(problem, state))
+    own = _best_size(recorded, state, _places(problem, state), 0 if roughly else _TIMES_SIZED)
     if own.problem.tolerance == usual:
         return recorded
-    own = _finished(own)
+    own = own if roughly else _finished(own)
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
     moved = _laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places)
     common = _common(usual, moved)
@@ -172,22 +175,40 @@ def _anywhere(tolerance: Tolerance) -> Tolerance:
     return replace(tolerance, scale=_ANY_SCALE, start_m=_ANY_START_M)
 
 
-def _best_size(recorded: Problem, state: State, places: list[Array]) -> _Laid:
+def _best_size(recorded: Problem, state: State, places: list[Array], times: int) -> _Laid:
     """The size of wander with the most evidence: the usual one, of the runs as they were recorded, unless another, of
-    smooth ones, is clearly better. The middle one comes first: where that is no better, the largest is not either.
+    smooth ones, is clearly better; then the one that the wander has, once it is known, with close knots.
 
     places    where the model lies beside the runs (n,) [m], or near it
+    times     how often the size is found anew, at most
     """
     smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
-    usual = _laid(recorded.granting(recorded.tolerance), state, _places(recorded))
-    best = usual
-    for size in (_MIDDLE, _LARGE, _SMALL):
-        sized = _sized(recorded.tolerance, size)
-        needless = best is usual if size is _LARGE else best.problem.tolerance.knot_s == _LARGE[1]
-        if not needless and _in_reach(recorded, size):
-            there = places if best is usual else best.places
-            best = min(best, _laid(smooth.granting(sized), state, there), key=lambda one: one.lost)
-    return best if best.lost < usual.lost - _CLEARLY else usual
+    best = usual = _laid(recorded.granting(recorded.tolerance), state, _places(recorded))
+    for size in (_MIDDLE, _SMALL):
+        if best is usual and _in_reach(recorded, size):
+            found = _laid(smooth.granting(_sized(recorded.tolerance, size)), state, places)
+            best = found if found.lost < usual.lost - _CLEARLY else usual
+    for _ in range(0 if best is usual else times):
+        knot_s = best.problem.tolerance.knot_s
+        size = _wander_m(best), _CLOSE_S if _in_reach(recorded, (0.0, _CLOSE_S)) else knot_s
+        again = _laid(smooth.granting(_sized(recorded.tolerance, size)), state, best.places)
+        if again.lost > best.lost - _CLEARLY:
+            break
+        best = again
+    return best
+
+
+def _wander_m(laid: _Laid) -> float:
+    """The size of a wander by what is known of it: what it does after one second [m] (a step of expectation and
+    maximisation: A. P. Dempster, N. M. Laird, D. B. Rubin, Journal of the Royal Statistical Society B 39, 1977)."""
+    problem, state = laid.problem, laid.state
+    squares = seconds = 0.0
+    for wander, k, run, (_, information) in zip(problem.wander, state.wander, problem.runs.runs, wander_seen(
+            problem, state, problem.wander_slopes(state)), strict=True):
+        steps = np.diff(np.eye(wander.knots, wander.count), axis=0)
+        squares += float(((steps @ k) ** 2).sum() + (steps @ np.linalg.inv(information) * steps).sum())
+        seconds += (run.count - 1) / run.rate_hz
+    return float(np.sqrt(squares / seconds))
 
 
 def _places(problem: Problem, state: State | None = None) -> list[Array]:

@@ -60,7 +60,8 @@ def wrong(request: pytest.FixtureRequest) -> tuple[float, float]:
 def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> None:
     true = driven([])
     problem = problem_of([with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(true)])
-    laid, state = wandering.lying(problem, problem.start())
+    laid = wandering.relaid(problem, aligned(problem, problem.start()), problem)
+    state = wandering.aligned_anew(laid, problem.start())
     before, after = (max(np.sqrt(((one.distance_m - run.distance_m)[run.first:] ** 2).mean())
                          for one, run in zip(each.runs.runs, true, strict=True)) for each in (problem, laid))
     assert before > 0.02 and after < min(0.012, 0.5 * before)
