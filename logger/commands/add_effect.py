@@ -98,9 +98,8 @@ _ROUNDS = 3
 
 def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chosen:
     """Where the fit of an effect begins: as it was said, and for the rest where a search for it alone ends."""
-    from logger.lab.candidates import Base, best_choice, fitted, misalignment, screened, settled_further
-    from logger.lab.settling import settled
-    from logger.lab.wandering import lying
+    from logger.lab.candidates import best_choice, fitted, misalignment, screened, settled_further
+    from logger.lab.diagnosis import refitted
     from logger.vehicle.effect import chosen
 
     if set(values) >= {one.name for one in effect.parameters}:
@@ -111,8 +110,7 @@ def searched(given: Bench, effect: Effect, values: Mapping[str, float]) -> Chose
         tell("refitting the car's own numbers")
         nominal = problem.start(given.model.effects)
         seen = misalignment(problem, nominal)
-        problem, start = lying(problem, nominal)
-        base = Base.of(problem, *settled(problem, start))
+        problem, base = refitted(problem, nominal)
         tell(f"searching for {effect.name}")
         tries = fitted(problem, base, screened(problem, base, effect, seen))
     except ValueError as error:

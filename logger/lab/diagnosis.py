@@ -73,6 +73,7 @@ _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is no
 _MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.5, 3
 _HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fitted, and when only screened
 _THE_SAME_PLACE = 20.0  # steps
+_THE_SAME_M = 0.001
 _UNDECIDED = 0.05  # of what is left to explain
 _NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 
@@ -192,7 +193,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     nominal = problem.start(present)
     seen = misalignment(problem, nominal)
     recorded = problem
-    problem, before = _before(recorded, nominal)
+    problem, before = refitted(recorded, nominal)
     steps = [Step("the vehicle as its file says", recorded.judged_error(nominal)),
              Step("its numbers refitted within what is granted", before.judged_error)]
     way = _way(problem, recorded, before, left, seen, progress, workers)
@@ -220,7 +221,7 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     )
 
 
-def _before(problem: Problem, nominal: State) -> tuple[Problem, Base]:
+def refitted(problem: Problem, nominal: State) -> tuple[Problem, Base]:
     """The car's own numbers refitted, with the runs where they lie: beside the car as it stands, and once more beside
     the one that was refitted."""
     laid, start = lying(problem, nominal)
@@ -232,7 +233,8 @@ def _where_it_lies(recorded: Problem, problem: Problem, now: Base) -> tuple[Prob
     do so only beside a model that lacked more; and if it explains enough to tell."""
     tells = (now.unexplained > 0 or problem is not recorded) and now.judged_error < ASTRAY
     laid = relaid(problem, now.state, recorded) if tells else problem
-    return (problem, now) if laid is problem else (laid, _on(laid, now))
+    same = laid is problem or moved_m(problem, laid) < _THE_SAME_M
+    return (problem, now) if same else (laid, _on(laid, now))
 
 
 def _on(problem: Problem, now: Base) -> Base:

@@ -2,8 +2,8 @@
 
 Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
 moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
-well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more. No noise
-is taken for less than what two right simulations of a car differ by.
+well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more, the
+quietest first. No noise is taken for less than what two right simulations of a car differ by.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 
 from logger.lab.fitting import Problem, State
 
-# A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty, which is
-# two deviations below the others by chance, from so many.
-_LOUDER, _LOUDER_THAN_QUIETEST = 2.5, 4.5
+# A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty alone, which
+# is two deviations of its own below the others by chance, from so many.
+_LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
 _FILTERED = 0.6
 _LEAST_SHARE = 0.002
@@ -41,14 +41,15 @@ def noise_of(problem: Problem, state: State) -> Noise:
     bands = range(min(len(one.power) for one in cells))
     freedoms = [sum(float(one.freedom[band]) for one in cells) for band in bands]
     levels = [sum(float(one.freedom[band] * one.power[band]) for one in cells) / freedoms[band] for band in bands]
-    quietest = min(bands, key=lambda band: levels[band])
+    by_level = sorted(zip(levels, freedoms, strict=True))
     louder = _LOUDER
-    if power < _FILTERED * levels[quietest]:
-        power, freedom, louder = levels[quietest], freedoms[quietest], _LOUDER_THAN_QUIETEST
-    for band in reversed(bands):
-        level, n = levels[band], freedoms[band]
-        if level < power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
-            power, freedom = (power * freedom + level * n) / (freedom + n), freedom + n
+    if power < _FILTERED * by_level[0][0]:
+        (power, freedom), *by_level = by_level
+        louder = _LOUDER_THAN_QUIETEST
+    for level, n in by_level:
+        if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
+            break
+        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
     counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
     power = max(power, _LEAST_SHARE**2 * float((counted**2).mean()))
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))

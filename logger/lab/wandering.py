@@ -3,10 +3,10 @@
 Problem: one recorder's distance is right to millimetres after a minute, another integrates a speed that is off by some
 centimetres a second, now more and now less. A lab that grants only the little takes the much for missing physics, and
 one that grants the much lets it swallow effects. Solution: the runs are followed along the road as a model goes there,
-and laid out with wanders of growing size, with knots as close as each size asks for. The size with the greatest
-evidence is taken: the likelihood with the wander integrated out, by Laplace's approximation (D. J. C. MacKay, Neural
-Computation 4, 1992). If that is more than usual, the runs get the distances that they then have, and what is left to
-wander is as usual. A wrong factor or a late clock, which is one for all of the runs, stays for the effects to explain.
+and laid out with a usual and with a larger wander. The one with more evidence is taken: the likelihood with the wander
+integrated out, by Laplace's approximation (D. J. C. MacKay, Neural Computation 4, 1992). If that is the larger one, its
+size is found anew from the wander itself, the runs get the distances that they then have, and what is left to wander is
+as usual. A wrong factor or a late clock, which is one for all of the runs, stays for the effects to explain.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from logger.lab.settling import aligned
 
 Array = npt.NDArray[np.float64]
 
-_SMALL, _MIDDLE = (0.012, 1.0), (0.03, 0.5)
+_SMALL, _LARGE = (0.012, 1.0), (0.03, 0.5)
 """Wanders after one second [m], and how far apart their knots are [s]."""
 _CLOSE_S, _TIMES_SIZED = 0.25, 2
 """How close knots are in the end, and how often the size is found anew with them, at most."""
-_MOST_KNOTS, _MOST_KNOTS_BY_SAMPLES = 3000, 2.4e7
+_MOST_KNOTS, _MOST_KNOTS_BY_SAMPLES = 3000, 1.5e7
 """Runs that have more, together, are too long for so close knots: they would take too much memory."""
 _ANY_SCALE, _ANY_START_M = 0.05, 3.0
 ASTRAY = 0.7
@@ -41,17 +41,40 @@ what such a one has to gain beside a larger wander, as a model that lacks someth
 _PROMISING = 0.4
 _BLOCK_S, _SLOWEST_MPS, _LEAST_BLOCKS, _CHANCE = 10.0, 1.0, 4, 1e-3
 _WORTH_ALIGNING = 0.01
+"""A round that gains a smaller share of what was gained is the last, to tell which wander is likelier."""
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
 
 
 @dataclass(frozen=True, eq=False)
 class _Laid:
-    """A problem on all stretches with a size of wander, the model where its runs lie then, and what evidence that
-    lacks: minus twice its logarithm, but for a constant."""
+    """A problem on all stretches with a size of wander, the model where its runs lie then, and what is known of the
+    wander of each (k, k)."""
 
     problem: Problem
     state: State
-    lost: float
+    information: list[Array]
+
+    @staticmethod
+    def of(problem: Problem, state: State) -> _Laid:
+        """A model that is aligned with the runs."""
+        return _Laid(problem, state, [one for _, one in wander_seen(problem, state, problem.wander_slopes(state))])
+
+    @property
+    def lost(self) -> float:
+        """What evidence it lacks: minus twice its logarithm, but for a constant."""
+        return self.problem.deviance(self.state) + sum(map(_price, self.problem.wander, self.information))
+
+    @property
+    def wander_m(self) -> float:
+        """The size of the wander by what is known of it: what it does after one second [m] (a step of expectation and
+        maximisation: A. P. Dempster, N. M. Laird, D. B. Rubin, Journal of the Royal Statistical Society B 39, 1977)."""
+        squares = seconds = 0.0
+        for wander, k, run, information in zip(self.problem.wander, self.state.wander, self.problem.runs.runs,
+                                               self.information, strict=True):
+            steps = np.diff(np.eye(wander.knots, wander.count), axis=0)
+            squares += float(((steps @ k) ** 2).sum() + (steps @ np.linalg.inv(information) * steps).sum())
+            seconds += (run.count - 1) / run.rate_hz
+        return float(np.sqrt(squares / seconds))
 
     @property
     def places(self) -> list[Array]:
@@ -60,7 +83,8 @@ class _Laid:
 
 
 def lying(problem: Problem, state: State) -> tuple[Problem, State]:
-    """The problem with its runs about where they lie beside a model as it was given, and the model there."""
+    """The problem with its runs about where they lie beside a model as it was given, and the model there: near enough
+    for it to be refitted there, and the runs laid anew beside that."""
     there = aligned(problem, state)
     laid = relaid(problem, there, problem, roughly=True)
     return (problem, there) if laid is problem else (laid, aligned_anew(laid, state))
@@ -77,7 +101,7 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
 
     state       laid out where it lies in the problem
     recorded    the problem with the runs where they were recorded
-    roughly     near enough for a model that is to be refitted, and the runs laid anew beside that
+    roughly     where the larger of two wanders has them, however close its knots should be
     """
     usual = problem.tolerance
     if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
@@ -87,10 +111,10 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
         return recorded
     own = own if roughly else _finished(own)
     # One factor or one delay of all runs may be what seems to wander, or be there besides.
-    moved = _laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places)
+    moved = _finished(_laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places))
     common = _common(usual, moved)
     unmoved = _over(recorded, moved.problem.moved_m(common)).granting(_anywhere(usual))
-    if _laid(unmoved, state, _places(unmoved)).lost < own.lost - _CLEARLY:
+    if _finished(_laid(unmoved, state, _places(unmoved))).lost < own.lost - _CLEARLY:
         return recorded
     if moved.lost < own.lost - _MUCH:
         return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
@@ -107,8 +131,9 @@ def _without_factor(runs: Sequence[Run], farther_m: Sequence[Array]) -> list[Arr
     shares: list[float] = []
     for run, farther in zip(runs, farther_m, strict=True):
         ends = np.arange(run.first, run.count, round(_BLOCK_S * run.rate_hz))
-        way = np.diff(run.distance_m[ends])
-        shares += list((np.diff(farther[ends]) / way)[way > _SLOWEST_MPS * _BLOCK_S])
+        way, gained = np.diff(run.distance_m[ends]), np.diff(farther[ends])
+        drives = way > _SLOWEST_MPS * _BLOCK_S
+        shares += list(gained[drives] / way[drives])
     if len(shares) < _LEAST_BLOCKS or not ttest_1samp(shares, 0.0).pvalue < _CHANCE:
         return list(farther_m)
     factor = float(np.mean(shares))
@@ -146,8 +171,8 @@ def _promises(problem: Problem, state: State) -> bool:
     that takes no simulation."""
     usual = problem.tolerance
     likely, moved = False, _gain_and_price(problem, state, _anywhere(usual))
-    for size in (_SMALL, _MIDDLE):
-        if _in_reach(problem, size):
+    for size in (_SMALL, _LARGE):
+        if _in_reach(problem, size[1]):
             gain, price = _gain_and_price(problem, state, _sized(usual, size))
             likely = likely or (gain > _PROMISING * price and gain - price > moved[0] - moved[1])
     return likely
@@ -184,31 +209,18 @@ def _best_size(recorded: Problem, state: State, places: list[Array], times: int)
     """
     smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
     best = usual = _laid(recorded.granting(recorded.tolerance), state, _places(recorded))
-    for size in (_MIDDLE, _SMALL):
-        if best is usual and _in_reach(recorded, size):
+    for size in (_LARGE, _SMALL):
+        if best is usual and _in_reach(recorded, size[1]):
             found = _laid(smooth.granting(_sized(recorded.tolerance, size)), state, places)
             best = found if found.lost < usual.lost - _CLEARLY else usual
     for _ in range(0 if best is usual else times):
-        knot_s = best.problem.tolerance.knot_s
-        size = _wander_m(best), _CLOSE_S if _in_reach(recorded, (0.0, _CLOSE_S)) else knot_s
+        knot_s = _CLOSE_S if _in_reach(recorded, _CLOSE_S) else best.problem.tolerance.knot_s
+        size = best.wander_m, knot_s
         again = _laid(smooth.granting(_sized(recorded.tolerance, size)), state, best.places)
         if again.lost > best.lost - _CLEARLY:
             break
         best = again
     return best
-
-
-def _wander_m(laid: _Laid) -> float:
-    """The size of a wander by what is known of it: what it does after one second [m] (a step of expectation and
-    maximisation: A. P. Dempster, N. M. Laird, D. B. Rubin, Journal of the Royal Statistical Society B 39, 1977)."""
-    problem, state = laid.problem, laid.state
-    squares = seconds = 0.0
-    for wander, k, run, (_, information) in zip(problem.wander, state.wander, problem.runs.runs, wander_seen(
-            problem, state, problem.wander_slopes(state)), strict=True):
-        steps = np.diff(np.eye(wander.knots, wander.count), axis=0)
-        squares += float(((steps @ k) ** 2).sum() + (steps @ np.linalg.inv(information) * steps).sum())
-        seconds += (run.count - 1) / run.rate_hz
-    return float(np.sqrt(squares / seconds))
 
 
 def _places(problem: Problem, state: State | None = None) -> list[Array]:
@@ -223,9 +235,9 @@ def _sized(tolerance: Tolerance, size: tuple[float, float]) -> Tolerance:
     return replace(tolerance, wander_m=size[0], knot_s=size[1])
 
 
-def _in_reach(problem: Problem, size: tuple[float, float]) -> bool:
-    """Whether the runs are not too long for the knots of a size."""
-    knots = [run.count / run.rate_hz / size[1] for run in problem.runs.runs]
+def _in_reach(problem: Problem, knot_s: float) -> bool:
+    """Whether the runs are not too long for knots so far apart."""
+    knots = [run.count / run.rate_hz / knot_s for run in problem.runs.runs]
     by_samples = sum(number * run.count for number, run in zip(knots, problem.runs.runs, strict=True))
     return sum(knots) < _MOST_KNOTS and by_samples < _MOST_KNOTS_BY_SAMPLES
 
@@ -249,7 +261,7 @@ def _laid(problem: Problem, state: State, places: list[Array]) -> _Laid:
         if problem.deviance(there) > problem.deviance(best) - _CLEARLY:
             break
         best = there
-    return _Laid(problem, best, _lost(problem, best))
+    return _Laid.of(problem, best)
 
 
 def _aligned_from(problem: Problem, state: State, places: list[Array]) -> State:
@@ -261,15 +273,7 @@ def _aligned_from(problem: Problem, state: State, places: list[Array]) -> State:
 
 def _finished(laid: _Laid) -> _Laid:
     """The same aligned as well as it can be."""
-    state = aligned(laid.problem, laid.state)
-    return _Laid(laid.problem, state, _lost(laid.problem, state))
-
-
-def _lost(problem: Problem, state: State) -> float:
-    """What evidence a model lacks beside runs that it is aligned with."""
-    seen = wander_seen(problem, state, problem.wander_slopes(state))
-    price = sum(_price(wander, information) for wander, (_, information) in zip(problem.wander, seen, strict=True))
-    return problem.deviance(state) + price
+    return _Laid.of(laid.problem, aligned(laid.problem, laid.state))
 
 
 def _common(tolerance: Tolerance, found: _Laid) -> list[Array]:

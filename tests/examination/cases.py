@@ -253,7 +253,7 @@ def _choose(rng: np.random.Generator, kind: str, seed: int, effect: str | None) 
     if kind == "wandering":
         asked = [None, *(name for name in names if name not in OF_THE_DISTANCE)]
         name = effect or asked[seed % len(asked)]
-        return [(EFFECTS[name], _log_uniform(rng, 2.2, 15.0), VISIBLE)] if name else []
+        return [(first or EFFECTS[name], _log_uniform(rng, 2.2, 15.0), VISIBLE)] if name else []
     if kind == "one":
         return [(first or EFFECTS[names[seed % len(names)]], _log_uniform(rng, 0.5, 20.0), 0.0)]
     if kind == "outsider":
@@ -309,11 +309,9 @@ def _record(
     full = with_effects(scene, hidden)
     clean = measured(full)
     plain = measured(without(scene, hidden, *range(len(hidden))), STEP_S * 2)
-    wrong = (0.0, 1.0)
-    if kind == "wandering":
-        wrong = _log_uniform(rng, *WRONG_MPS), _log_uniform(rng, *WRONG_FOR_S)
+    wrong = (_log_uniform(rng, *WRONG_MPS), _log_uniform(rng, *WRONG_FOR_S)) if kind == "wandering" else None
     recordings = tuple(
-        _recording(rng, drive, noise, one, *wrong) for drive, one in zip(scene.drives, clean, strict=True))
+        _recording(rng, drive, noise, one, wrong) for drive, one in zip(scene.drives, clean, strict=True))
     by_way = tuple(
         clean_acceleration(full, drive, STEP_S * 2, (run.distance_m, run.speed_mps))
         for drive, run in zip(scene.drives, recordings, strict=True))
@@ -335,18 +333,18 @@ def _record(
 
 
 def _recording(
-    rng: np.random.Generator, drive: Drive, noise: Noise, clean: Array, wrong_mps: float, wrong_for_s: float,
+    rng: np.random.Generator, drive: Drive, noise: Noise, clean: Array, wrong: tuple[float, float] | None,
 ) -> Recording:
     """What the recorder writes: the speed signal is noisy and rounded, the distance is its integral.
 
     The noise is large enough for the rounding to leave no lasting error: after a minute the distance is wrong by a
-    millimetre to two centimetres, and by more where the speed is wrong by ``wrong_mps`` (coloured noise).
+    millimetre to two centimetres, and by more where the speed is ``wrong``: by so much [m/s], for so long [s].
     """
     t = drive.times_s
     step = _log_uniform(rng, 0.002, 0.02)
     speed = drive.speed_at_mps(t) + rng.uniform(0.5, 0.7) * step * rng.standard_normal(t.size)
-    if wrong_mps:
-        speed = speed + wrong_mps * _coloured(rng, t.size, np.exp(-1 / RATE_HZ / wrong_for_s))
+    if wrong:
+        speed = speed + wrong[0] * _coloured(rng, t.size, np.exp(-1 / RATE_HZ / wrong[1]))
     speed = step * np.round(speed / step)
     wrong = np.concatenate([[0.0], np.cumsum((speed - drive.speed_at_mps(t))[:-1])]) / RATE_HZ
     return Recording(t, noise.add(clean, rng), speed, drive.distance_m(t) + wrong, clean)

@@ -92,7 +92,7 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("What nobody could see", [
             "In these cases the car's own numbers and the distance, each within what it may be off by, can do all that "
             "the weakest effect does but for less than 1 % of the error, as the examiner's own simulator has it. They "
-            "count in all figures above as they came out."], _unseen(records)),
+            "count in all figures above as they came out. Distances that wander may hide more."], _unseen(records)),
     ]
 
 
@@ -267,9 +267,9 @@ class Matrix:
 
 
 _MATRIX_LINES = (
-    "Cases that hid one thing, or nothing: what was hidden (rows) and what was said first (columns; a case off the "
-    "list counts as unexplained where that was said, whatever else was). *Confused*: so many of the row named another "
-    "first and the right one as what cannot be told from it, which counts as right.",)
+    "Cases that hid one thing, or nothing, and whose distance is right: what was hidden (rows) and what was said "
+    "first (columns; a case off the list counts as unexplained where that was said, whatever else was). *Confused*: "
+    "so many of the row named another first and the right one as what cannot be told from it, which counts as right.",)
 
 
 def _row(record: Record) -> str:

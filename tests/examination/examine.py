@@ -1,7 +1,7 @@
 """The examination of the lab: random cases with hidden effects, put before ``ridelog diagnose`` and ``add-effect``.
 
     python tests/examination/examine.py                    the whole of it, and the report
-    python tests/examination/examine.py --one 20 --none 0 --two 0 --outsider 0 --docs DIR
+    python tests/examination/examine.py --one 20 --none 0 --two 0 --outsider 0 --wandering 0 --docs DIR
     python tests/examination/examine.py --report-only
 
 Each case is one line of the results file as soon as it is over: stopped, the examination goes on where it was. Remove

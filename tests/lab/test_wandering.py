@@ -128,7 +128,15 @@ def test_knots_go_through_what_is_straight_between_them() -> None:
     assert slopes.times(k) == pytest.approx(k @ slopes.columns(), abs=1e-9)
 
 
-def test_a_run_too_long_for_close_knots_is_tried_with_fewer() -> None:
-    long = a_run("run", 5.0, 400.0, 1)
-    assert not wandering._in_reach(problem_of([long]), (0.03, 0.5))
-    assert wandering._in_reach(problem_of([long]), (0.012, 1.0))
+def test_the_size_of_a_wander_is_found() -> None:
+    problem = problem_of([with_wrong_speed(run, 0.08, 0.02, 3 + i) for i, run in enumerate(driven([]))])
+    state = aligned(problem, problem.start())
+    found = wandering._best_size(problem, state, wandering._places(problem, state), 2).problem.tolerance
+    assert found.wander_m == pytest.approx(0.08 * np.sqrt(2 * 0.02), rel=0.35)  # of coloured noise, integrated
+    assert found.knot_s == 0.25
+
+
+@pytest.mark.parametrize(("lasts_s", "knots_s"), [(150.0, (0.25, 0.5, 1.0)), (220.0, (0.5, 1.0)), (400.0, ())])
+def test_longer_runs_have_fewer_knots(lasts_s: float, knots_s: tuple[float, ...]) -> None:
+    problem = problem_of([a_run("run", 5.0, lasts_s, 1)])
+    assert tuple(one for one in (0.25, 0.5, 1.0) if wandering._in_reach(problem, one)) == knots_s
