@@ -15,7 +15,7 @@ from logger.identification.parameters import read
 from logger.lab.fitting import Problem, Slopes, State
 from logger.lab.settling import settled
 from logger.lab.spread import with_spread
-from logger.lab.wandering import moved_m, relaid
+from logger.lab.wandering import aligned_anew, lying, moved_m, relaid
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
@@ -68,11 +68,13 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
     loose      the same, not firm: it shows how far the car would have to bend without the added effects
     """
     recorded = problem
+    problem, _ = lying(recorded, recorded.start((*present, *added)))
     before, after, slopes = _without_and_with(problem, present, added)
-    laid = relaid(problem, after, problem)
+    laid = relaid(problem, after, recorded)
     if laid is not problem:
-        problem, loose = laid, loose.over(laid.runs)
+        problem = laid
         before, after, slopes = _without_and_with(problem, present, added)
+    loose = loose.over(problem.runs)
     bent, slopes_before = settled(loose, before)
     _, spread_before = with_spread(loose, bent, slopes_before)
     effects, spread = with_spread(problem, after, slopes)
@@ -91,9 +93,9 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
 def _without_and_with(problem: Problem, present: Sequence[Chosen],
                       added: Sequence[Chosen]) -> tuple[State, State, Slopes]:
     """The car fitted without and with the effects, and slopes near the latter."""
-    before, _ = settled(problem, problem.start(present))
+    before, _ = settled(problem, aligned_anew(problem, problem.start(present)))
     # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
     starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
-              problem.start((*present, *added)))
+              aligned_anew(problem, problem.start((*present, *added))))
     return before, *settled(problem, min(starts, key=problem.deviance))
 

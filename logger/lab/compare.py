@@ -93,11 +93,14 @@ def _refitted(
     body bounce."""
     problem = Problem(runs, given or vehicle, Tolerance(), whole=True, stands=vehicle)
     names = problem.nuisance.names
-    state, _ = settled(problem, problem.start(effects))
-    recorded, laid = problem, wandering.relaid(problem, state, problem)
+    recorded, nominal = problem, problem.start(effects)
+    problem, start = wandering.lying(recorded, nominal)
+    state, _ = settled(problem, start)
+    laid = wandering.relaid(problem, state, recorded)
     if laid is not problem:
-        problem, runs = laid, laid.runs
-        state, _ = settled(problem, problem.start(effects))
+        problem = laid
+        state, _ = settled(problem, wandering.aligned_anew(problem, nominal))
+    runs = problem.runs
     if problem.error(state) > plain.error:
         return plain, dict.fromkeys(names, 0.0), (), 0.0
     car = problem.car(state.effects, state.logs)

@@ -39,7 +39,8 @@ _CLEARLY, _MUCH = 20.0, 500.0
 """What a larger wander, or a factor or delay for all runs, has to gain in minus twice the logarithm of likelihood; and
 what such a one has to gain beside a larger wander, as a model that lacks something seems early or late as well."""
 _PROMISING = 0.4
-_BLOCK_S, _SLOWEST_MPS, _LEAST_BLOCKS, _CHANCE = 10.0, 1.0, 4, 1e-3
+_TOO_FAR = 3.0
+"""A factor or a start of a run that is off by more deviations of what is granted asks for a look."""
 _WORTH_ALIGNING = 0.01
 """A round that gains a smaller share of what was gained is the last, to tell which wander is likelier."""
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
@@ -85,14 +86,14 @@ class _Laid:
 def lying(problem: Problem, state: State) -> tuple[Problem, State]:
     """The problem with its runs about where they lie beside a model as it was given, and the model there: near enough
     for it to be refitted there, and the runs laid anew beside that."""
-    there = aligned(problem, state)
+    there = aligned_anew(problem, state)
     laid = relaid(problem, there, problem, roughly=True)
     return (problem, there) if laid is problem else (laid, aligned_anew(laid, state))
 
 
 def aligned_anew(problem: Problem, state: State) -> State:
-    """A model of other runs aligned with these, from where they have it."""
-    return aligned(problem, problem.unmoved(state.effects, state.logs))
+    """A model aligned with runs from where they have it, or where they are followed along the road from there."""
+    return aligned(problem, _followed(problem, state, _places(problem)))
 
 
 def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = False) -> Problem:
@@ -104,41 +105,32 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     roughly     where the larger of two wanders has them, however close its knots should be
     """
     usual = problem.tolerance
-    if problem is recorded and problem.judged_error(state) < ASTRAY and not _promises(problem, state):
+    if problem is recorded and problem.judged_error(state) < ASTRAY and not (
+            _far(problem, state) or _promises(problem, state)):
         return problem  # runs that were laid beside a model that lacked more are looked at again in any case
     own = _best_size(recorded, state, _places(problem, state), 0 if roughly else _TIMES_SIZED)
-    if own.problem.tolerance == usual:
+    wanders = own.problem.tolerance != usual
+    if not wanders and not _far(own.problem, own.state):
         return recorded
     own = own if roughly else _finished(own)
-    # One factor or one delay of all runs may be what seems to wander, or be there besides.
-    moved = _finished(_laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places))
-    common = _common(usual, moved)
-    unmoved = _over(recorded, moved.problem.moved_m(common)).granting(_anywhere(usual))
-    if _finished(_laid(unmoved, state, _places(unmoved))).lost < own.lost - _CLEARLY:
+    # One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own.
+    each = _finished(_laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places))
+    factor, delay = _common(usual, each)
+    common = each.problem.moved_m([one + other for one, other in zip(factor, delay, strict=True)])
+    unmoved = _over(recorded, common).granting(usual)
+    if _finished(_laid(unmoved, state, _places(unmoved))).lost < min(own.lost, each.lost) - _CLEARLY:
         return recorded
-    if moved.lost < own.lost - _MUCH:
-        return _over(problem.over(moved.problem.runs), moved.problem.moved_m(
-            [k - one for k, one in zip(moved.state.wander, common, strict=True)]))
-    return _over(problem.over(own.problem.runs), _without_factor(own.problem.runs.runs,
-                                                                 own.problem.moved_m(own.state.wander)))
+    if each.lost < own.lost - (_MUCH if wanders else _CLEARLY):
+        return _at(problem, [place - one for place, one in zip(each.places, common, strict=True)])
+    if not wanders:
+        return recorded
+    return _at(problem, [place - one for place, one in zip(own.places, own.problem.moved_m(factor), strict=True)])
 
 
-def _without_factor(runs: Sequence[Run], farther_m: Sequence[Array]) -> list[Array]:
-    """By how much runs are farther than recorded (n,) [m], but for one factor of all of them, if there is one: if what
-    they gain in each length of time says so (Student's test)."""
-    from scipy.stats import ttest_1samp
-
-    shares: list[float] = []
-    for run, farther in zip(runs, farther_m, strict=True):
-        ends = np.arange(run.first, run.count, round(_BLOCK_S * run.rate_hz))
-        way, gained = np.diff(run.distance_m[ends]), np.diff(farther[ends])
-        drives = way > _SLOWEST_MPS * _BLOCK_S
-        shares += list(gained[drives] / way[drives])
-    if len(shares) < _LEAST_BLOCKS or not ttest_1samp(shares, 0.0).pvalue < _CHANCE:
-        return list(farther_m)
-    factor = float(np.mean(shares))
-    return [farther - factor * (run.distance_m - run.distance_m[0])
-            for run, farther in zip(runs, farther_m, strict=True)]
+def _far(problem: Problem, state: State) -> bool:
+    """Whether a model lies so that a run's factor or start is farther off than is granted."""
+    return any(abs(k[wander.knots]) > _TOO_FAR * problem.tolerance.scale or abs(k[0]) > _TOO_FAR *
+               problem.tolerance.start_m for wander, k in zip(problem.wander, state.wander, strict=True))
 
 
 def _over(problem: Problem, farther_m: Sequence[Array]) -> Problem:
@@ -251,8 +243,13 @@ def _smooth(run: Run) -> Array:
 
 
 def _laid(problem: Problem, state: State, places: list[Array]) -> _Laid:
-    """A model laid out where the runs lie, beginning at places (n,) [m] or where they are followed along the road from
-    there, whichever is likelier."""
+    """A model laid out where the runs lie, beginning at places (n,) [m]."""
+    return _Laid.of(problem, _followed(problem, state, places))
+
+
+def _followed(problem: Problem, state: State, places: list[Array]) -> State:
+    """A model aligned from places (n,) of the runs [m] or from where they are followed along the road from there,
+    whichever is likelier; well enough to tell that."""
     best = _aligned_from(problem, state, places)
     for _ in range(_FOLLOWED):
         followed = [place + followed_m(run, prediction) for place, run, prediction in zip(
@@ -261,11 +258,11 @@ def _laid(problem: Problem, state: State, places: list[Array]) -> _Laid:
         if problem.deviance(there) > problem.deviance(best) - _CLEARLY:
             break
         best = there
-    return _Laid.of(problem, best)
+    return best
 
 
 def _aligned_from(problem: Problem, state: State, places: list[Array]) -> State:
-    """A model aligned from places (n,) of the runs [m], well enough to tell how likely it can be there."""
+    """A model aligned from places (n,) of the runs [m]."""
     wander = [one.through(place - run.distance_m, run)
               for one, place, run in zip(problem.wander, places, problem.runs.runs, strict=True)]
     return aligned(problem, problem.laid_out(state.effects, state.logs, wander), _WORTH_ALIGNING)
@@ -276,14 +273,36 @@ def _finished(laid: _Laid) -> _Laid:
     return _Laid.of(laid.problem, aligned(laid.problem, laid.state))
 
 
-def _common(tolerance: Tolerance, found: _Laid) -> list[Array]:
-    """What of the wander (k,) of each run is one factor, of the scale that was fitted, and one delay that all runs have
-    (generalised least squares, with factors and starts as a tolerance has them)."""
-    problem = found.problem.granting(replace(found.problem.tolerance, scale=tolerance.scale, start_m=tolerance.start_m))
-    along = [np.stack([one.by_factor, one.through(run.speed_mps, run)])
-             for one, run in zip(problem.wander, problem.runs.runs, strict=True)]
-    sizes = np.sum([one @ prior.precision @ one.T for one, prior in zip(along, problem.wander, strict=True)], axis=0)
-    pulls = np.sum([one @ prior.precision @ k for one, prior, k in zip(
-        along, problem.wander, found.state.wander, strict=True)], axis=0)
-    factor_and_delay = np.linalg.lstsq(sizes, pulls, rcond=None)[0]
-    return [factor_and_delay @ one for one in along]
+def _common(usual: Tolerance, found: _Laid) -> tuple[list[Array], list[Array]]:
+    """What of the wander (k,) of each run is one factor and what one delay that all runs have: generalised least
+    squares, with factors and starts of their own as is usual, or as far apart as they are; nothing where there is none.
+    """
+    runs, k = found.problem.runs.runs, found.state.wander
+    wanders = found.problem.granting(replace(found.problem.tolerance, scale=usual.scale, start_m=usual.start_m)).wander
+    along = [np.stack([one.by_factor, one.through(run.speed_mps, run)]) for one, run in zip(wanders, runs, strict=True)]
+    _, left = _explained(wanders, along, k)
+    scale = max(usual.scale, _deviation([own[one.knots] for one, own in zip(wanders, left, strict=True)]))
+    start_m = max(usual.start_m, _deviation([own[0] for own in left]))
+    wanders = found.problem.granting(replace(found.problem.tolerance, scale=scale, start_m=start_m)).wander
+    least, best = np.inf, np.zeros(2)
+    for parts in ([0, 1], [0], [1], []):
+        sizes, left = _explained(wanders, [one[parts] for one in along], k)
+        cost = sum(float(own @ one.precision @ own) for one, own in zip(wanders, left, strict=True))
+        if cost + _CLEARLY * len(parts) < least:
+            least, best = cost + _CLEARLY * len(parts), np.zeros(2)
+            best[parts] = sizes
+    return [best[0] * one[0] for one in along], [best[1] * one[1] for one in along]
+
+
+def _explained(wanders: Sequence[Wander], along: Sequence[Array], k: Sequence[Array]) -> tuple[Array, list[Array]]:
+    """How much of each of some common ways of being off (m, k), per run, there is (m,), and what of the wander (k,) is
+    left then."""
+    sizes = np.sum([one @ prior.precision @ one.T for one, prior in zip(along, wanders, strict=True)], axis=0)
+    pulls = np.sum([one @ prior.precision @ own for one, prior, own in zip(along, wanders, k, strict=True)], axis=0)
+    much = np.linalg.lstsq(sizes, pulls, rcond=None)[0] if len(pulls) else pulls
+    return much, [own - much @ one for one, own in zip(along, k, strict=True)]
+
+
+def _deviation(left: Sequence[float]) -> float:
+    """Of numbers of runs from which one of all was taken away."""
+    return float(np.sqrt(np.sum(np.square(left)) / max(1, len(left) - 1)))
