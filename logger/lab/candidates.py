@@ -30,7 +30,8 @@ from logger.lab.fitting import (
 )
 from logger.lab.noise import left_to_explain
 from logger.lab.prediction import Run
-from logger.lab.settling import settled
+from logger.lab.settling import aligned, settled
+from logger.lab.wandering import far
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,7 @@ _STEPS, _ROUNDS = 5, 4
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
 _ALIKE_SHARE = 0.01
+_WORTH_ALIGNING = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,10 +321,14 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
 
 
 def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:
-    """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing."""
-    nothing = np.zeros(base.weighed.count)
-    state = problem.laid_out((*base.state.effects, one), *base.weighed.parted(nothing))
-    return Trial(one, base.objective - base.weighed.objective(state), nothing)
+    """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing; or of the
+    car as it is, aligned anew, where a wander that is hardly granted puts these right."""
+    effects = (*base.state.effects, one)
+    states = [problem.laid_out(effects, *base.weighed.parted(np.zeros(base.weighed.count)))]
+    if far(problem, base.state):
+        states.append(aligned(problem, problem.unmoved(effects, base.state.logs), _WORTH_ALIGNING))
+    return max((Trial(one, base.objective - base.weighed.objective(state), base.weighed.joined(state))
+                for state in states), key=lambda trial: trial.gain)
 
 
 def _scaled(one: Chosen, strength: float) -> Chosen | None:

@@ -106,11 +106,11 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     """
     usual = problem.tolerance
     if problem is recorded and problem.judged_error(state) < ASTRAY and not (
-            _far(problem, state) or _promises(problem, state)):
+            far(problem, state) or _promises(problem, state)):
         return problem  # runs that were laid beside a model that lacked more are looked at again in any case
     own = _best_size(recorded, state, _places(problem, state), 0 if roughly else _TIMES_SIZED)
     wanders = own.problem.tolerance != usual
-    if not wanders and not _far(own.problem, own.state):
+    if not wanders and not far(own.problem, own.state):
         return recorded
     own = own if roughly else _finished(own)
     # One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own.
@@ -127,8 +127,8 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     return _at(problem, [place - one for place, one in zip(own.places, own.problem.moved_m(factor), strict=True)])
 
 
-def _far(problem: Problem, state: State) -> bool:
-    """Whether a model lies so that a run's factor or start is farther off than is granted."""
+def far(problem: Problem, state: State) -> bool:
+    """Whether a model lies so that a run's factor or start is farther off than is likely by what is granted."""
     return any(abs(k[wander.knots]) > _TOO_FAR * problem.tolerance.scale or abs(k[0]) > _TOO_FAR *
                problem.tolerance.start_m for wander, k in zip(problem.wander, state.wander, strict=True))
 
