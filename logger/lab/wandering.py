@@ -118,7 +118,7 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     factor, delay = _common(usual, each)
     common = each.problem.moved_m([one + other for one, other in zip(factor, delay, strict=True)])
     unmoved = _over(recorded, common).granting(usual)
-    if _finished(_laid(unmoved, state, _places(unmoved))).lost < min(own.lost, each.lost) - _CLEARLY:
+    if _finished(_laid(unmoved, state, _places(unmoved))).lost < (own if wanders else each).lost - _CLEARLY:
         return recorded
     if each.lost < own.lost - (_MUCH if wanders else _CLEARLY):
         return _at(problem, [place - one for place, one in zip(each.places, common, strict=True)])
