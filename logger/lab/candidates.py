@@ -190,7 +190,8 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         trial = _trial(problem, base, chosen(effect, values))
         if effect.realigns:
-            trial = max(trial, _afresh(problem, base, chosen(effect, values)), key=lambda one: one.gain)
+            by_much = values is not trials[0] and far(problem, base.state)
+            trial = max(trial, _afresh(problem, base, chosen(effect, values), by_much), key=lambda one: one.gain)
         if choice not in best or trial.gain > best[choice].gain:
             best[choice] = trial
     return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)), len(trials))
@@ -320,12 +321,12 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
     return Trial(trial.one, base.objective - squares, trial.joined)
 
 
-def _afresh(problem: Problem, base: Base, one: Chosen) -> Trial:
+def _afresh(problem: Problem, base: Base, one: Chosen, by_much: bool) -> Trial:
     """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing; or of the
-    car as it is, aligned anew, where a wander that is hardly granted puts these right."""
+    car as it is, aligned anew, where a wander that is hardly granted puts these right (``by_much``)."""
     effects = (*base.state.effects, one)
     states = [problem.laid_out(effects, *base.weighed.parted(np.zeros(base.weighed.count)))]
-    if far(problem, base.state):
+    if by_much:
         states.append(aligned(problem, problem.unmoved(effects, base.state.logs), _WORTH_ALIGNING))
     return max((Trial(one, base.objective - base.weighed.objective(state), base.weighed.joined(state))
                 for state in states), key=lambda trial: trial.gain)

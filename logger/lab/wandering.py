@@ -105,10 +105,12 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     roughly     where the larger of two wanders has them, however close its knots should be
     """
     usual = problem.tolerance
-    if problem is recorded and problem.judged_error(state) < ASTRAY and not (
-            far(problem, state) or _promises(problem, state)):
-        return problem  # runs that were laid beside a model that lacked more are looked at again in any case
-    own = _best_size(recorded, state, _places(problem, state), 0 if roughly else _TIMES_SIZED)
+    # Runs that were laid beside a model that lacked more are looked at again in any case.
+    may_wander = problem is not recorded or problem.judged_error(state) >= ASTRAY or _promises(problem, state)
+    if not may_wander and not far(problem, state):
+        return problem
+    sizes = (_LARGE, _SMALL) if may_wander else ()
+    own = _best_size(recorded, state, _places(problem, state), sizes, 0 if roughly else _TIMES_SIZED)
     wanders = own.problem.tolerance != usual
     if not wanders and not far(own.problem, own.state):
         return recorded
@@ -192,16 +194,18 @@ def _anywhere(tolerance: Tolerance) -> Tolerance:
     return replace(tolerance, scale=_ANY_SCALE, start_m=_ANY_START_M)
 
 
-def _best_size(recorded: Problem, state: State, places: list[Array], times: int) -> _Laid:
+def _best_size(recorded: Problem, state: State, places: list[Array], sizes: Sequence[tuple[float, float]],
+               times: int) -> _Laid:
     """The size of wander with the most evidence: the usual one, of the runs as they were recorded, unless another, of
     smooth ones, is clearly better; then the one that the wander has, once it is known, with close knots.
 
     places    where the model lies beside the runs (n,) [m], or near it
+    sizes     the larger ones that are tried until one is better
     times     how often the size is found anew, at most
     """
     smooth = _at(recorded, [_smooth(run) for run in recorded.runs.runs])
     best = usual = _laid(recorded.granting(recorded.tolerance), state, _places(recorded))
-    for size in (_LARGE, _SMALL):
+    for size in sizes:
         if best is usual and _in_reach(recorded, size[1]):
             found = _laid(smooth.granting(_sized(recorded.tolerance, size)), state, places)
             best = found if found.lost < usual.lost - _CLEARLY else usual
