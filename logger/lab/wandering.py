@@ -6,7 +6,8 @@ one that grants the much lets it swallow effects. Solution: the runs are followe
 and laid out with a usual and with a larger wander. The one with more evidence is taken: the likelihood with the wander
 integrated out, by Laplace's approximation (D. J. C. MacKay, Neural Computation 4, 1992). If that is the larger one, its
 size is found anew from the wander itself, the runs get the distances that they then have, and what is left to wander is
-as usual. A wrong factor or a late clock, which is one for all of the runs, stays for the effects to explain.
+as usual. Runs that each have a factor and a start of their own are laid by these. One wrong factor or one late clock of
+all runs stays for the effects to explain.
 """
 
 from __future__ import annotations
@@ -115,7 +116,8 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     if not wanders and not far(own.problem, own.state):
         return recorded
     own = own if roughly else _finished(own)
-    # One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own.
+    # One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own. A
+    # model that lacks something seems late in all runs as well, so that a delay beside a wander has to gain much.
     each = _finished(_laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places))
     factor, delay = _common(usual, each)
     common = each.problem.moved_m([one + other for one, other in zip(factor, delay, strict=True)])
