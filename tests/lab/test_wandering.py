@@ -143,7 +143,8 @@ def test_knots_go_through_what_is_straight_between_them() -> None:
 def test_the_size_of_a_wander_is_found() -> None:
     problem = problem_of([with_wrong_speed(run, 0.08, 0.02, 3 + i) for i, run in enumerate(driven([]))])
     state = aligned(problem, problem.start())
-    found = wandering._best_size(problem, state, wandering._places(problem, state), (wandering._LARGE,), 2).problem.tolerance
+    laid = wandering._best_size(problem, state, wandering._places(problem, state), (wandering._LARGE,), 2)
+    found = laid.problem.tolerance
     assert found.wander_m == pytest.approx(0.08 * np.sqrt(2 * 0.02), rel=0.35)  # of coloured noise, integrated
     assert found.knot_s == 0.25
 
