@@ -7,13 +7,10 @@ at the end shows what kind of frames it may be. End it with Ctrl-C.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +19,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import open_serial
 from drivers.ports import BytePort
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.service.stop import stopped_by_signals
 from logger.units import US_PER_S
 
 _CHUNK_BYTES = 4096
@@ -51,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         writer = _new_dump(args.out, header)
         print(f"recording {args.port} at {args.baud} baud to {args.out}; Ctrl-C ends it", file=sys.stderr)
         try:
-            with _stopped_by_signals() as stop:
+            with stopped_by_signals() as stop:
                 look, total, duration_s, fault = _record(port, writer, args.seconds, stop.is_set, _now_us)
         finally:
             writer.close()
@@ -129,19 +127,6 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
             told_us, told_bytes = at_us, total
             writer.flush(sync=True)
     return bytes(look), total, (now_us() - start_us) / US_PER_S, fault
-
-
-@contextmanager
-def _stopped_by_signals() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and SIGTERM set, while inside."""
-    stop = threading.Event()
-    wanted = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: stop.set()) for number in wanted]
-    try:
-        yield stop
-    finally:
-        for number, handler in zip(wanted, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _new_dump(path: Path, header: DumpHeader) -> DumpWriter:

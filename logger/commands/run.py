@@ -9,12 +9,11 @@ from __future__ import annotations
 import argparse
 import logging
 import os
-import signal
-import threading
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
 from logger.service.config import find_config, load_config
+from logger.service.stop import Stop, stopped_by_signals
 
 PAUSE_S = 30
 
@@ -30,9 +29,11 @@ def run(args: argparse.Namespace) -> int:
     logging.basicConfig(
         level=logging.DEBUG if args.verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s"
     )
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    with stopped_by_signals() as stop:
+        return _served(args, stop)
+
+
+def _served(args: argparse.Namespace, stop: Stop) -> int:
     try:
         config = load_config(find_config(args.config))
         from logger.service.start import serve

@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 from drivers.dump import Event
 from logger.service.core import Core
+from logger.service.stop import Stop
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.units import US_PER_S
@@ -132,7 +133,7 @@ class LiveService:
         self._floor_us = 0
         self._unsynced_us: int | None = None
 
-    def run(self, stop: threading.Event) -> None:
+    def run(self, stop: Stop) -> None:
         """Until ``stop`` is set; then finish the current window and close the files."""
         sys.setswitchinterval(THREAD_SWITCH_S)
         for listener in self._listeners:

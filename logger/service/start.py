@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -24,6 +23,7 @@ from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
 from logger.service.priority import go_first
 from logger.service.sources import Bma220Source, SerialSource, Source
+from logger.service.stop import Stop
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.store.folder_lock import FolderLock
@@ -36,7 +36,7 @@ LONGEST_BEAT_S = 2.0
 log = logging.getLogger(__name__)
 
 
-def serve(config: Config, stop: threading.Event) -> None:
+def serve(config: Config, stop: Stop) -> None:
     """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError where no folder can be."""
     go_first()
     _make(config.log.directory)
@@ -44,7 +44,7 @@ def serve(config: Config, stop: threading.Event) -> None:
         _serve(config, stop)
 
 
-def _serve(config: Config, stop: threading.Event) -> None:
+def _serve(config: Config, stop: Stop) -> None:
     sensor = assemble.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
     facts = assemble.sidecar(config, sensor, vehicle)

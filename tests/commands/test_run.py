@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from logger.commands import run as command
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.service import start
+from logger.service.stop import Stop
 
 
 @pytest.fixture(autouse=True)
@@ -21,7 +21,7 @@ def waited(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     """How long the command has waited [s]; its signals go back to what they were."""
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     seen: list[float] = []
-    monkeypatch.setattr(threading.Event, "wait", lambda self, timeout=None: seen.append(timeout) or False)
+    monkeypatch.setattr(Stop, "wait", lambda self, seconds: seen.append(seconds) or False)
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     yield seen
     for number, handler in before.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 from logger.service import start
 from logger.service.config import Config, LogConfig
 from logger.service.live import HANG_US, Listener, monotonic_us
+from logger.service.stop import Stop
 from logger.service.storage import Storage
 from logger.store.space import Limits
 
@@ -36,7 +36,7 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         def __init__(self, core: object, storage: Storage, listeners: list[Listener], *rest: Any) -> None:
             parts.update(storage=storage, listeners=listeners, beat=rest[-1])
 
-        def run(self, stop: threading.Event) -> None:
+        def run(self, stop: Stop) -> None:
             parts["storage"].close()
 
     def storage(*arguments: Any) -> Storage:
@@ -48,7 +48,7 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr(start, "Notifier", lambda: parts["told"])
     monkeypatch.setattr(start, "go_first", lambda: None)
     log = replace(LogConfig(tmp_path / "log"), quota_bytes=123_456_789, keep_free_bytes=987_654)
-    start.serve(Config(log=log, status_file=tmp_path / "status.json"), threading.Event())
+    start.serve(Config(log=log, status_file=tmp_path / "status.json"), Stop())
     parts["told"].words.clear()
     return parts
 
