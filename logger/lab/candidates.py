@@ -30,7 +30,7 @@ from logger.lab.fitting import (
 )
 from logger.lab.noise import left_to_explain
 from logger.lab.prediction import Run
-from logger.lab.settling import aligned, settled
+from logger.lab.settling import WORTH_ALIGNING, aligned, settled
 from logger.lab.wandering import far
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 
@@ -43,7 +43,6 @@ _STEPS, _ROUNDS = 5, 4
 TOLD_APART = 10.0
 """Gains that differ by less do not tell two effects apart."""
 _ALIKE_SHARE = 0.01
-_WORTH_ALIGNING = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,12 +185,18 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     base = base.without(problem, effect.replaces)
     best: dict[tuple[float, ...], Trial] = {}
+    astray = effect.realigns and far(problem, base.state)
+    lying: list[State] = []
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
-        trial = _trial(problem, base, chosen(effect, values))
+        one = chosen(effect, values)
+        found = [_trial(problem, base, one)]
         if effect.realigns:
-            by_much = values is not trials[0] and far(problem, base.state)
-            trial = max(trial, _afresh(problem, base, chosen(effect, values), by_much), key=lambda one: one.gain)
+            found.append(_of(base, _as_given(problem, base, one)))
+        if astray and values is not trials[0]:
+            lying = [_aligned(problem, base, one, lying)]
+            found.append(_of(base, lying[0]))
+        trial = max(found, key=lambda one: one.gain)
         if choice not in best or trial.gain > best[choice].gain:
             best[choice] = trial
     return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)), len(trials))
@@ -321,15 +326,23 @@ def _as_predicted(problem: Problem, base: Base, trial: Trial) -> Trial:
     return Trial(trial.one, base.objective - squares, trial.joined)
 
 
-def _afresh(problem: Problem, base: Base, one: Chosen, by_much: bool) -> Trial:
-    """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing; or of the
-    car as it is, aligned anew, where a wander that is hardly granted puts these right (``by_much``)."""
+def _as_given(problem: Problem, base: Base, one: Chosen) -> State:
+    """A trial of the car as it was given: where positions are wrong, what was fitted before is worth nothing."""
+    return problem.laid_out((*base.state.effects, one), *base.weighed.parted(np.zeros(base.weighed.count)))
+
+
+def _aligned(problem: Problem, base: Base, one: Chosen, nearby: Sequence[State]) -> State:
+    """A trial of the car as it is, aligned anew from the runs as they are or from where some other trials lie: where a
+    wander that is hardly granted puts positions right, others do with the effect."""
     effects = (*base.state.effects, one)
-    states = [problem.laid_out(effects, *base.weighed.parted(np.zeros(base.weighed.count)))]
-    if by_much:
-        states.append(aligned(problem, problem.unmoved(effects, base.state.logs), _WORTH_ALIGNING))
-    return max((Trial(one, base.objective - base.weighed.objective(state), base.weighed.joined(state))
-                for state in states), key=lambda trial: trial.gain)
+    starts = [problem.unmoved(effects, base.state.logs)]
+    starts += [problem.laid_out(effects, base.state.logs, other.wander) for other in nearby]
+    return aligned(problem, min(starts, key=problem.deviance), WORTH_ALIGNING)
+
+
+def _of(base: Base, state: State) -> Trial:
+    """A state, whose last effect is tried, as a trial."""
+    return Trial(state.effects[-1], base.objective - base.weighed.objective(state), base.weighed.joined(state))
 
 
 def _scaled(one: Chosen, strength: float) -> Chosen | None:

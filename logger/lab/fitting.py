@@ -179,16 +179,17 @@ class Problem:
         return [Whitener(one, cells) for one, cells in zip(self.stretches, self.cells(state), strict=True)]
 
     def slopes(self, state: State, steps: Array | None = None) -> Slopes:
-        """Of a state that was laid out; ``steps`` (p,) of the car's numbers."""
+        """Of a state that was laid out; ``steps`` (p,) of the car's numbers. Those are told well enough by a rough
+        simulation."""
         steps = self.nuisance.steps if steps is None else steps
         count = len(self.nuisance.names)
         by_number = [np.empty((count, len(one))) for one in self.measured]
         moved = self.moved_m(state.wander)
-        unmoved = self.runs.predict(self.car(state.effects, state.logs), moved)
+        unmoved = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
         for index in range(count):
             step = np.zeros(count)
             step[index] = steps[index]
-            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved)
+            shifted = self.runs.predict(self.car(state.effects, state.logs + step), moved, rough=True)
             for column, there, here in zip(by_number, shifted, unmoved, strict=True):
                 column[index] = (there - here) / step[index]
         return Slopes(by_number, self.wander_slopes(state), [k.copy() for k in state.wander], state.names)

@@ -19,6 +19,8 @@ from logger.lab.noise import left_to_explain
 
 _STEPS, _SETTLED = 5, 2.0
 _ALIGNING_ROUNDS = 20
+WORTH_ALIGNING = 0.01
+"""A round that gains a smaller share of what was gained is the last, where it is only to be told what is likelier."""
 
 
 def aligned(problem: Problem, state: State, worth: float = 0.0) -> State:

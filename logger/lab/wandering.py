@@ -22,7 +22,7 @@ from logger.lab.alignment import followed_m
 from logger.lab.fitting import Problem, State, wander_seen
 from logger.lab.nuisance import Tolerance, Wander
 from logger.lab.prediction import Run, Runs
-from logger.lab.settling import aligned
+from logger.lab.settling import WORTH_ALIGNING, aligned
 
 Array = npt.NDArray[np.float64]
 
@@ -42,8 +42,6 @@ what such a one has to gain beside a larger wander, as a model that lacks someth
 _PROMISING = 0.4
 _TOO_FAR = 3.0
 """A factor or a start of a run that is off by more deviations of what is granted asks for a look."""
-_WORTH_ALIGNING = 0.01
-"""A round that gains a smaller share of what was gained is the last, to tell which wander is likelier."""
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
 
 
@@ -271,7 +269,7 @@ def _aligned_from(problem: Problem, state: State, places: list[Array]) -> State:
     """A model aligned from places (n,) of the runs [m]."""
     wander = [one.through(place - run.distance_m, run)
               for one, place, run in zip(problem.wander, places, problem.runs.runs, strict=True)]
-    return aligned(problem, problem.laid_out(state.effects, state.logs, wander), _WORTH_ALIGNING)
+    return aligned(problem, problem.laid_out(state.effects, state.logs, wander), WORTH_ALIGNING)
 
 
 def _finished(laid: _Laid) -> _Laid:

@@ -57,15 +57,12 @@ SPRING, DAMPER, MOUNT, TIRE = range(4)
 @_compiled
 def _sum(result: Array, first: int, start: Array, by: Array, count: int, rows: Array) -> None:
     """Let the result, from ``first`` on, be the start and ``count`` rows, each times its number in ``by``."""
-    for r in range(first, len(result), LANES):
-        one, two, three, four = start[r], start[r + 1], start[r + 2], start[r + 3]
-        for c in range(count):
-            number = by[c]
-            one += number * rows[c, r]
-            two += number * rows[c, r + 1]
-            three += number * rows[c, r + 2]
-            four += number * rows[c, r + 3]
-        result[r], result[r + 1], result[r + 2], result[r + 3] = one, two, three, four
+    for r in range(first, len(result)):
+        result[r] = start[r]
+    for c in range(count):
+        number = by[c]
+        for r in range(first, len(result)):
+            result[r] += number * rows[c, r]
 
 
 @_compiled
