@@ -103,30 +103,42 @@ def relaid(problem: Problem, state: State, recorded: Problem, roughly: bool = Fa
     recorded    the problem with the runs where they were recorded
     roughly     where the larger of two wanders has them, however close its knots should be
     """
-    usual = problem.tolerance
     # Runs that were laid beside a model that lacked more are looked at again in any case.
     may_wander = problem is not recorded or problem.judged_error(state) >= ASTRAY or _promises(problem, state)
     if not may_wander and not far(problem, state):
         return problem
     sizes = (_LARGE, _SMALL) if may_wander else ()
     own = _best_size(recorded, state, _places(problem, state), sizes, 0 if roughly else _TIMES_SIZED)
-    wanders = own.problem.tolerance != usual
-    if not wanders and not far(own.problem, own.state):
+    if not _wanders(recorded, own) and not far(own.problem, own.state):
         return recorded
-    own = own if roughly else _finished(own)
-    # One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own. A
-    # model that lacks something seems late in all runs as well, so that a delay beside a wander has to gain much.
+    places = _where_driven(recorded, state, own if roughly else _finished(own))
+    return recorded if places is None else _at(recorded, places)
+
+
+def _wanders(recorded: Problem, own: _Laid) -> bool:
+    """Whether a larger wander than the usual one was found."""
+    return own.problem.tolerance != recorded.tolerance
+
+
+def _where_driven(recorded: Problem, state: State, own: _Laid) -> list[Array] | None:
+    """Where the runs were driven (n,) [m], by a model laid out with the size of wander that they have; None: where they
+    were recorded, for all that can be told.
+
+    One factor or one delay of all runs may be what seems to wander, or be there besides; or each run has its own. A
+    model that lacks something seems late in all runs as well, so that a delay beside a wander has to gain much.
+    """
+    wanders, usual = _wanders(recorded, own), recorded.tolerance
     each = _finished(_laid(own.problem.granting(_anywhere(own.problem.tolerance)), own.state, own.places))
     factor, delay = _common(usual, each)
     common = each.problem.moved_m([one + other for one, other in zip(factor, delay, strict=True)])
     unmoved = _over(recorded, common).granting(usual)
     if _finished(_laid(unmoved, state, _places(unmoved))).lost < (own if wanders else each).lost - _CLEARLY:
-        return recorded
+        return None
     if each.lost < own.lost - (_MUCH if wanders else _CLEARLY):
-        return _at(problem, [place - one for place, one in zip(each.places, common, strict=True)])
+        return [place - one for place, one in zip(each.places, common, strict=True)]
     if not wanders:
-        return recorded
-    return _at(problem, [place - one for place, one in zip(own.places, own.problem.moved_m(factor), strict=True)])
+        return None
+    return [place - one for place, one in zip(own.places, own.problem.moved_m(factor), strict=True)]
 
 
 def far(problem: Problem, state: State) -> bool:
@@ -156,7 +168,7 @@ def told(farther_m: float) -> list[str]:
     """What a person should know of runs that were laid elsewhere, by so much at most [m]."""
     if farther_m == 0:
         return []
-    return ["The distances of these runs wander by more than usual: the runs were laid where the model finds them, up "
+    return ["The distances of these runs are off by more than usual: the runs were laid where the model finds them, up "
             f"to {farther_m:.2g} m from where they were recorded."]
 
 

@@ -76,7 +76,7 @@ def test_a_distance_that_wanders_lacks_no_physics_and_hides_none(wrong: tuple[fl
         runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(driven(effects))]
         found = diagnose(problem_of(runs), EFFECTS)
         assert found.verdict == tuple(one.effect.name for one in effects) and not found.unexplained
-        assert any("wander by more than usual" in line for line in summary(told(found, EFFECTS)))
+        assert any("are off by more than usual" in line for line in summary(told(found, EFFECTS)))
 
 
 def test_an_effect_is_added_where_the_runs_lie() -> None:
