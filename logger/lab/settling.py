@@ -18,8 +18,8 @@ from logger.lab.fitting import (
 from logger.lab.noise import left_to_explain
 
 _STEPS, _SETTLED = 5, 2.0
-_ALIGNING_ROUNDS = 20
-WORTH_ALIGNING = 0.01
+_ALIGNING_ROUNDS = 60
+WORTH_ALIGNING = 0.004
 """A round that gains a smaller share of what was gained is the last, where it is only to be told what is likelier."""
 
 
@@ -35,7 +35,7 @@ def aligned(problem: Problem, state: State, worth: float = 0.0) -> State:
         nothing = [np.zeros((numbers, len(prediction))) for prediction in state.predictions]
         slopes = Slopes(nothing, problem.wander_slopes(state), state.wander, state.names)
         weighed = Weighed(problem, slopes, problem.whiteners(state), still=True)
-        trial = improved(weighed, state, [], _STEPS, laid_out=True)
+        trial = improved(weighed, state, [], 1, laid_out=True)  # slopes by the wander are cheaper than a simulation
         gained = least - problem.deviance(trial)
         if gained > 0:
             least, state = least - gained, trial

@@ -12,6 +12,7 @@ Then the average over the patch is made of parabolas, and the integral of that a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ _POINT_M = 1e-4
 _SHORT_STEP_M = 1e-4
 # Knots nearer to each other than this share of a spacing are one.
 _SAME_KNOT = 1e-9
+_KEPT_PATHS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,11 @@ class Track:
         if not np.isfinite(self.elevation_m).all():
             raise ValueError("track: expected finite elevations")
 
+    @cached_property
+    def _paths(self) -> dict[float, tuple[TirePath, ...]]:
+        """What tires of the last few patches met: fits ask for the same ones hundreds of times."""
+        return {}
+
     @property
     def end_m(self) -> float:
         """Where the last sample lies [m]."""
@@ -57,8 +64,14 @@ class Track:
 
     def tire_paths(self, patch_m: float) -> tuple[TirePath, ...]:
         """What tires of this patch [m, 0 or more] meet on each track: one path, or the left and the right one."""
-        columns = self.elevation_m.reshape(len(self.elevation_m), -1).T
-        return tuple(TirePath(self.start_m, self.spacing_m, column, patch_m) for column in columns)
+        known = self._paths.get(patch_m)  # another thread may put others in its place at any time
+        if known is None:
+            columns = self.elevation_m.reshape(len(self.elevation_m), -1).T
+            known = tuple(TirePath(self.start_m, self.spacing_m, column, patch_m) for column in columns)
+            for old in [*self._paths][:-_KEPT_PATHS + 1]:
+                self._paths.pop(old, None)
+            self._paths[patch_m] = known
+        return known
 
     def averaged(self, distance_m: npt.ArrayLike, patch_m: float) -> Array:
         """Mean elevation over a patch centred at each distance (m,), exact: (m,), or (m, 2) for two tracks [m]."""

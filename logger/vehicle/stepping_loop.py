@@ -61,8 +61,9 @@ def _sum(result: Array, first: int, start: Array, by: Array, count: int, rows: A
         result[r] = start[r]
     for c in range(count):
         number = by[c]
-        for r in range(first, len(result)):
-            result[r] += number * rows[c, r]
+        if number != 0.0:  # forces of laws that a car does not have
+            for r in range(first, len(result)):
+                result[r] += number * rows[c, r]
 
 
 @_compiled
