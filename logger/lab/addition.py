@@ -3,13 +3,17 @@
 Problem: whoever adds an effect wants its numbers with their errors, and wants to see what else changed: a missing
 effect pulls the car's own numbers away from the truth, and adding it lets them go back. Solution: the car is fitted
 with and without the effect on all of the runs, each number comes with its standard error from the information matrix,
-and both fits are told side by side.
+and both fits are told side by side. What is written holds on to the numbers that were given; what is told side by side
+does not, on either side, so that nothing but the effect makes the difference.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
 
 from logger.identification.parameters import read
 from logger.lab.fitting import Problem, Slopes, State
@@ -19,11 +23,16 @@ from logger.lab.wandering import aligned_anew, lying, moved_m, relaid
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
+Array = npt.NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the car: as it was given, refitted without the added effects, and with them; with standard errors,
-    which include how far off it may have been."""
+    """A number of the car: as it was given, refitted without the added effects, and with them, as far off as the runs
+    ask for; with standard errors, which include how far off it may have been.
+
+    written    with the effects, held near what was given: what the vehicle has then
+    """
 
     name: str
     nominal: float
@@ -31,6 +40,7 @@ class Number:
     without_standard_error: float
     found: float
     found_standard_error: float
+    written: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,37 +75,43 @@ def add(problem: Problem, loose: Problem, present: Sequence[Chosen], added: Sequ
     that these have are where the fit begins.
 
     problem    firm, so that what is still missing beside these effects does not bend the car, and they not with it
-    loose      the same, not firm: it shows how far the car would have to bend without the added effects
+    loose      the same, not firm: it shows how far the car has to bend without the added effects, and with them
     """
     recorded = problem
     problem, _ = lying(recorded, recorded.start((*present, *added)))
-    before, after, slopes = _without_and_with(problem, present, added)
-    laid = relaid(problem, after, recorded)
+    before, after = _without_and_with(problem, present, added)
+    laid = relaid(problem, after[0], recorded)
     if laid is not problem:
         problem = laid
-        before, after, slopes = _without_and_with(problem, present, added)
+        before, after = _without_and_with(problem, present, added)
     loose = loose.over(problem.runs)
-    bent, slopes_before = settled(loose, before)
-    _, spread_before = with_spread(loose, bent, slopes_before)
-    effects, spread = with_spread(problem, after, slopes)
-    vehicle = problem.nuisance.vehicle(problem.vehicle, after.logs)
-    earlier = problem.nuisance.vehicle(problem.vehicle, bent.logs)
+    (bent, spread_before), (freed, spread_after) = (_freed(problem, loose, *one) for one in (before, after))
+    effects, _ = with_spread(problem, *after)
+    vehicle = problem.nuisance.vehicle(problem.vehicle, after[0].logs)
+    without, found = (problem.nuisance.vehicle(problem.vehicle, state.logs) for state in (bent, freed))
     numbers = tuple(
-        Number(name, read(problem.vehicle, name), read(earlier, name), read(earlier, name) * float(was),
-               read(vehicle, name), read(vehicle, name) * float(now))
-        for name, was, now in zip(problem.nuisance.names, spread_before, spread, strict=True)
+        Number(name, read(problem.vehicle, name), read(without, name), read(without, name) * float(was),
+               read(found, name), read(found, name) * float(now), read(vehicle, name))
+        for name, was, now in zip(problem.nuisance.names, spread_before, spread_after, strict=True)
     )
-    written = recorded.unmoved(after.effects, after.logs)
-    return Added(vehicle, effects, numbers, recorded.error(recorded.start(present)), problem.error(before),
-                 problem.error(after), recorded.error(written), problem, moved_m(recorded, problem), before, after)
+    written = recorded.unmoved(after[0].effects, after[0].logs)
+    return Added(vehicle, effects, numbers, recorded.error(recorded.start(present)), problem.error(before[0]),
+                 problem.error(after[0]), recorded.error(written), problem, moved_m(recorded, problem), before[0],
+                 after[0])
 
 
 def _without_and_with(problem: Problem, present: Sequence[Chosen],
-                      added: Sequence[Chosen]) -> tuple[State, State, Slopes]:
-    """The car fitted without and with the effects, and slopes near the latter."""
-    before, _ = settled(problem, aligned_anew(problem, problem.start(present)))
+                      added: Sequence[Chosen]) -> tuple[tuple[State, Slopes], tuple[State, Slopes]]:
+    """The car fitted without and with the effects, each with slopes near it."""
+    before, slopes = settled(problem, aligned_anew(problem, problem.start(present)))
     # A car that was refitted without what is missing may be bent too far, or lie too wrong, to begin with.
     starts = (problem.laid_out((*before.effects, *added), before.logs, before.wander),
               aligned_anew(problem, problem.start((*present, *added))))
-    return before, *settled(problem, min(starts, key=problem.deviance))
+    return (before, slopes), settled(problem, min(starts, key=problem.deviance))
 
+
+def _freed(problem: Problem, loose: Problem, state: State, slopes: Slopes) -> tuple[State, Array]:
+    """The model fitted without holding on to the car's numbers, and standard errors of their logarithms (p,)."""
+    if problem.nuisance.held(state.logs):
+        state, slopes = settled(loose, state, slopes=slopes)
+    return state, with_spread(loose, state, slopes)[1]

@@ -30,7 +30,8 @@ _NAMED = 4
 class Moved:
     """A number of the car: as it was given, refitted without effects that were added later, and with them.
 
-    shift    from the one to the other, in standard errors of the last
+    shift      from the one to the other, in standard errors of the last
+    written    what the vehicle has now, held near what was given
     """
 
     name: str
@@ -40,6 +41,7 @@ class Moved:
     found: float
     standard_error: float
     shift: float
+    written: float
 
     @property
     def biased(self) -> bool:
@@ -101,7 +103,8 @@ def moved_between(first: Added, last: Added) -> list[Moved]:
     first."""
     found = [
         Moved(one.name, one.nominal, one.without, one.without_standard_error, now.found, now.found_standard_error,
-              (now.found - one.without) / now.found_standard_error if now.found_standard_error > 0 else 0.0)
+              (now.found - one.without) / now.found_standard_error if now.found_standard_error > 0 else 0.0,
+              now.written)
         for one, now in zip(first.numbers, last.numbers, strict=True)
     ]
     return sorted(found, key=lambda one: -abs(one.shift))
@@ -155,19 +158,19 @@ def bias(names: Sequence[str], moved: Sequence[Moved]) -> str:
     more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
     worst = biased[0]
     return (f"Without {together} these were biased: {listed}{more}. {worst.name} came out {worst.too_much}, "
-            f"{abs(worst.shift):.1f} standard errors away from what it is now.")
+            f"{abs(worst.shift):.1f} standard errors away from what it is with {'it' if len(names) == 1 else 'them'}.")
 
 
 MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Without and with: refitted, in per cent from what was given, ± standard error. Shift: from the one "
-              "to the other in standard errors. A number that moved by more than two had been bent to make up for what "
-              "was missing.")
+MOVED_HINT = ("Without and with: refitted as far as the runs ask for, in per cent from what was given, ± standard "
+              "error. Now: what the vehicle has, held near what was given. Shift: from without to with in standard "
+              "errors. A number that moved by more than two had been bent to make up for what was missing.")
 
 
 def moved_rows(moved: Sequence[Moved]) -> Iterator[tuple[str, str, str, str, str, str]]:
     """Under ``MOVED_HEADS``."""
     for one in moved:
-        yield (one.name, f"{one.found:.5g}", f"{one.without / one.nominal - 1:+.1%}",
+        yield (one.name, f"{one.written:.5g}", f"{one.without / one.nominal - 1:+.1%}",
                f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}", f"{one.shift:+.1f}",
                "was biased" if one.biased else "")
 
@@ -185,7 +188,8 @@ def as_json(found: Gained) -> dict[str, Any]:
         "noise_floor_error": found.floor, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
                      "without_standard_error": one.without_standard_error, "with": one.found,
-                     "with_standard_error": one.standard_error, "shift_standard_errors": one.shift}
+                     "with_standard_error": one.standard_error, "shift_standard_errors": one.shift,
+                     "written": one.written}
                     for one in found.moved],
         "biased": [one.name for one in found.moved if one.biased],
     }

@@ -78,6 +78,10 @@ class Nuisance:
         return (2 * _FIRMNESS * beyond**3 * np.sign(logs) / self.deviations,
                 6 * _FIRMNESS * beyond**2 / self.deviations**2)
 
+    def held(self, logs: Array) -> bool:
+        """Whether firmness holds on to one of these numbers (p,), which would else be farther off."""
+        return self.firm and bool(self._beyond(logs).any())
+
     def _beyond(self, logs: Array) -> Array:
         return np.maximum(np.abs(logs / self.deviations) - _FREE, 0.0)
 

@@ -48,7 +48,7 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
     assert [step.step for step in model.history] == ["as it was given", "numbers refitted", "added dry_friction"]
     assert model.history[-1].error == told["error_after"]
     mass = next(one for one in told["numbers"] if one["name"] == "sprung_mass_kg")
-    assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["with"]
+    assert mass["nominal"] == 875 and model.vehicle.sprung_mass_kg == mass["written"]
 
     # Rebound and bump are alike in this car: one more number gains nothing.
     assert add("damper_asymmetry:rebound_to_bump_ratio=1.1", first, second, *runs) == 0

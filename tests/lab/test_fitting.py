@@ -79,7 +79,7 @@ def test_an_effect_is_found_with_its_number_and_its_error() -> None:
     error = added.effects[0].standard_errors["rebound_to_bump_ratio"]
     assert abs(ratio - true["rebound_to_bump_ratio"]) < max(4 * error, 0.02 * ratio)
     assert added.error_after < added.error_refitted < added.error_before
-    assert read(added.vehicle, "sprung_mass_kg") == added.numbers[0].found
+    assert read(added.vehicle, "sprung_mass_kg") == added.numbers[0].written
 
 
 def test_a_null_effect_explains_nothing() -> None:

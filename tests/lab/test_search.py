@@ -11,6 +11,7 @@ from logger.lab.addition import add
 from logger.lab.candidates import Base, misalignment, screened
 from logger.lab.diagnosis import Diagnosis, diagnose
 from logger.lab.fitting import Problem
+from logger.lab.gained import gained
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Run, Runs
 from logger.lab.settling import aligned, settled
@@ -120,7 +121,7 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     runs = runs_of(CAR, [friction, offset])
     firm, loose = (Problem(runs, CAR, Tolerance(), whole=True, firm=firm) for firm in (True, False))
     first = add(firm, loose, [], [friction])
-    bent = max(abs(one.found / one.nominal - 1) for one in first.numbers)
+    bent = max(abs(one.written / one.nominal - 1) for one in first.numbers)
     assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to what was granted
     assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
     firm, loose = (Problem(runs, CAR, Tolerance(), whole=True, stands=first.vehicle, firm=one) for one in (True, False))
@@ -129,7 +130,16 @@ def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() 
     found = {one.effect.name: one for one in second.effects}
     assert found["sensor_offset"].values["offset_m"] == pytest.approx(0.4, rel=0.06)
     assert found["dry_friction"].values["friction_force_n"] == pytest.approx(90.0, rel=0.06)
-    assert max(abs(one.found / one.nominal - 1) for one in second.numbers) < 0.5 * bent
+    assert max(abs(one.written / one.nominal - 1) for one in second.numbers) < 0.5 * bent
+
+
+def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends() -> None:
+    runs = runs_of(CAR, [chosen(EFFECTS["sensor_offset"], {"offset_m": 0.4})])
+    firm, loose = (Problem(runs, CAR, Tolerance(), whole=True, firm=firm) for firm in (True, False))
+    added = add(firm, loose, [], [chosen(EFFECTS["wheel_lift"], {})])
+    assert any(abs(one.written - one.found) > 2 * one.found_standard_error for one in added.numbers)  # it was held
+    found = gained(added, ["wheel_lift"])
+    assert not found.helps and not any(one.biased for one in found.moved)
 
 
 def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
