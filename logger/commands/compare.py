@@ -99,10 +99,10 @@ def _tables(found: Comparison) -> list[str]:
 
 def _row(plain: Part | None, refitted: Part, unit: str) -> str:
     name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", f"{plain.error:.3f}") if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error:>8.3f}"
+    share, error = (f"{plain.share:.1%}", plain.error_told(3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_told(3):>8}"
 
 
 def _place(part: Part, run: str) -> str:
     name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error:>8.3f}"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_told(3):>8}"

@@ -59,7 +59,7 @@ class Trend:
     p_value: float
 
 
-UNKNOWN = Trend(0.0, 0.0, float("nan"))
+UNKNOWN = Trend(float("nan"), float("nan"), float("nan"))
 
 
 def aligned(beside: Beside) -> Alignment:

@@ -49,7 +49,8 @@ class Band:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the data: its share of the power left out, and its error (rms left / rms measured, in it).
+    """A part of the data: its share of the power left out, and its error (rms left / rms measured, in it; NaN where
+    nothing was measured).
 
     low, high    its ends, in the unit of the list it stands in
     left_mps2    rms of what is left in it
@@ -64,6 +65,10 @@ class Part:
     left_mps2: float
     samples: int
     name: str = ""
+
+    def error_told(self, digits: int) -> str:
+        """The error with so many digits behind the point; a dash where there is none."""
+        return f"{self.error:.{digits}f}" if np.isfinite(self.error) else "-"
 
 
 @dataclass(frozen=True)
@@ -257,4 +262,4 @@ def _parts(values: Array, edges: Array, left: Array, measured: Array, whole: flo
 
 
 def _ratio(power: float, of: float) -> float:
-    return float(np.sqrt(power / of)) if of > 0 else 0.0
+    return float(np.sqrt(power / of)) if of > 0 else float("nan")

@@ -185,7 +185,8 @@ def _standing_json(standing: Standing) -> dict[str, Any]:
     beside, where = standing.beside, standing.where
     return {
         "error": standing.error,
-        "runs": [{"run": run.name, "error": error([run], [prediction]), "samples": run.count - run.first}
+        "runs": [{"run": run.name, "error": _finite(error([run], [prediction])),
+                  "samples": run.count - run.first}
                  for run, prediction in zip(beside.runs, beside.predictions, strict=True)],
         "where": {
             "frequency": [{**_part_json(part, "hz"), "name": part.name} for part in where.frequency],
@@ -198,11 +199,12 @@ def _standing_json(standing: Standing) -> dict[str, Any]:
 
 
 def _part_json(part: Part, unit: str) -> dict[str, Any]:
-    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": part.error, "error_power_share": part.share}
+    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": _finite(part.error),
+            "error_power_share": part.share}
 
 
 def _mark_json(mark: Mark) -> dict[str, Any]:
-    return {"name": mark.name, "found": mark.found, "value": mark.value, "unit": mark.unit,
+    return {"name": mark.name, "found": mark.found, "value": _finite(mark.value), "unit": mark.unit,
             "standard_error": _finite(mark.standard_error), "p_value": _finite(mark.p_value)}
 
 

@@ -46,7 +46,7 @@ _UNKNOWN = float("nan")
 class Mark:
     """One mark.
 
-    value, unit        what it is, and its standard error where there is one
+    value, unit        what it is, and its standard error where there is one; NaN where the runs cannot tell
     p_value            how probable it would be in noise; NaN where the runs cannot tell
     large              whether it is large enough to matter
     road               whether it ties what is left to the road or to the car's motion
@@ -131,7 +131,7 @@ def _frequency(beside: Beside, where: Located) -> Mark:
     width = (part.high - part.low) / whole
     return Mark("frequency", part.share, "1", None, min(chances[best], 1.0), part.share > 2 * width, False,
                 f"{_percent(part.share)} of the power of what is left sits {_band_words(part)}, where white noise "
-                f"would have {_percent(width)}; there the error is {part.error:.2f}.")
+                f"would have {_percent(width)}; there the error is {part.error_told(2)}.")
 
 
 def _lean(beside: Beside) -> Mark:
@@ -409,7 +409,7 @@ def _correlation(one: Array, other: Array, freedom: int) -> tuple[float, float]:
     one, other = one - one.mean(), other - other.mean()
     size = float(np.sqrt((one @ one) * (other @ other)))
     if freedom < 6 or not size > 0:
-        return 0.0, _UNKNOWN
+        return _UNKNOWN, _UNKNOWN
     rho = float(one @ other) / size
     return rho, float(2 * t.sf(abs(rho) * np.sqrt(freedom / max(1 - rho**2, 1e-12)), freedom))
 
@@ -441,7 +441,7 @@ def _size(curve: Curve) -> float:
 
 def _nothing(name: str, unit: str) -> Mark:
     """A mark that these runs cannot have."""
-    return Mark(name, 0.0, unit, None, _UNKNOWN, False, False, "")
+    return Mark(name, _UNKNOWN, unit, None, _UNKNOWN, False, False, "")
 
 
 # --- words ---

@@ -88,7 +88,7 @@ def _candidates(found: Verdict) -> str:
 
 def _where(shape: Shape) -> str:
     """By frequency, and along the way."""
-    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", f"{part.error:.2f}")
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_told(2))
             for part in shape.where.frequency]
     drawn = grid(("Band", "Hz", "Share of what is left", "Error"), rows)
     if shape.turns is not None and shape.turns.found:

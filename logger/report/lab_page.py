@@ -97,7 +97,7 @@ def _places(standing: Standing) -> str:
     drawn = picture(along) if lines else ""
     rows = "".join(f"<tr><td>{escape(names[part.name])}</td><td class=n>{part.low:g} to {part.high:g}</td>"
                    f"<td class=n>{part.share:.1%}</td><td class=n>{part.left_mps2:.3g}</td>"
-                   f"<td class=n>{part.error:.2f}</td></tr>" for part in worst_places(standing.where, _WORST))
+                   f"<td class=n>{part.error_told(2)}</td></tr>" for part in worst_places(standing.where, _WORST))
     return (f'<section><h2>By place</h2>{drawn}<div class="scroll"><table><tr><th>Run</th><th class=n>From, to [m]</th>'
             "<th class=n>Share of what is left</th><th class=n>Left [m/s2]</th><th class=n>Error</th></tr>"
             f"{rows}</table></div></section>")
@@ -146,12 +146,12 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
     stands = any(one is not None for one, _ in pairs)
 
     def before(one: Part | None) -> str:
-        return f"<td class=n>{f'{one.error:.3f}' if one else ''}</td>" if stands else ""
+        return f"<td class=n>{one.error_told(3) if one else ''}</td>" if stands else ""
 
     rows = "".join(
         f"<tr>{f'<td>{escape(part.name)}</td>' if part.name else ''}<td class=n>{part.low:.3g} to {part.high:.3g}</td>"
         f'<td class="bar"><span class="f0" style="width:{part.share:.1%}"></span></td><td class=n>{part.share:.1%}</td>'
-        f"<td class=n>{part.error:.3f}</td>{before(one)}</tr>" for one, part in pairs)
+        f"<td class=n>{part.error_told(3)}</td>{before(one)}</tr>" for one, part in pairs)
     first = "<th>Band</th>" if refitted[0].name else ""
     return (f'<section><h2>{title}</h2><div class="scroll"><table><tr>{first}<th class=n>From, to [{unit}]</th>'
             "<th>Share of what is left</th><th></th><th class=n>Error</th>"
@@ -160,8 +160,8 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
 
 def _marks(marks: Sequence[Mark]) -> str:
     rows = "".join(
-        f"<tr><td>{escape(mark.name)}</td><td class=n>{mark.value:.3g} {escape(mark.unit if mark.unit != '1' else '')}"
-        f"</td><td class=n>{'' if mark.standard_error is None else f'{mark.standard_error:.2g}'}</td>"
+        f"<tr><td>{escape(mark.name)}</td><td class=n>{_measured(mark.value, mark.unit)}"
+        f"</td><td class=n>{_measured(mark.standard_error)}</td>"
         f"<td class=n>{_chance(mark.p_value)}</td><td>{'found' if mark.found else ''}</td></tr>" for mark in marks)
     return ('<section><h2>All marks</h2><div class="scroll"><table><tr><th>Mark</th><th class=n>Value</th>'
             "<th class=n>Standard error</th><th class=n>Chance in noise</th><th></th></tr>"
@@ -179,6 +179,13 @@ def _numbers(found: Comparison) -> str:
 
 def _titled(title: str, curve: Curve) -> str:
     return f"{title}: would explain {curve.share:.0%} of what is left"
+
+
+def _measured(value: float | None, unit: str = "1") -> str:
+    """A number with its unit; nothing where it is not known."""
+    if value is None or not np.isfinite(value):
+        return ""
+    return escape(f"{value:.3g} {unit}" if unit != "1" else f"{value:.3g}")
 
 
 def _chance(p_value: float) -> str:

@@ -52,6 +52,19 @@ def test_errors_of_parts_are_ratios_of_rms() -> None:
         assert part.error == pytest.approx(0.25)  # 0.2 of the model is 0.25 of what is left to be measured
 
 
+def test_where_nothing_was_measured_there_is_no_error() -> None:
+    dead = slice(600, 900)  # three seconds of zeros
+
+    def silent(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
+        return np.where((np.arange(len(prediction)) >= dead.start) & (np.arange(len(prediction)) < dead.stop),
+                        -prediction, 0.05)
+
+    where = located(beside_with(silent))
+    unknown = [part for part in where.place if not np.isfinite(part.error)]
+    assert unknown and all(part.left_mps2 > 0 and part.error_told(3) == "-" for part in unknown)
+    assert all(part.error > 0 for part in where.place if part not in unknown)
+
+
 def test_runs_are_called_by_their_folders_while_those_differ() -> None:
     one, other, third = a_run("a/run1", 8.0, 5.0, 1), a_run("a/run2", 8.0, 5.0, 1), a_run("b/run2", 8.0, 5.0, 1)
     assert short_names([one, other]) == {"a/run1": "run1", "a/run2": "run2"}

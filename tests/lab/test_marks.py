@@ -207,7 +207,10 @@ def test_a_run_of_five_seconds_can_be_read() -> None:
     rng = np.random.default_rng(1)
     short = Beside([measuring(run, prediction[0] + white(run, prediction[0], rng))], nothing.car, prediction,
                    runs.respond(nothing.car))
-    assert not marks(short).found
+    found = marks(short)
+    assert not found.found
+    assert all(np.isnan(mark(found, name).value) for name in ("drift", "shift"))  # too few windows to tell
+
 
 
 def test_a_model_that_leaves_nothing() -> None:
