@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from logger.commands.lab_model import check_model, check_out, paragraphs
 from logger.commands.lab_runs import lab_runs
-from logger.errors import EXIT_DONE, BadInput
+from logger.errors import EXIT_DONE, BadInput, naming
 
 if TYPE_CHECKING:
     from logger.lab.beside import Part
@@ -56,7 +56,8 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.lab_page import page
 
-        args.out.write_text(page(found), "utf-8")
+        with naming(args.out):
+            args.out.write_text(page(found), "utf-8")
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:

@@ -28,7 +28,7 @@ from logger.commands.lab_model import (
     paragraphs,
     wipe,
 )
-from logger.errors import EXIT_DONE, BadInput
+from logger.errors import EXIT_DONE, BadInput, naming
 
 if TYPE_CHECKING:
     from logger.lab.verdict import Verdict
@@ -61,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.diagnosis_page import page
 
-        args.out.write_text(page(found, given.model.vehicle.name), "utf-8")
+        with naming(args.out):
+            args.out.write_text(page(found, given.model.vehicle.name), "utf-8")
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
         return EXIT_DONE

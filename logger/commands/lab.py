@@ -22,7 +22,7 @@ from logger.commands.add_effect import lines as added_lines
 from logger.commands.diagnose import diagnosed
 from logger.commands.diagnose import lines as diagnosis_lines
 from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
-from logger.errors import EXIT_DONE, BadInput
+from logger.errors import EXIT_DONE, BadInput, naming
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison
@@ -54,9 +54,8 @@ def run(args: argparse.Namespace) -> int:
 
     given = bench(args)
     asks = not (args.yes or args.json) and sys.stdin.isatty()
-    if not (asks or args.yes or args.json):
-        print("Nobody is at a terminal to be asked: what is found missing is added (as with --yes).", file=sys.stderr)
-    story = walk(given, args.out, _asked if asks else take, silent if args.json else say)
+    ask = _asked if asks else take if args.yes or args.json else _taking()
+    story = walk(given, args.out, ask, silent if args.json else say)
     if args.json:
         print(json.dumps(as_json(story) | {"story": str(args.out / STORY)}, allow_nan=False))
     return EXIT_DONE
@@ -90,6 +89,8 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
         verdicts.append(diagnosed(given, frozenset(refused)))
         tell(diagnosis_lines(verdicts[-1], _SHOWN))
         for one in verdicts[-1].missing:
+            if len(rounds) == _MOST_ROUNDS:
+                break
             wanted = ask(given, one.effect.name)
             if wanted is None:
                 refused.append(one.effect.name)
@@ -106,7 +107,8 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
                 going = True
                 break
     story = Story(first, tuple(verdicts), tuple(rounds), tuple(refused))
-    (out / STORY).write_text(page(story), "utf-8")
+    with naming(out / STORY):
+        (out / STORY).write_text(page(story), "utf-8")
     tell(_chapter("The end", why.get("end")))
     tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
     return story
@@ -156,6 +158,21 @@ def _compared(given: Bench) -> Comparison:
 def take(_given: Bench, name: str) -> str:
     """Whatever the verdict is."""
     return name
+
+
+def _taking() -> Ask:
+    """As ``take``, and says so the first time: not before, where bad input may still be all that there is to say."""
+    said = False
+
+    def ask(given: Bench, name: str) -> str:
+        nonlocal said
+        if not said:
+            print("Nobody is at a terminal to be asked: what is found missing is added (as with --yes).",
+                  file=sys.stderr)
+        said = True
+        return take(given, name)
+
+    return ask
 
 
 def _asked(given: Bench, name: str) -> str | None:

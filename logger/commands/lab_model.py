@@ -230,8 +230,21 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
         raise BadInput(f"{option} {out}: expected another file than those that are read")
     if not out.parent.is_dir() or out.is_dir():
         raise BadInput(f"{option} {out}: expected a file in a folder that there is")
-    if not os.access(out if out.exists() else out.parent, os.W_OK):
+    if not _may_be_written(out):
         raise BadInput(f"{option} {out}: expected a file that may be written")
+
+
+def _may_be_written(path: Path) -> bool:
+    """Whether a file can be written, as far as that shows without writing. What is there stays as it is; one that is
+    not there is made and taken away: permissions alone do not tell of all that root, or a file system, cannot do."""
+    if path.exists():
+        return os.access(path, os.W_OK)
+    try:
+        path.touch(exist_ok=False)
+        path.unlink()
+    except OSError:
+        return False
+    return True
 
 
 def on_screen() -> Callable[[str], None]:

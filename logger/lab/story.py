@@ -44,6 +44,12 @@ class Story:
         return [name for one in self.rounds for name in one.gained.names]
 
     @property
+    def left(self) -> list[str]:
+        """Names of the effects that were found missing last and neither added nor refused: the rounds were used up."""
+        missing = [one.effect.name for one in self.verdicts[-1].missing]
+        return [name for name in missing if name not in self.added and name not in self.refused]
+
+    @property
     def floor(self) -> float | None:
         """The error that the sensor's noise alone makes."""
         return self.rounds[-1].gained.floor if self.rounds else self.verdicts[-1].diagnosis.noise_floor_error
@@ -66,6 +72,7 @@ class Story:
 def ending(story: Story) -> list[str]:
     """What it came to."""
     verdict, steps = story.verdicts[-1], story.steps
+    with_what = [bias(story.added, story.moved)] if story.added else []
     lines = []
     if story.added:
         lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f} to {steps[-1][1]:.3f}, "
@@ -75,15 +82,17 @@ def ending(story: Story) -> list[str]:
         lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:
         lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
-    elif verdict.diagnosis.strained and not verdict.diagnosis.left_over:
+    if story.left:
+        lines.append(f"Found missing and not added: {', '.join(story.left)}. Go on with the last file.")
+    if story.refused or story.left:
+        return [*lines, *with_what]
+    if verdict.diagnosis.strained and not verdict.diagnosis.left_over:
         lines.append("Numbers of the vehicle's file are off by more than was granted: see whether they can be right.")
     elif verdict.diagnosis.unexplained:
         lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
     else:
         lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can tell.")
-    if story.added:
-        lines.append(bias(story.added, story.moved))
-    return lines
+    return [*lines, *with_what]
 
 
 def as_json(story: Story) -> dict[str, Any]:
@@ -91,7 +100,8 @@ def as_json(story: Story) -> dict[str, Any]:
     verdict = story.verdicts[-1]
     return {
         "error_before": story.steps[0][1], "error_after": story.steps[-1][1], "noise_floor_error": story.floor,
-        "added": story.added, "refused": list(story.refused), "unexplained": verdict.diagnosis.unexplained,
+        "added": story.added, "refused": list(story.refused), "left": story.left,
+        "unexplained": verdict.diagnosis.unexplained,
         "steps": [{"step": words, "error": error} for words, error in story.steps],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from collections.abc import Callable
 from html import escape
 from html.parser import HTMLParser
@@ -125,6 +126,30 @@ def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, c
     assert [one.effect.name for one in read_model(tmp_path / "vehicle-2.yaml").effects] == ["sensor_gain",
                                                                                             "sensor_offset"]
     assert len(read_model(tmp_path / "vehicle-2.yaml").history) == 4
+
+
+def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    out = tmp_path / "file"
+    out.touch()
+    done = subprocess.run([ridelog, "lab", "--vehicle", "rav4-2009", runs[0], "--out", str(out)], check=False,
+                          capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"ridelog: --out {out}: expected a folder\n"
+
+
+def test_no_more_files_are_written_than_were_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("logger.commands.lab._MOST_ROUNDS", 1)
+    two = [*named("sensor_offset", offset_m=0.5), *named("time_offset", delay_s=0.02)]
+    few = {one.effect.name: one.effect for one in two}
+    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    assert lab(write_runs(tmp_path / "runs", two, lasts_s=12.0), tmp_path / "out", "--yes") == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["story.html", "vehicle-1.yaml"]
+    words = " ".join(capsys.readouterr().out.split())
+    added = read_model(tmp_path / "out" / "vehicle-1.yaml").effects[0].effect.name
+    left = ({"sensor_offset", "time_offset"} - {added}).pop()
+    assert f"Found missing and not added: {left}." in words and "Nothing more is missing" not in words
 
 
 def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
