@@ -10,15 +10,15 @@ from zipfile import ZipFile
 
 from logger.commands.lab import STORY, say, silent, take, walk
 from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs
-from logger.errors import BadInput
+from logger.errors import BadInput, naming
 
 if TYPE_CHECKING:
     from logger.lab.story import Story
 
 _INTRODUCTION = (
-    "Somebody drove a RAV4 twice along a poor town street with speed bumps, once slowly and once briskly, with an "
-    "accelerometer on the body. The street was measured beforehand, and the file of the car, rav4-2009, comes with "
-    "ridelog. Something is in this car that its file does not know; what, the lab is to find out."
+    "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on the one and briskly on the other, "
+    "with an accelerometer on the body. Both streets were measured beforehand, and the file of the car, rav4-2009, "
+    "comes with ridelog. Something is in this car that its file does not know; what, the lab is to find out."
 )
 _EXPLAINED = {
     "compare": "First question: does the model fail at all, or are only its numbers a little off? Nominal masses and "
@@ -54,12 +54,25 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
 
 
 def unpack(out: Path) -> list[Path]:
-    """Write the drives below ``out``, where they may be already; their folders."""
+    """Write the drives below ``out``, where they may be already; their folders.
+
+    Raises BadInput, and writes nothing, where something else of one of their names is there; OSError as ``open``.
+    """
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out {out}: expected a folder")
     with resources.as_file(resources.files("logger.demo") / "lab.zip") as file, ZipFile(file) as archive:
-        archive.extractall(out)
-        return sorted({out / Path(name).parent for name in archive.namelist()}, reverse=True)
+        contents = {out / name: archive.read(name) for name in archive.namelist()}
+    for path, content in contents.items():
+        if path.parent.exists() and not path.parent.is_dir():
+            raise BadInput(f"{path.parent}: expected a folder, or nothing; choose another folder with --out")
+        if path.exists() and not (path.is_file() and path.read_bytes() == content):
+            raise BadInput(f"{path}: expected nothing there, or the demo's own file, found something else; choose "
+                           "another folder with --out")
+    for path, content in contents.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with naming(path):
+            path.write_bytes(content)
+    return sorted({path.parent for path in contents}, reverse=True)
 
 
 def _answer(story: Story) -> list[str]:

@@ -1,9 +1,9 @@
 """Makes the drives of the lab's tutorial: ``python -m logger.demo.lab_drives FILE.zip``.
 
-Two drives of forty seconds in a 2009 RAV4, over a poor town street with speed bumps, slowly and less slowly. All of it
-is simulated. The car differs from what its file says in two ways: its masses, springs and dampers are off by up to 3 %,
-as those of any car are; and it has one physical effect that the file does not know. Readers of the tutorial should find
-out which before they read on here.
+Two drives of forty seconds in a 2009 RAV4, over two poor town streets with speed bumps, slowly and less slowly. All of
+it is simulated. The car differs from what its file says in two ways: its masses, springs and dampers are off by up to
+3 %, as those of any car are; and it has one physical effect that the file does not know. Readers of the tutorial should
+find out which before they read on here.
 """
 
 from __future__ import annotations

@@ -1,0 +1,67 @@
+"""``ridelog demo --lab --unpack``: what is said of the drives is true, and nobody's files are written over."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.commands import demo_lab
+from logger.demo import lab_drives
+from logger.store.drive_file import read_run
+
+DOC = Path(__file__).parents[2] / "docs" / "lab.md"
+
+
+@pytest.fixture
+def unpack(ridelog: Path, tmp_path: Path) -> Callable[[], subprocess.CompletedProcess[str]]:
+    def run() -> subprocess.CompletedProcess[str]:
+        return subprocess.run([ridelog, "demo", "--lab", "--unpack", "--out", str(tmp_path / "lab")],
+                              capture_output=True, text=True, check=False)
+
+    return run
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_drives_are_on_two_streets_and_the_texts_say_so(tmp_path: Path) -> None:
+    slow, brisk = map(read_run, demo_lab.unpack(tmp_path))
+    common = min(len(slow.track.elevation_m), len(brisk.track.elevation_m))
+    apart_m = slow.track.elevation_m[:common] - brisk.track.elevation_m[:common]
+    assert np.sqrt(np.mean(apart_m**2)) > 0.01
+    assert slow.speed_mps.mean() < 0.7 * brisk.speed_mps.mean()
+    for text in (demo_lab._INTRODUCTION, DOC.read_text("utf-8"), str(lab_drives.__doc__)):
+        words = " ".join(text.split())
+        assert "two poor town streets" in words
+        assert not re.search(r"\bstreet\b|\btwice along", words)
+
+
+def test_the_same_drives_again_are_fine(unpack: Callable[[], subprocess.CompletedProcess[str]], tmp_path: Path) -> None:
+    assert unpack().returncode == 0
+    (tmp_path / "lab" / "brisk" / "drive.csv").unlink()
+    before = files_in(tmp_path)
+    done = unpack()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert files_in(tmp_path).items() > before.items()
+
+
+@pytest.mark.parametrize(("kept", "words"), [
+    ("slow/drive.csv", "another folder"), ("brisk/profile.csv", "another folder"), ("brisk", "expected a folder"),
+    ("slow/profile.csv/mine.txt", "another folder"),
+])
+def test_a_file_of_the_users_own_stays(
+    kept: str, words: str, unpack: Callable[[], subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
+    mine = tmp_path / "lab" / kept
+    mine.parent.mkdir(parents=True)
+    mine.write_text("t_s,mine\n", "utf-8")
+    done = unpack()
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert f"{tmp_path / 'lab' / '/'.join(kept.split('/')[:2])}: " in done.stderr and words in done.stderr
+    assert files_in(tmp_path) == {f"lab/{kept}": b"t_s,mine\n"}
