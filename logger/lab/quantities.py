@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from math import floor, isfinite, log10
 
 from logger.vehicle.effect import Chosen
 
-_UNITS = {
-    "n_s2_per_m2": "N s2/m2", "n_s_per_m": "N s/m", "n_per_m3": "N/m3", "n_per_m": "N/m", "m_per_s": "m/s",
-    "kg_m2": "kg m2", "n": "N", "kg": "kg", "hz": "Hz", "m": "m", "s": "s",
+_SYMBOLS = {
+    "n": "N", "kg": "kg", "w": "W", "j": "J", "pa": "Pa", "hz": "Hz", "m": "m", "mm": "mm", "km": "km", "s": "s",
+    "ms": "ms", "rad": "rad", "deg": "deg", "mps": "m/s",
 }
+_UNIT = rf"(?:{'|'.join(_SYMBOLS)})[2-9]?"
+# The end of a name: N s2 of ``_n_s2``, kg m2, or one unit; then what that is per, if anything. Products begin with one
+# of the first five, so that the ``m`` of ``_m_kg`` belongs to the name.
+_ENDING = re.compile(rf"(?:_(?P<over>(?:n|kg|w|j|pa)(?:_(?:m|s|rad)[2-9]?)+|{_UNIT}))?"
+                     rf"(?P<under>(?:(?:^|_)per_{_UNIT}(?:_{_UNIT})*)*)$")
 _LARGE, _SMALL = 1e6, 1e-3
 _RARE = 1e-9
 
 
 def unit_of(name: str) -> str:
-    """The unit that a name ends in; nothing for a ratio."""
-    return next((unit for ending, unit in _UNITS.items() if name.endswith(f"_{ending}")), "")
+    """The unit that a name ends in, ``N s/m`` of ``damping_n_s_per_m``, ``1/s`` of ``decay_per_s``; nothing for a
+    ratio."""
+    ending = _ENDING.search(name)
+    assert ending is not None  # the end alone is one
+    over, under = _product(ending["over"] or ""), [_product(one) for one in ending["under"].split("per_")[1:]]
+    return "/".join([over or "1" * bool(under), *(f"({one})" if {" ", "/"} & set(one) else one for one in under)])
+
+
+def _product(words: str) -> str:
+    """Symbols of units: ``N s2`` of ``n_s2``."""
+    return " ".join(_SYMBOLS[word.rstrip("23456789")] + word.lstrip("abcdefghijklmnopqrstuvwxyz")
+                    for word in words.split("_") if word)
 
 
 def measured(value: float, error: float | None) -> str:
