@@ -5,7 +5,8 @@ file of a folder offers one thing under an agreed name, and the folder is read. 
 one file that offers nothing is the one that says what such a thing is (``weighting.py`` for the offers ``WEIGHTING``).
 
 A user's own file outside the package offers its one thing in the same way. It is Python that nobody has checked, so
-whatever goes wrong in it becomes one line that names the file and the line in it.
+whatever goes wrong in it becomes one line that names the file and the line in it, and whatever it prints goes to
+stderr: stdout is for what the command was asked.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from threading import Lock
 from traceback import extract_tb
 from types import ModuleType
 from typing import Any
@@ -58,17 +60,41 @@ def offered_by(path: Path, offer: str) -> Any:
     sys.modules[module.__name__] = module  # dataclasses and pickles look for it there
     with blamed_on(path):
         exec(compile(source, str(path), "exec"), module.__dict__)
-    if not hasattr(module, offer):
-        raise BadInput(f"{path}: expected it to offer {offer}, as in {offer} = ...")
-    return getattr(module, offer)
+        if not hasattr(module, offer):
+            raise BadInput(f"{path}: expected it to offer {offer}, as in {offer} = ...")
+        return getattr(module, offer)
+
+
+class _Aside:
+    """Sends what is printed to stderr as long as anybody is in it. Threads come and go in any order, so that the last
+    one out, and not the first one in, gives stdout back."""
+
+    def __init__(self) -> None:
+        self._lock, self._inside, self._stdout = Lock(), 0, sys.stdout
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._inside:
+                self._stdout, sys.stdout = sys.stdout, sys.stderr
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                sys.stdout = self._stdout
+
+
+_ASIDE = _Aside()
 
 
 @contextmanager
 def blamed_on(path: Path) -> Iterator[None]:
     """Turn whatever a user's own file raises, or is found to lack, into BadInput that names it, and the line in it
-    that was reached."""
+    that was reached; what it prints meanwhile goes to stderr."""
     try:
-        yield
+        with _ASIDE:
+            yield
     except RidelogError:
         raise
     except SyntaxError as error:

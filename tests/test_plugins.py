@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from threading import Barrier, Thread
 
 import pytest
 
 from logger.errors import BadInput
-from logger.plugins import catalogue
+from logger.plugins import blamed_on, catalogue, offered_by
 
 
 def folder(root: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> str:
@@ -41,3 +43,41 @@ def test_a_file_without_its_offer_is_named(
 
 def test_the_weightings_are_a_catalogue() -> None:
     assert list(catalogue("logger.dsp.weightings", "WEIGHTING")) == ["wb", "wc", "wd", "we", "wf", "wj", "wk"]
+
+
+def test_what_a_users_own_file_prints_is_no_answer_of_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text("print('loaded')\nEFFECT = lambda: print('asked')\n")
+    offer = offered_by(path, "EFFECT")
+    with blamed_on(path):
+        offer()
+        with blamed_on(path):
+            offer()
+        offer()
+    print("answer")
+    told = capsys.readouterr()
+    assert (told.out, told.err.split()) == ("answer\n", ["loaded", *3 * ["asked"]])
+
+
+def test_threads_that_leave_a_users_own_file_in_another_order_leave_stdout_as_it_was(tmp_path: Path) -> None:
+    first_in, both_in, first_out = Barrier(2), Barrier(2), Barrier(2)
+
+    def first() -> None:
+        with blamed_on(tmp_path):
+            first_in.wait(10)
+            both_in.wait(10)
+        first_out.wait(10)
+
+    before, thread = sys.stdout, Thread(target=first)
+    meanwhile = []
+    thread.start()
+    first_in.wait(10)
+    with pytest.raises(BadInput), blamed_on(tmp_path):
+        both_in.wait(10)
+        first_out.wait(10)
+        meanwhile.append(sys.stdout)
+        raise ValueError("wrong")
+    thread.join()
+    assert meanwhile == [sys.stderr] and sys.stdout is before

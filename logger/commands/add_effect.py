@@ -136,9 +136,13 @@ def added(given: Bench, start: Chosen, starts: int) -> Gained:
 
 
 def model_of(given: Bench, found: Gained) -> Model:
-    """The model with the effect, and how it came to it."""
+    """The model with the effect, and how it came to it. BadInput for one that could not be read back, because a fit
+    ended at numbers that no car has."""
+    from logger.store.effect_file import check_on
     from logger.store.vehicle_file import Model, Step
 
+    for one in found.added.effects:
+        check_on(found.added.vehicle, one, two_tracks=True)
     history = given.model.history
     if not history:
         history = (Step("as it was given", found.added.error_before, found.floor),

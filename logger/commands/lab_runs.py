@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 _SAME_RATE = 1e-6
 LEAST_S = 5.0
+# The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
+# second on. A recorder's clock may be off by a per cent.
+_LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
 _SKIP_S = 2.0  # what the lab leaves out of each run
 _MOST_MEAN_MPS2 = 2.0
 _LEAST_MPS2 = 1e-5  # no sensor is so quiet
@@ -47,12 +50,15 @@ def lab_runs(folders: Sequence[Path]) -> Runs:
 
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
-    """Raise BadInput for a drive that is shorter than 5 s, has another rate than the others, recorded nothing, or whose
-    distances are none: they fall, leap, or have nothing to do with the speed."""
+    """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
+    others, recorded nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed."""
     import numpy as np
 
     from logger.store.drive_file import MAX_SPEED_MPS
 
+    if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
+        raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "
+                       f"{drive.rate_hz:.4g}")
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < LEAST_S:
         raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")

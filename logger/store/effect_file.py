@@ -17,7 +17,7 @@ import numpy as np
 from logger.errors import BadInput
 from logger.plugins import blamed_on, catalogue, offered_by
 from logger.store.yaml_lines import Node
-from logger.vehicle.effect import Chosen, Effect, Parameter, chosen
+from logger.vehicle.effect import Chosen, Effect, Parameter, VehicleEffect, chosen
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.vehicle import Vehicle
 from logger.vehicle.watched_effect import watched
@@ -34,10 +34,10 @@ def own_effect(path: Path) -> Effect:
     the effect, whenever it is asked and fails or gives no answer."""
     effect = offered_by(path, "EFFECT")
     with blamed_on(path):
-        effect = look_through(effect)
+        effect = watched(look_through(effect), partial(blamed_on, path))
     if effect.name in shipped_effects():
         raise BadInput(f"{path}: expected a name that no effect of ridelog has, found {effect.name!r}")
-    return watched(effect, partial(blamed_on, path))
+    return effect
 
 
 def effect_named(text: str) -> tuple[Effect, str | None]:
@@ -54,12 +54,19 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
 
 
 def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool) -> None:
-    """Raise BadInput if the effect cannot be there in this car on this road; a user's own is tried on the car."""
+    """Raise BadInput if the effect cannot be there in this car on this road, or makes a car of it that would tip over
+    an axle; a user's own is tried on the car."""
     obstacle = one.effect.obstacle(vehicle, two_tracks)
     if obstacle is not None:
         raise BadInput(f"{one.effect.name}: {obstacle}")
     if one.file is not None:
         try_out(one.effect, one.p, vehicle)
+    if isinstance(one.effect, VehicleEffect):
+        made = one.effect.vehicle(one.p, vehicle)
+        for name, axle in (("front", made.front), ("rear", made.rear)):
+            if axle is not None and axle.cg_distance_m < 0:
+                raise BadInput(f"{one.effect.name}: expected the centre of gravity between the axles, found it "
+                               f"{-axle.cg_distance_m:.3g} m beyond the {name} axle")
 
 
 # --- in a vehicle's file ---
@@ -87,7 +94,10 @@ def _read_effect(node: Node) -> Chosen:
     name, file = said["name"], None
     if "file" in said:
         file = os.path.normpath(Path(node.file).parent / said["file"].text())
-        effect = own_effect(Path(file))
+        try:
+            effect = own_effect(Path(file))
+        except BadInput as error:
+            raise BadInput(f"{node.file}:{said['file'].line}: {error}") from None
         if effect.name != name.text():
             raise name.wrong(f"{effect.name!r}, as EFFECT in {file} is named")
     elif name.text() in shipped_effects():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.commands.lab_model import check_out
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import read_run, write_drive, write_profile
 
-from lacking import named, write_runs
+from lacking import OWN, named, write_runs
 
 SHAKES = """\
 from dataclasses import replace
@@ -168,3 +171,103 @@ def test_two_tracks_are_asked_for_where_no_profile_is_known(runs: list[str], tmp
     car = car_with(tmp_path, "{name: roll, track_width_m: 1.5, roll_inertia_kg_m2: 500}")
     with pytest.raises(BadInput, match=r"car\.yaml: its effect roll needs a road that is known under the right wheels"):
         main(["diagnose", "--same-road", "--vehicle", car, *runs])
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 2.0, 4.0, 25.0, 48.0])
+def test_a_record_too_slow_to_show_the_wheels(rate_hz: float, runs: list[str], tmp_path: Path) -> None:
+    given = read_run(runs[0])
+    place_s = np.arange(round(40 * rate_hz)) / rate_hz
+    write_drive(tmp_path / "drive.csv", {
+        "t_s": place_s, "accel_z_mps2": np.sin(40 * place_s), "speed_mps": np.full(len(place_s), 1.0),
+        "distance_m": place_s})
+    write_profile(tmp_path / "profile.csv", given.track)
+    for command in COMMANDS:
+        with pytest.raises(BadInput) as caught:
+            main([*COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", str(tmp_path)])
+        assert str(caught.value).startswith(f"{tmp_path / 'drive.csv'}: expected 50 samples a second or more")
+        assert f"found {rate_hz:g}" in str(caught.value)
+    with pytest.raises(BadInput, match="expected 50 samples a second or more"):
+        main(["diagnose", "--same-road", "--vehicle", "rav4-2009", str(tmp_path), runs[1]])
+
+
+def command_line(ridelog: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([ridelog, *arguments], check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+
+
+@pytest.mark.parametrize("rate_hz", [49.8, 50.0])
+def test_a_record_just_fast_enough(rate_hz: float, ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    given = read_run(runs[0])
+    thinned = {"accel_z_mps2": given.accel_z_mps2[::2], "speed_mps": given.speed_mps[::2],
+               "distance_m": given.distance_m[::2]}
+    write_drive(tmp_path / "drive.csv", {"t_s": np.arange(len(given.time_s[::2])) / rate_hz, **thinned})
+    write_profile(tmp_path / "profile.csv", given.track)
+    for more in ([], ["--out", str(tmp_path / "page.html")]):
+        done = command_line(ridelog, "compare", "--vehicle", "rav4-2009", str(tmp_path), "--json", *more)
+        assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["error"] < 1
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
+def test_a_disk_that_is_full_is_named(command: str, ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    done = command_line(ridelog, *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", runs[0], "--out", "/dev/full")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "ridelog: /dev/full: No space left on device\n"
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
+def test_where_nothing_can_be_written_it_is_said_first(command: str, runs: list[str]) -> None:
+    arguments = [*COMMANDS[command](Path("/proc")), "--vehicle", "rav4-2009", *runs]
+    with pytest.raises(BadInput, match=r"^--out /proc/.*: expected a file that may be written"):
+        main(arguments)
+
+
+def test_looking_whether_a_file_may_be_written_leaves_what_there_was(tmp_path: Path) -> None:
+    there, new = tmp_path / "there.yaml", tmp_path / "new.yaml"
+    there.write_text("mine", "utf-8")
+    before = there.stat()
+    check_out(there, [])
+    check_out(new, [])
+    assert there.read_text("utf-8") == "mine" and there.stat().st_mtime_ns == before.st_mtime_ns
+    assert not new.exists()
+
+
+PRINTS = OWN.replace("class Bracket", "print('HELLO from the file')\n\n\nclass Bracket").replace("EFFECT =", """\
+    def vehicle(self, p, vehicle):
+        print("HELLO while it runs")
+        return super().vehicle(p, vehicle)
+
+
+EFFECT =""")
+
+
+def test_what_an_own_effect_prints_is_no_json(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(PRINTS, "utf-8")
+    new = tmp_path / "new.yaml"
+    car = car_with(tmp_path, "{name: long_bracket, file: own.py, offset_m: 0.1}")
+    for arguments in (
+        ["compare", "--vehicle", car, runs[0]],
+        ["add-effect", str(tmp_path / "own.py"), "--vehicle", "rav4-2009", runs[0], "--out", str(new)],
+        ["simulate", "--vehicle", car, "--flat", "30", "--speed", "10", "--out", str(tmp_path / "drive.csv")],
+    ):
+        done = command_line(ridelog, *arguments, "--json")
+        assert done.returncode == 0
+        assert isinstance(json.loads(done.stdout), dict)
+        assert "HELLO from the file" in done.stderr and "HELLO while it runs" in done.stderr
+
+
+def test_an_own_effects_file_that_is_not_there(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    car = car_with(tmp_path, "{name: long_bracket, file: own.py, offset_m: 0.1}")
+    line = Path(car).read_text("utf-8").splitlines().index(
+        "effects: [{name: long_bracket, file: own.py, offset_m: 0.1}]") + 1
+    done = command_line(ridelog, "compare", "--vehicle", car, runs[0])
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (f"ridelog: {car}:{line}: {tmp_path / 'own.py'}: expected a readable file (No such file or "
+                           "directory)\n")
+
+
+def test_a_centre_of_gravity_beyond_an_axle(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    done = command_line(ridelog, "add-effect", "cg_shift:shift_m=0.9", "--vehicle", "ford-escort", runs[0],
+                        "--out", str(tmp_path / "new.yaml"))
+    assert done.returncode == 2
+    assert done.stderr == ("ridelog: cg_shift: expected the centre of gravity between the axles, found it 0.0161 m "
+                           "beyond the front axle\n")

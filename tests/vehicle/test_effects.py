@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from logger.errors import BadInput
 from logger.roads import iso8608
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
-from logger.store.effect_file import shipped_effects
+from logger.store.effect_file import check_on, shipped_effects
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Scale, chosen
@@ -209,6 +210,23 @@ def test_a_shift_of_the_centre_of_gravity_leaves_axles_and_sensor_where_they_are
     assert made.sensor.ahead_m == pytest.approx(0.1)
     both = compose(away, [usual(EFFECTS["cg_shift"], shift_m=0.1), usual(EFFECTS["sensor_offset"], offset_m=0.4)])
     assert both.vehicle.sensor.ahead_m == 0.4
+
+
+@pytest.mark.parametrize("shift_m", [-1.0, -0.3, 0.3, 1.0])
+def test_a_shift_is_applied_as_it_was_asked_for(shift_m: float) -> None:
+    short = replace(HALF, front=replace(HALF.front, cg_distance_m=0.9))
+    made = compose(short, [usual(EFFECTS["cg_shift"], shift_m=shift_m)]).vehicle
+    assert made.rear is not None
+    assert (made.front.cg_distance_m, made.rear.cg_distance_m) == pytest.approx((0.9 - shift_m, 1.47 + shift_m))
+
+
+@pytest.mark.parametrize(("shift_m", "axle"), [(0.95, "front"), (-0.85, "rear")])
+def test_a_car_whose_centre_of_gravity_lies_beyond_an_axle_is_refused(shift_m: float, axle: str) -> None:
+    assert HALF.rear is not None
+    short = replace(HALF, front=replace(HALF.front, cg_distance_m=0.9), rear=replace(HALF.rear, cg_distance_m=0.8))
+    check_on(short, usual(EFFECTS["cg_shift"], shift_m=0.98 * (0.9 if axle == "front" else -0.8)), two_tracks=False)
+    with pytest.raises(BadInput, match=rf"^cg_shift: expected .* axles, found it 0\.05 m beyond the {axle} axle$"):
+        check_on(short, usual(EFFECTS["cg_shift"], shift_m=shift_m), two_tracks=False)
 
 
 def test_an_occupant_takes_the_frequency_it_is_given() -> None:

@@ -1,6 +1,7 @@
 """The centre of gravity sits ahead of where the model puts it, or behind.
 
-The axles stay where they are, and so does the sensor, so that all of them come to lie farther back from it.
+The axles stay where they are, and so does the sensor, so that all of them come to lie farther back from it. A shift
+beyond an axle is applied as well, so that a fit may pass there; ``check_on`` refuses it where somebody asks for it.
 """
 
 from __future__ import annotations
@@ -10,8 +11,6 @@ from types import SimpleNamespace
 
 from logger.vehicle.effect import Parameter, Scale, VehicleEffect
 from logger.vehicle.vehicle import Vehicle
-
-_LEAST_ARM_M = 0.05
 
 
 class CgShift(VehicleEffect):
@@ -31,12 +30,11 @@ class CgShift(VehicleEffect):
     def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
         front, rear = vehicle.front, vehicle.rear
         assert rear is not None
-        shift = min(max(p.shift_m, _LEAST_ARM_M - rear.cg_distance_m), front.cg_distance_m - _LEAST_ARM_M)
         return replace(
             vehicle,
-            front=replace(front, cg_distance_m=front.cg_distance_m - shift),
-            rear=replace(rear, cg_distance_m=rear.cg_distance_m + shift),
-            sensor=replace(vehicle.sensor, ahead_m=vehicle.sensor.ahead_m - shift),
+            front=replace(front, cg_distance_m=front.cg_distance_m - p.shift_m),
+            rear=replace(rear, cg_distance_m=rear.cg_distance_m + p.shift_m),
+            sensor=replace(vehicle.sensor, ahead_m=vehicle.sensor.ahead_m - p.shift_m),
         )
 
 
