@@ -5,12 +5,6 @@
     '- CheckFailed     the check a command was asked to make found something wrong; exit 1
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
 EXIT_DONE = 0
 EXIT_CHECK_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -32,15 +26,3 @@ class CheckFailed(RidelogError):
     """The check found something wrong."""
 
     exit_status = EXIT_CHECK_FAILED
-
-
-@contextmanager
-def naming(path: Path | str) -> Iterator[None]:
-    """Give an OSError the name of the file that is written in here, where it has none: what fails after a file was
-    opened, such as a full disk, does not say which file it was."""
-    try:
-        yield
-    except OSError as error:
-        if error.filename is None:
-            error.filename = str(path)
-        raise

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 
 from logger.commands.lab_model import check_model, check_out, paragraphs
 from logger.commands.lab_runs import lab_runs
-from logger.errors import EXIT_DONE, BadInput, naming
+from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import naming
 
 if TYPE_CHECKING:
     from logger.lab.beside import Part

@@ -10,7 +10,8 @@ from zipfile import ZipFile
 
 from logger.commands.lab import STORY, say, silent, take, walk
 from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs
-from logger.errors import BadInput, naming
+from logger.errors import BadInput
+from logger.store.naming import naming
 
 if TYPE_CHECKING:
     from logger.lab.story import Story

@@ -28,7 +28,8 @@ from logger.commands.lab_model import (
     paragraphs,
     wipe,
 )
-from logger.errors import EXIT_DONE, BadInput, naming
+from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import naming
 
 if TYPE_CHECKING:
     from logger.lab.verdict import Verdict

@@ -22,7 +22,8 @@ from logger.commands.add_effect import lines as added_lines
 from logger.commands.diagnose import diagnosed
 from logger.commands.diagnose import lines as diagnosis_lines
 from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
-from logger.errors import EXIT_DONE, BadInput, naming
+from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import naming
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison

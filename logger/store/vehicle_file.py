@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from logger.errors import BadInput, naming
+from logger.errors import BadInput
 from logger.identification.parameters import changed, read, sized
+from logger.store.naming import naming
 from logger.store.yaml_lines import Node, load_mapping
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
