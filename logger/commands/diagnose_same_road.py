@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import columns, on_screen, paragraphs, wipe
+from logger.commands.lab_model import columns, deviation_of, known_effects, on_screen, paragraphs, wipe
 from logger.commands.lab_runs import check_record
 from logger.errors import EXIT_DONE, BadInput
 
@@ -23,30 +23,30 @@ if TYPE_CHECKING:
     from logger.store.drive_file import Drive
 
 _SHOWN = 8
-_BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 
 
 def run_same_road(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose --same-road``."""
     from logger.lab.nuisance import Tolerance
-    from logger.lab.unmeasured import SameRoad
+    from logger.lab.unmeasured import NotOneRoad, SameRoad
     from logger.lab.unmeasured_diagnosis import as_json, diagnose_same_road
     from logger.shipped import vehicle_path
-    from logger.store.effect_file import own_effect, shipped_effects
     from logger.store.vehicle_file import read_model
 
     if args.out is not None:
         raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
+    tolerance = Tolerance(numbers=deviation_of(args.tolerance))
     runs, model = _drives(args.runs), read_model(vehicle_path(args.vehicle))
     for one in model.effects:
         if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
             raise BadInput(f"{args.vehicle}: its effect {one.effect.name} needs a road that is known under the right "
                            "wheels too")
-    effects = {**shipped_effects(), **{one.effect.name: one.effect for one in model.effects}}
-    effects |= {one.name: one for one in map(own_effect, map(Path, args.effect_file))}
+    effects, _ = known_effects(model, args.effect_file)
     try:
-        problem = SameRoad(runs, model.vehicle, Tolerance(numbers=args.tolerance / _BAND_DEVIATIONS))
+        problem = SameRoad(runs, model.given or model.vehicle, tolerance, model.vehicle)
         found = diagnose_same_road(problem, effects, model.effects, on_screen())
+    except NotOneRoad as error:
+        raise BadInput(str(error)) from None
     except ValueError as error:
         raise BadInput(f"{args.vehicle}: {error}") from None
     finally:

@@ -110,26 +110,41 @@ def bench(args: argparse.Namespace) -> Bench:
 def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str], tolerance: float) -> Bench:
     """The model, runs and effects. Raises BadInput for whatever is wrong with them."""
     from logger.shipped import vehicle_path
-    from logger.store.effect_file import own_effect, shipped_effects
     from logger.store.vehicle_file import read_model
 
-    low, high = _TOLERANCES
-    if not low <= tolerance <= high:
-        raise BadInput(f"--tolerance {tolerance:g}: expected {low:g} to {high:g}")
+    numbers = deviation_of(tolerance)
     model = read_model(vehicle_path(vehicle))
-    effects, files = dict(shipped_effects()), {}
-    for one in model.effects:
-        if one.file is not None:
-            effects[one.effect.name], files[one.effect.name] = one.effect, one.file
-    for file in effect_files:
-        effect = own_effect(Path(file))
-        if effect.name in effects:
-            raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
-        effects[effect.name], files[effect.name] = effect, file
-    found = Bench(vehicle, model, lab_runs(folders), effects, files, tolerance / _BAND_DEVIATIONS)
+    effects, files = known_effects(model, effect_files)
+    found = Bench(vehicle, model, lab_runs(folders), effects, files, numbers)
     check_model(vehicle, model, found.runs)
     _try_own(found, effect_files)
     return found
+
+
+def deviation_of(tolerance: float) -> float:
+    """The deviation, as a share, that a band of ``--tolerance`` either way is taken for. BadInput for one that no car's
+    numbers have."""
+    low, high = _TOLERANCES
+    if not low <= tolerance <= high:
+        raise BadInput(f"--tolerance {tolerance:g}: expected {low:g} to {high:g}")
+    return tolerance / _BAND_DEVIATIONS
+
+
+def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
+    """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
+    and the files of the user's own, by name. BadInput for a name that is there twice."""
+    from logger.store.effect_file import own_effect, shipped_effects
+
+    effects, own = dict(shipped_effects()), {}
+    for one in model.effects:
+        if one.file is not None:
+            effects[one.effect.name], own[one.effect.name] = one.effect, one.file
+    for file in files:
+        effect = own_effect(Path(file))
+        if effect.name in effects:
+            raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
+        effects[effect.name], own[effect.name] = effect, file
+    return effects, own
 
 
 def check_model(word: str, model: Model, runs: Runs) -> None:

@@ -36,7 +36,7 @@ from logger.identification.crossing import Crossing, Drive, Grid, grid_under
 from logger.identification.low_pass import LowPass
 from logger.identification.noise import RoadNoise
 from logger.identification.parameters import WEAKEST, Free
-from logger.identification.verdict import APART, Finding, NotIdentifiable, statistical, structural
+from logger.identification.verdict import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
 
 Array = npt.NDArray[np.float64]
@@ -341,8 +341,7 @@ class _Problem:
             if len(road.drives) > 1 and together > max(_MORE_TOGETHER * alone, _LITTLE * size):
                 where = f"road {number}" if len(self.roads) > 1 else "one road"
                 words = (f"the drives do not agree on {where}: together they leave {together:.2g} m/s2, each by itself "
-                         f"{alone:.2g}. It is not the same road, not the same line on it, or their distances disagree "
-                         "by more than can be found; take them for roads of their own.")
+                         f"{alone:.2g}. {NOT_ONE_ROAD}; take them for roads of their own.")
                 return [Finding(APART, {}, words)]
         return []
 
@@ -516,10 +515,10 @@ class UnknownRoad:
             normal += rows @ rows.T
         self._factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
 
-    def told(self, at: RoadState, number: int) -> Array:
-        """What the other drives make one expect in the drive of this number (n,), less its mean [m/s2]."""
+    def told(self, at: RoadState, number: int, by: Sequence[int] | None = None) -> Array:
+        """What the other drives, or some, make one expect in the drive of this number (n,), less its mean [m/s2]."""
         model, crossings = self._model(at), self.crossings
-        others = [index for index in range(len(crossings)) if index != number]
+        others = [index for index in range(len(crossings)) if index != number] if by is None else list(by)
         rest = _Model([model.waves[one] for one in others], [model.responses[one] for one in others], [],
                       model.precondition, model.variance)
         white = self._solve(rest, [self.measured[one][None] for one in others], which=others)[0]

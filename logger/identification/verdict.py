@@ -30,6 +30,8 @@ SILENT, TOGETHER, WEAK, UNEXPLAINED = "silent", "together", "weak", "unexplained
 TURNED, APART = "turned", "apart"
 NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
+NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their distances disagree by more than can be "
+                "found")
 _PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
 # Rms of what is left over that of what was measured; and how much less of it is clearly less.

@@ -303,7 +303,7 @@ def _trial(problem: Problem, base: Base, one: Chosen) -> Trial:
         return Trial(one, base.ahead, here)
     strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
     strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
-    scaled = _scaled(one, strength)
+    scaled = scaled_by(one, strength)
     whole = Trial(one, base.ahead + 2 * along - own, here - absorbed)
     if scaled is None:
         return whole
@@ -345,7 +345,7 @@ def _of(base: Base, state: State) -> Trial:
     return Trial(state.effects[-1], base.objective - base.weighed.objective(state), base.weighed.joined(state))
 
 
-def _scaled(one: Chosen, strength: float) -> Chosen | None:
+def scaled_by(one: Chosen, strength: float) -> Chosen | None:
     """The effect at a share of its strength: of the way from its null to where it stands; None if it has no null."""
     for place, parameter in enumerate(one.effect.parameters):
         if parameter.null is None or parameter.choices:

@@ -367,7 +367,7 @@ def _merit(one: Tried) -> float:
     return TOLD_APART * one.numbers - one.whole_gain
 
 
-def _p_value(gain: float, numbers: int, count: int) -> float:
+def p_value(gain: float, numbers: int, count: int) -> float:
     """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction). Shapes
     that have no meaning without a strength (a knee, a frequency) count by the values that they were tried at."""
     from scipy.special import gammaincc
@@ -385,7 +385,7 @@ def _accepted(problem: Problem, one: Tried, count: int, before: float, now: Base
     saw, and no small part of what is left to explain by ``now``, if that is asked."""
     return ((now is None or one.whole_gain > _least_of_left(now, one.effect))
             and not one.state.effects[-1].at_an_end
-            and _p_value(one.gain, one.numbers, count) < CHANCE
+            and p_value(one.gain, one.numbers, count) < CHANCE
             and _worthy(problem, one.state, one.whole_gain, one.eased, before)
             and one.judged_gain > -HARM * one.gain)
 
@@ -543,6 +543,6 @@ def _candidate(tried: Tried, count: int, rivals: tuple[Tried, ...],
                values: Mapping[str, float] | None) -> Candidate:
     return Candidate(
         tried.effect, tried.state.effects[-1].values if values is None else values, tried.judged_error,
-        _p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain,
+        p_value(tried.gain, tried.numbers, count), tried.whole_gain, tried.judged_gain,
         tuple(one.effect.name for one in rivals),
     )

@@ -218,7 +218,7 @@ class Problem:
         here = coordinates_of(state.effects, moves)
         unmoved = self.runs.predict(self.car(state.effects, state.logs), over)
         result = [np.empty((len(moves), len(one))) for one in self.measured]
-        for index, step in enumerate(_steps(state.effects, moves)):
+        for index, step in enumerate(steps_of(state.effects, moves)):
             there = here.copy()
             there[index] += step
             shifted = self.runs.predict(self.car(moved(state.effects, moves, there), state.logs), over)
@@ -364,15 +364,20 @@ def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
     return np.array(places)
 
 
-def _steps(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
-    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound."""
+def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float = _LOG_STEP,
+             share_step: float = _SHARE_STEP) -> Array:
+    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound.
+
+    log_step      on logarithmic scales
+    share_step    on others, as a share; both where a parameter has no step of its own
+    """
     steps = []
     for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
         usual = abs(parameter.coordinate(parameter.start))
         step = parameter.step
         if step is None:
-            step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here), _LEAST_SHARE * usual)
+            step = log_step if parameter.scale is Scale.LOG else share_step * max(abs(here), _LEAST_SHARE * usual)
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
         steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
     return np.array(steps)
@@ -386,7 +391,7 @@ def steps_apart(one: Chosen, other: Chosen) -> float:
         return np.inf
     moves = moves_of([one])
     here, there = (coordinates_of([each], moves) for each in (one, other))
-    return float(np.max(np.abs(there - here) / np.abs(_steps([one], moves)), initial=0.0))
+    return float(np.max(np.abs(there - here) / np.abs(steps_of([one], moves)), initial=0.0))
 
 
 def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False,

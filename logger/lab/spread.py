@@ -37,16 +37,19 @@ def with_spread(problem: Problem, state: State, slopes: Slopes) -> tuple[tuple[C
     scale = np.where(seen, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=_SINGULAR, hermitian=True)
     deviations = np.where(seen, np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale, np.inf)
-    return (_with_errors(state.effects, moves, deviations[weighed.count:]),
+    return (with_errors(state.effects, moves, deviations[weighed.count:]),
             deviations[: len(problem.nuisance.names)])
 
 
-def _with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array) -> tuple[Chosen, ...]:
-    """Standard errors on the scales of the parameters (m,) as those of their values."""
+def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array) -> tuple[Chosen, ...]:
+    """The effects with standard errors, of which those of the numbers that moved are given on their scales (m,)."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
         step = _TINY_STEP * max(abs(here), _TINY_STEP)
-        rise = abs(parameter.value(here + step) - parameter.value(here - step)) / (2 * step)
+        # At a bound a value goes one way only: it rises by so much over the way that it went.
+        high, low = parameter.value(here + step), parameter.value(here - step)
+        way = abs(parameter.coordinate(high) - parameter.coordinate(low))
+        rise = abs(high - low) / way if way > 0 else 0.0
         errors[move.effect] = {**errors[move.effect], parameter.name: float(rise * deviation)}
     return tuple(replace(one, standard_errors=found) for one, found in zip(effects, errors, strict=True))

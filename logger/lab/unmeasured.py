@@ -15,17 +15,18 @@ itself (a gain; a longer contact patch) shows in the information that is left of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import pairwise, permutations
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.identification.crossing import Drive
 from logger.identification.shared_road import Options, RoadState, UnknownRoad
-from logger.lab.fitting import Move, coordinates_of, moved, moves_of
+from logger.lab.candidates import scaled_by
+from logger.lab.fitting import Move, coordinates_of, moved, moves_of, steps_of
 from logger.lab.linear_response import Tabulated, response_of
 from logger.lab.nuisance import Nuisance, Tolerance, nuisance_of
 from logger.lab.prediction import Run
@@ -43,10 +44,14 @@ _PROBES = 8
 # What is granted to a stretch: deviations of its waviness, and of its places from those of the whole way.
 _WAVINESS, _WAVINESS_OFF = 2.0, 0.3
 _OFFSET_OFF_M = 0.05
-_LOG_STEP, _SHARE_STEP, _LEAST_SHARE = 1e-3, 1e-3, 0.1
+_LOG_STEP, _SHARE_STEP = 1e-3, 1e-3
 _MOST_STEPS, _LONGEST_LOG, _SETTLED, _MANY_ROUNDS = 10, 0.5, 0.1, 12
 _LEVEL, _TILT = 0, 1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+class NotOneRoad(ValueError):
+    """The drives are not over one road."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,24 +88,32 @@ class Look:
 class SameRoad:
     """Drives over one road, a nominal vehicle, and what may be a little off.
 
-    ValueError unless two of the runs share some seconds of the way.
+    stands    the vehicle as it stands, where fits begin, if that is another than was given
+
+    NotOneRoad unless each of the runs shares some seconds of the way with another.
     """
 
-    def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance) -> None:
-        self.runs, self.vehicle, self.rate_hz = list(runs), vehicle, runs[0].rate_hz
+    def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
+                 stands: Vehicle | None = None) -> None:
+        stands = stands or vehicle
+        self.runs, self.rate_hz = list(runs), runs[0].rate_hz
+        self.vehicle = replace(vehicle, contact_patch_m=stands.contact_patch_m)  # that is not free
         known = nuisance_of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
         self.nuisance = Nuisance(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
                                  known.steps[kept])
-        structure = compose(vehicle).structure
+        self.stands = self.nuisance.logs(self.vehicle, stands)
+        structure = compose(stands).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
         self.stretches = _cut(self.runs)
-        if not self.stretches:
-            raise ValueError("expected two drives over the same road, some seconds of it by both")
+        shared = {run for parts in self.stretches for run, _ in parts}
+        if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
+                             "it that another drive was over too, by their distances")
         options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=_PROBES)
         generator = np.random.default_rng(options.seed)
-        nominal = self.table(response_of(self.car((), np.zeros(len(known.names[: sum(kept)]))), self.rate_hz))
+        nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
         sizes = [1 + len(parts) for parts in self.stretches]
         ends = np.cumsum(sizes)
@@ -122,9 +135,8 @@ class SameRoad:
         return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
 
     def start(self, effects: Sequence[Chosen] = ()) -> State:
-        """The nominal car on roads of a likely level."""
-        logs = np.zeros(len(self.nuisance.names))
-        return State(tuple(effects), logs, self._first, self.response(effects, logs))
+        """The car as it stands on roads of a likely level."""
+        return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
 
     def look(self, table: Tabulated, roads: Array, information: bool) -> Look:
         """The slopes, by the table's and by the roads' numbers, and the information."""
@@ -182,6 +194,15 @@ class SameRoad:
             found += [(run, road.measured[number], other.told(at, number)) for number, (run, _) in enumerate(parts)]
         return found
 
+    def told_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
+        """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
+        the latter alone makes one expect (n,)."""
+        table = self.table(state.gains)
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            other, at = road.with_car(table), self._at(state.roads[part], 0)
+            for number, by in permutations(range(len(parts)), 2):
+                yield parts[number][0], parts[by][0], road.measured[number], other.told(at, number, [by])
+
     def errors(self, state: State) -> list[float]:
         """Of every run, rms(read - expected) / rms(read), the road being told by the other drives alone; nan for one
         that no other shares a stretch with."""
@@ -196,6 +217,12 @@ class SameRoad:
         told = self.told(state)
         return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in told)
                              / sum(float((read**2).sum()) for _, read, _ in told)))
+
+    @property
+    def size_mps2(self) -> float:
+        """R.m.s. of what was read, by which errors are divided."""
+        squares = sum(float((one**2).sum()) for road in self._roads for one in road.measured)
+        return float(np.sqrt(squares / self.samples))
 
     @property
     def samples(self) -> int:
@@ -338,12 +365,7 @@ def _sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move
         beside[index] += _LOG_STEP
         slopes.append((problem.response(effects, beside) - gains) / _LOG_STEP)
     here = coordinates_of(effects, moves)
-    for index, move in enumerate(moves):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
-        usual = abs(parameter.coordinate(parameter.start))
-        step = _LOG_STEP if parameter.scale is Scale.LOG else _SHARE_STEP * max(abs(here[index]), _LEAST_SHARE * usual)
-        if abs(parameter.coordinate(parameter.value(here[index] + step)) - here[index]) < 0.5 * step:
-            step = -step
+    for index, step in enumerate(steps_of(effects, moves, _LOG_STEP, _SHARE_STEP)):
         beside = here.copy()
         beside[index] += step
         slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / step)
@@ -421,20 +443,8 @@ def _trial(one: Chosen, slope: float, left: float, alone: float, share: float) -
     if not left > _NOTHING * alone:
         return Trial(one, 0.0, one, 0.0, max(share, 0.0))
     strength = float(np.clip(slope / left, _WEAKEST, _STRONGEST))
-    scaled = _scaled(one, strength)
+    scaled = scaled_by(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one
     gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / _PROBES)
     return Trial(one, gain, scaled, float(np.sqrt(left)), max(share, 0.0))
-
-
-def _scaled(one: Chosen, strength: float) -> Chosen | None:
-    """The effect at a share of its strength; None if it has no null."""
-    for place, parameter in enumerate(one.effect.parameters):
-        if parameter.null is None or parameter.choices:
-            continue
-        move = [Move(0, place)]
-        null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
-        here = float(coordinates_of([one], move)[0])
-        return moved([one], move, np.array([null + strength * (here - null)]))[0]
-    return None

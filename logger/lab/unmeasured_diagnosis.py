@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.verdict import structural
+from logger.identification.verdict import NOT_ONE_ROAD, structural
 from logger.lab.blind import SEEN
 from logger.lab.candidates import alike_within
-from logger.lab.diagnosis import CHANCE, WORTH
-from logger.lab.fitting import coordinates_of
+from logger.lab.diagnosis import CHANCE, WORTH, p_value
 from logger.lab.noise import UNEXPLAINED
+from logger.lab.one_road import apart, in_doubt, likenesses
 from logger.lab.quantities import chance, finite, numbers_of
-from logger.lab.unmeasured import Fitted, SameRoad, State, Trial, fitted, inverse, trials
+from logger.lab.spread import with_errors
+from logger.lab.unmeasured import Fitted, NotOneRoad, SameRoad, State, Trial, fitted, inverse, trials
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
 
 Array = npt.NDArray[np.float64]
@@ -34,7 +35,6 @@ TAKEN_BY_ROAD = 0.02
 """The road takes an effect of whose information it leaves no more than this share."""
 _FITTED, _STARTS, _FIRST_STEPS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 4, 0.1, 6.0
 _NOTHING = 1e-2
-_TINY_STEP = 1e-4
 # Of a sample's freedom the recorder's filter leaves this share.
 _FREEDOM = 0.74
 
@@ -68,6 +68,7 @@ class Found:
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
     together      of the car's numbers: what these drives cannot tell, in words
     noise_mps2    what no road explains; ``quiet_mps2``: the sensor's noise where no car moves it
+    doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
     """
 
     candidates: tuple[Candidate, ...]
@@ -81,6 +82,7 @@ class Found:
     together: tuple[str, ...]
     noise_mps2: float
     quiet_mps2: float
+    doubtful: tuple[tuple[str, str], ...] = ()
 
     @property
     def excess(self) -> float:
@@ -97,13 +99,18 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
                        progress: Progress = lambda words: None) -> Found:
     """Find the effects that the model, with those that are ``present``, lacks.
 
-    ValueError if one that is present leaves the car answering out of proportion to the road.
+    ValueError if one that is present leaves the car answering out of proportion to the road; NotOneRoad for drives that
+    are plainly over two.
     """
-    progress("refitting the car's own numbers and the road")
+    progress("are the drives over one road?")
     nominal = problem.start(present)
-    base = fitted(problem.prepared(nominal), nominal)
     untried = _obstacles(problem, effects, present)
     left = {name: one for name, one in effects.items() if name not in untried}
+    alike = likenesses(problem, nominal, _trials(left))
+    if found := apart(alike):
+        raise NotOneRoad(_two_roads(*(problem.runs[run].name for run in found)))
+    progress("refitting the car's own numbers and the road")
+    base = fitted(problem.prepared(nominal), nominal)
     before = base
     first: list[Trial] = []
     fits: list[Candidate] = []
@@ -113,12 +120,13 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}: trying {len(left)} effects")
         tried = trials(base.problem, base, _trials(left))
+        bar = Bar(len(left), problem.samples, steps[-1][1])
         models = _fits(base, tried, progress)
-        candidates = _judged(base, models, len(left), problem.samples)
+        candidates = _judged(base, models, bar)
         first, fits = first or tried, fits or candidates
-        if not candidates or not _accepted(candidates[0], len(left), problem.samples):
+        best = next((one for one in candidates if bar.passed(one)), None)
+        if best is None:
             break
-        best = candidates[0]
         taken.append(best)
         base = models[best.one.effect.name]
         base = replace(base, problem=base.problem.prepared(base.state))
@@ -129,19 +137,24 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     usual = trials(base.problem, base, [chosen(one, one.usual) for one in left.values()])
     road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
     return Found(
-        tuple(listed), _with_errors(base, len(present)), tuple(steps),
+        tuple(listed), _with_spread(base, len(present)), tuple(steps),
         tuple(zip(base.problem.errors(before.state), base.problem.errors(base.state), strict=True)),
-        problem.quiet_mps2() / _size(problem), untried, road,
+        problem.quiet_mps2() / problem.size_mps2, untried, road,
         {one.one.effect.name: one.deviations for one in usual
          if one.deviations < SEEN and one.one.effect.name not in road},
         _together(base), base.state.noise_mps2, problem.quiet_mps2(),
+        tuple((problem.runs[one].name, problem.runs[other].name) for one, other in in_doubt(alike)),
     )
+
+
+def _two_roads(one: str, other: str) -> str:
+    return (f"{one} and {other}: expected drives over the same road, found that neither tells what the other met. "
+            f"{NOT_ONE_ROAD}; leave one of them out")
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
     found = {}
-    logs = np.zeros(len(problem.nuisance.names))
     for name, effect in effects.items():
         why = effect.obstacle(problem.vehicle, True)
         if why is None and effect.obstacle(problem.vehicle, False) is not None:
@@ -152,7 +165,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             why = "it changes the way of every drive alike, and so would another road"
         elif why is None:
             try:
-                problem.response((*present, chosen(effect, effect.usual)), logs)
+                problem.response((*present, chosen(effect, effect.usual)), problem.stands)
             except ValueError:
                 why = "a car with it does not answer in proportion to the road, which takes a measured road"
         if why is not None:
@@ -188,34 +201,37 @@ def _starts(base: Fitted, ranked: Sequence[Trial]) -> list[State]:
                     gains=base.problem.response((*base.state.effects, one), base.state.logs)) for one in ones]
 
 
-def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, samples: int) -> list[Candidate]:
+@dataclass(frozen=True)
+class Bar:
+    """What an effect has to pass: among ``count`` candidates, over so many samples, on a model of this error."""
+
+    count: int
+    samples: int
+    error: float
+
+    def passed(self, one: Candidate) -> bool:
+        """Whether it is there: not by chance, worth naming, and of help in telling each drive by the others."""
+        return (one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * self.samples
+                and one.error is not None and one.error <= self.error)
+
+
+def _judged(base: Fitted, models: Mapping[str, Fitted], bar: Bar) -> list[Candidate]:
     """Fitted effects as candidates, best first."""
     found = []
     for model in models.values():
         one = model.state.effects[-1]
         gain = model.problem.gain(base.state, model.state)
-        found.append(Candidate(one, model.problem.error(model.state), _p_value(gain, _numbers(one), count), gain))
-    found.sort(key=lambda one: _numbers(one.one) * float(np.log(samples)) - one.gain)  # G. Schwarz 1978
-    return [replace(one, confused_with=_rivals(one, found, count, samples)) for one in found]
-
-
-def _p_value(gain: float, numbers: int, count: int) -> float:
-    """How often noise alone gains as much in one of ``count`` trials (Wilks's theorem, Bonferroni's correction)."""
-    from scipy.special import gammaincc
-
-    return float(min(1.0, count * gammaincc(max(numbers, 1) / 2, max(gain, 0.0) / 2)))
+        found.append(Candidate(one, model.problem.error(model.state), p_value(gain, _numbers(one), bar.count), gain))
+    found.sort(key=lambda one: _numbers(one.one) * float(np.log(bar.samples)) - one.gain)  # G. Schwarz 1978
+    return [replace(one, confused_with=_rivals(one, found, bar)) for one in found]
 
 
 def _numbers(one: Chosen) -> int:
     return sum(not parameter.choices for parameter in one.effect.parameters)
 
 
-def _accepted(one: Candidate, count: int, samples: int) -> bool:
-    return one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * samples
-
-
-def _rivals(one: Candidate, found: Sequence[Candidate], count: int, samples: int) -> tuple[str, ...]:
-    worthy = [other for other in found if _accepted(other, count, samples)]
+def _rivals(one: Candidate, found: Sequence[Candidate], bar: Bar) -> tuple[str, ...]:
+    worthy = [other for other in found if bar.passed(other)]
     near = alike_within(one.gain)
     return tuple(other.one.effect.name for other in worthy
                  if one in worthy and other is not one and abs(other.gain - one.gain) < near)
@@ -226,23 +242,15 @@ def _promises(tried: Sequence[Trial], told: set[str], count: int) -> list[Candid
     best: dict[str, Trial] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
         best.setdefault(one.one.effect.name, one)
-    return [Candidate(one.at, None, _p_value(one.gain, _numbers(one.at), count), one.gain)
+    return [Candidate(one.at, None, p_value(one.gain, _numbers(one.at), count), one.gain)
             for name, one in best.items() if name not in told]
 
 
-def _with_errors(model: Fitted, present: int) -> tuple[Chosen, ...]:
+def _with_spread(model: Fitted, present: int) -> tuple[Chosen, ...]:
     """The effects that were found, with standard errors."""
     first = len(model.state.logs)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
-    effects = list(model.state.effects)
-    for move, here, deviation in zip(model.moves, coordinates_of(effects, model.moves), deviations, strict=True):
-        one = effects[move.effect]
-        parameter = one.effect.parameters[move.parameter]
-        step = _TINY_STEP * max(abs(here), _TINY_STEP)
-        rise = abs(parameter.value(here + step) - parameter.value(here - step)) / (2 * step)
-        errors = {**one.standard_errors, parameter.name: float(rise * deviation)}
-        effects[move.effect] = replace(one, standard_errors=errors)
-    return tuple(effects[present:])
+    return with_errors(model.state.effects, model.moves, deviations)[present:]
 
 
 def _together(model: Fitted) -> tuple[str, ...]:
@@ -255,11 +263,6 @@ def _together(model: Fitted) -> tuple[str, ...]:
     powers, directions = np.linalg.eigh(left)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
     return tuple(one.words for one in structural([names[index] for index in own], derivatives, 1.0, _NOTHING))
-
-
-def _size(problem: SameRoad) -> float:
-    read = np.concatenate([drive.measured_mps2 for parts in problem.stretches for _, drive in parts])
-    return float(np.std(read))
 
 
 # --- as it is told ---
@@ -289,7 +292,8 @@ def summary(found: Found) -> list[str]:
 
 def cannot_tell(found: Found) -> list[str]:
     """What these drives cannot tell, in sentences."""
-    lines = []
+    lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
+             "noise." for one, other in found.doubtful]
     if found.taken_by_road:
         lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
                      "measured would do the same.")
@@ -301,15 +305,14 @@ def cannot_tell(found: Found) -> list[str]:
 
 
 def as_json(found: Found) -> dict[str, Any]:
-    """The diagnosis as one JSON object. An effect that was not fitted is told with the error of the refitted car."""
-    base = found.steps[1][1]
+    """The diagnosis as one JSON object. An effect that was not fitted has no error: null."""
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     values = {one.effect.name: dict(one.values) for one in found.missing}
     return {
         "baseline_error": found.steps[0][1], "noise_floor_error": found.floor_error,
         "candidates": [
             {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
-             "error": base if one.error is None else one.error, "p_value": one.p_value,
+             "error": one.error, "p_value": one.p_value,
              "confused_with": list(one.confused_with), "fitted": one.error is not None,
              "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
             for one in found.candidates],

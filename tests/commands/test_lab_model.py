@@ -17,6 +17,7 @@ from logger.errors import BadInput
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import read_run, write_drive, write_profile
+from logger.vehicle.vehicle import Vehicle
 
 from lacking import OWN, named, write_runs
 
@@ -171,6 +172,45 @@ def test_two_tracks_are_asked_for_where_no_profile_is_known(runs: list[str], tmp
     car = car_with(tmp_path, "{name: roll, track_width_m: 1.5, roll_inertia_kg_m2: 500}")
     with pytest.raises(BadInput, match=r"car\.yaml: its effect roll needs a road that is known under the right wheels"):
         main(["diagnose", "--same-road", "--vehicle", car, *runs])
+
+
+@pytest.mark.parametrize("share", ["0", "-1", "nan", "0.6"])
+@pytest.mark.parametrize("more", [[], ["--same-road"]])
+def test_a_tolerance_that_no_car_has(share: str, more: list[str], runs: list[str]) -> None:
+    with pytest.raises(BadInput, match=rf"--tolerance {share}: expected 0.001 to 0.5"):
+        main(["diagnose", *more, "--vehicle", "rav4-2009", *runs, f"--tolerance={share}"])
+
+
+@pytest.mark.parametrize("more", [[], ["--same-road"]])
+def test_two_effects_of_one_name(more: list[str], runs: list[str], tmp_path: Path) -> None:
+    (tmp_path / "one.py").write_text(SHAKES, "utf-8")
+    (tmp_path / "two.py").write_text(SHAKES, "utf-8")
+    files = [f"--effect-file={tmp_path / name}" for name in ("one.py", "two.py")]
+    with pytest.raises(BadInput, match=r"--effect-file .*two\.py: expected each effect once, found shakes again"):
+        main(["diagnose", *more, "--vehicle", "rav4-2009", *runs, *files])
+
+
+def test_drives_over_two_roads_are_refused_where_no_profile_is_known(tmp_path: Path) -> None:
+    runs = write_runs(tmp_path, [], lasts_s=14.0)  # each has a road of its own
+    with pytest.raises(BadInput, match=r"run1 and .*run2: expected drives over the same road, found that neither "):
+        main(["diagnose", "--same-road", "--vehicle", "rav4-2009", *runs])
+
+
+def test_a_car_that_was_refitted_is_judged_by_what_was_given(
+    runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+
+    def same_road(_runs: object, vehicle: Vehicle, _tolerance: object, stands: Vehicle) -> None:
+        asked.extend((vehicle.sprung_mass_kg, stands.sprung_mass_kg))
+        raise ValueError("enough")
+
+    monkeypatch.setattr("logger.lab.unmeasured.SameRoad", same_road)
+    car = Path(car_with(tmp_path, ""))
+    car.write_text(car.read_text("utf-8") + "given: {sprung_mass_kg: 800}\n", "utf-8")
+    with pytest.raises(BadInput, match="enough"):
+        main(["diagnose", "--same-road", "--vehicle", str(car), *runs])
+    assert asked == [800.0, 875.0]
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 2.0, 4.0, 25.0, 48.0])

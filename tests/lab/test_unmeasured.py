@@ -12,9 +12,11 @@ import pytest
 from logger.identification.crossing import Crossing, Drive, grid_under
 from logger.lab.linear_response import Tabulated, response_of
 from logger.lab.nuisance import Tolerance
+from logger.lab.one_road import apart, in_doubt, likenesses
 from logger.lab.prediction import Run
-from logger.lab.unmeasured import SameRoad, State, trials
+from logger.lab.unmeasured import NotOneRoad, SameRoad, State, trials
 from logger.lab.unmeasured import fitted as fit
+from logger.lab.unmeasured_diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.roads.track import Track
 from logger.shipped import vehicle_file
@@ -29,6 +31,7 @@ Array = npt.NDArray[np.float64]
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 RATE_HZ, SPACING_M, NOISE_MPS2 = 100.0, 0.05, 0.05
 LONG = Track(SPACING_M, generate(64.0, 220.0, SPACING_M, 3), -110.0)
+OTHER = Track(SPACING_M, generate(64.0, 220.0, SPACING_M, 4), -110.0)
 FLAT = Track(1.0, np.zeros(2))
 
 
@@ -36,13 +39,14 @@ def named(name: str, **values: float) -> Chosen:
     return chosen(shipped_effects()[name], values)
 
 
-def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int) -> Run:
+def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int, road: Track = LONG,
+           noise_mps2: float = NOISE_MPS2) -> Run:
     """A drive over the road, the simulation having begun five seconds before the record."""
     time_s = np.arange(-500, round(RATE_HZ * length_m / speed_mps)) / RATE_HZ
     distance_m = speed_mps * time_s + 0.8 * (1 - np.cos(time_s / 2))
     car = compose(CAR, effects)
-    clean = recorded(car, Passage(LONG, RATE_HZ, car.driven(distance_m)))[500:]
-    noise = NOISE_MPS2 * np.random.default_rng(seed).standard_normal(len(clean))
+    clean = recorded(car, Passage(road, RATE_HZ, car.driven(distance_m)))[500:]
+    noise = noise_mps2 * np.random.default_rng(seed).standard_normal(len(clean))
     return Run(f"run{seed}", RATE_HZ, clean + noise, distance_m[500:], np.full(len(clean), speed_mps), FLAT)
 
 
@@ -128,5 +132,82 @@ def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
 def test_drives_over_other_roads_are_refused() -> None:
     here = run_of([], 14.0, 80.0, 1)
     far = replace(here, distance_m=here.distance_m + 500.0)
-    with pytest.raises(ValueError, match="same road"):
+    with pytest.raises(NotOneRoad, match=r"run1 and run1: expected drives over the same road, found no 3 s of it"):
         SameRoad([here, far], CAR, Tolerance())
+    with pytest.raises(NotOneRoad, match="elsewhere: expected drives over the same road"):
+        SameRoad([here, run_of([], 9.0, 80.0, 2), replace(far, name="elsewhere")], CAR, Tolerance())
+
+
+@pytest.mark.parametrize("effects", [[], [named("sensor_bandwidth", cutoff_hz=4.0)]], ids=["right", "lacking"])
+def test_one_road_is_told_from_two(effects: list[Chosen]) -> None:
+    here = run_of(effects, 9.0, 85.0, 1)
+    one = SameRoad([here, run_of(effects, 15.0, 85.0, 2)], CAR, Tolerance())
+    assert all(found.seen for found in likenesses(one, one.start()))
+    two = SameRoad([here, run_of(effects, 15.0, 85.0, 2, OTHER)], CAR, Tolerance())
+    assert not any(found.seen for found in likenesses(two, two.start()))
+    assert apart(likenesses(two, two.start())) == (0, 1)
+
+
+def test_the_one_drive_over_another_road_is_named() -> None:
+    runs = [run_of([], 9.0, 85.0, 1), run_of([], 14.0, 85.0, 2, OTHER), run_of([], 15.0, 85.0, 3)]
+    bandwidth = shipped_effects()["sensor_bandwidth"]
+    with pytest.raises(NotOneRoad, match=r"run2: expected drives .* neither tells what the other met|run2 and run3: "):
+        diagnose_same_road(SameRoad(runs, CAR, Tolerance()), {bandwidth.name: bandwidth})
+
+
+def test_two_roads_with_a_bump_each_at_about_one_place() -> None:
+    place_m = np.arange(len(LONG.elevation_m)) * SPACING_M + LONG.start_m
+    roads = [Track(SPACING_M, road.elevation_m + high_m * np.exp(-0.5 * ((place_m - at_m) / wide_m) ** 2), road.start_m)
+             for road, high_m, at_m, wide_m in ((LONG, 0.05, 40.0, 0.3), (OTHER, 0.03, 41.0, 0.6))]
+    problem = SameRoad([run_of([], 9.0, 85.0, 1, roads[0]), run_of([], 15.0, 85.0, 2, roads[1])], CAR, Tolerance())
+    assert not any(found.seen for found in likenesses(problem, problem.start()))
+
+
+def test_drives_that_drown_in_noise_are_not_refused() -> None:
+    problem = SameRoad([run_of([], speed, 85.0, seed, noise_mps2=8.0) for seed, speed in ((1, 9.0), (2, 15.0))], CAR,
+                       Tolerance())
+    found = likenesses(problem, problem.start())
+    assert apart(found) is None
+    assert in_doubt(found) == [(0, 1)]
+
+
+def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
+    soft = named("top_mount_compliance", mount_stiffness_n_per_m=1e4)
+    problem = SameRoad([run_of([soft], speed, 85.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))],
+                       CAR, Tolerance())
+    trials_of_it = [chosen(soft.effect, values) for values in soft.effect.trials()]
+    assert apart(likenesses(problem, problem.start())) == (0, 1)
+    assert apart(likenesses(problem, problem.start(), trials_of_it)) is None
+
+
+def test_errors_and_floor_are_over_the_same() -> None:
+    runs = [run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)]
+    runs[1] = replace(runs[1], measured_mps2=runs[1].measured_mps2 + 1.5)
+    problem = SameRoad(runs, CAR, Tolerance())
+    read = np.concatenate([one for _, one, _ in problem.told(problem.start())])
+    assert problem.size_mps2 == pytest.approx(np.sqrt(np.mean(read**2)))
+
+
+def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
+    stands = replace(CAR, sprung_mass_kg=1.05 * CAR.sprung_mass_kg, contact_patch_m=0.15)
+    problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance(), stands)
+    start = problem.start()
+    assert problem.nuisance.vehicle(problem.vehicle, start.logs) == stands
+    assert problem.cost(start) == pytest.approx((np.log(1.05) / Tolerance().numbers) ** 2)
+
+
+def test_what_does_not_help_to_tell_each_drive_is_not_accepted() -> None:
+    bar = Bar(count=20, samples=1000, error=0.5)
+    helps = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.49, 1e-12, 500.0)
+    assert bar.passed(helps)
+    assert not bar.passed(replace(helps, error=0.51))
+    assert not bar.passed(replace(helps, error=None))
+
+
+def test_what_was_not_fitted_has_no_error() -> None:
+    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), None, 0.5, 1.0)
+    found = Found((one,), (), (("as its file says", 0.4), ("refitted", 0.3)), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
+                  (("slow", "brisk"),))
+    told = as_json(found)
+    assert told["candidates"][0]["error"] is None and told["candidates"][0]["fitted"] is False
+    assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
