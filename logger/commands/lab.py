@@ -143,10 +143,12 @@ def _searched(given: Bench, name: str) -> Chosen:
 
 def _compared(given: Bench) -> Comparison:
     from logger.lab.compare import compare
+    from logger.lab.nuisance import Tolerance
 
     on_screen()("comparing")
     try:
-        return compare(given.runs, given.model.vehicle, given.model.effects, given.model.given)
+        return compare(given.runs, given.model.vehicle, given.model.effects, given.model.given,
+                       Tolerance(numbers=given.numbers))
     except ValueError as error:
         raise BadInput(f"{given.word}: {error}") from None
     finally:

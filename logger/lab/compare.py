@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from logger.lab import wandering
 from logger.lab.beside import Beside, Located, Part, located
-from logger.lab.fitting import Problem
+from logger.lab.fitting import LEAST_SHARE, Problem
 from logger.lab.marks import Mark, Marks, read_marks
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Runs, error
@@ -65,35 +65,46 @@ class Comparison:
     marks: Marks
 
     @property
+    def tells(self) -> bool:
+        """Whether more is left than two right simulations of a car differ by."""
+        return self.refitted.error >= LEAST_SHARE
+
+    @property
+    def marks_found(self) -> tuple[Mark, ...]:
+        """The marks of what is left that matter."""
+        return self.marks.found if self.tells else ()
+
+    @property
     def missing(self) -> bool:
         """Whether what is left is tied to the road or the car's motion, or numbers had to move far: an effect may
         explain it."""
-        return bool(self.far) or any(mark.road for mark in self.marks.found)
+        return bool(self.far) or any(mark.road for mark in self.marks_found)
 
 
-def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None) -> Comparison:
+def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
+            tolerance: Tolerance | None = None) -> Comparison:
     """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
 
-    given    the vehicle before any fit, if it has been refitted: what its numbers are usually off from
+    given        the vehicle before any fit, if it has been refitted: what its numbers are usually off from
+    tolerance    what is usually off, and by how much; None: the usual
 
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
     plain = _standing(Beside(runs.runs, car, runs.predict(car), runs.respond(car)))
-    refitted, moves, far, farther_m = _refitted(runs, vehicle, effects, plain, given)
+    recorded = Problem(runs, given or vehicle, tolerance or Tolerance(), whole=True, stands=vehicle)
+    refitted, moves, far, farther_m = _refitted(recorded, effects, plain)
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves, far, farther_m,
                       read_marks(refitted.beside, refitted.where, plain.beside))
 
 
 def _refitted(
-    runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen], plain: Standing, given: Vehicle | None,
+    recorded: Problem, effects: Sequence[Chosen], plain: Standing,
 ) -> tuple[Standing, dict[str, float], tuple[str, ...], float]:
     """The model refitted, how its numbers moved, which of them far, and how far the runs. One that is no better than
     the plain model is the plain one: the fit weighs every frequency by its noise, and may buy a better top with a worse
     body bounce."""
-    problem = Problem(runs, given or vehicle, Tolerance(), whole=True, stands=vehicle)
-    names = problem.nuisance.names
-    recorded, nominal = problem, problem.start(effects)
+    names, nominal = recorded.nuisance.names, recorded.start(effects)
     problem, start = wandering.lying(recorded, nominal)
     state, _ = settled(problem, start)
     laid = wandering.relaid(problem, state, recorded)
@@ -147,21 +158,23 @@ def headline(found: Comparison) -> list[str]:
 
 def evidence(found: Comparison) -> list[str]:
     """What speaks for a missing effect, or against one."""
-    if not found.marks.found:
+    if not found.tells:
+        return ["What is left is less than two right simulations of a car differ by: it tells nothing."]
+    if not found.marks_found:
         return ["Nothing is left that differs from noise: no mark is found."]
-    return [mark.sentence for mark in found.marks.found]
+    return [mark.sentence for mark in found.marks_found]
 
 
 def conclusion(found: Comparison) -> str:
     """What it comes to, and what to do next."""
-    if found.missing and not any(mark.road for mark in found.marks.found):
+    if found.missing and not any(mark.road for mark in found.marks_found):
         return ("What is left is hardly more than noise, but only with numbers that this car does not have. Either its "
                 "file is wrong or an effect is missing that such numbers imitate. Next: ridelog diagnose with the same "
                 "arguments.")
     if found.missing:
         return ("What is left is tied to the road and the car's motion, so it is more than noise. Next: ridelog "
                 "diagnose with the same arguments says which physical effect would explain it.")
-    if found.marks.found:
+    if found.marks_found:
         return ("What is left is not tied to the road: it looks like noise of its own colour, of the sensor or the "
                 "engine. Nothing here asks for another effect of the car.")
     return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
@@ -177,7 +190,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
         "missing": found.missing,
         "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
-        "marks": [_mark_json(mark) for mark in found.marks.marks],
+        "marks": [_mark_json(mark, mark in found.marks_found) for mark in found.marks.marks],
     }
 
 
@@ -203,8 +216,8 @@ def _part_json(part: Part, unit: str) -> dict[str, Any]:
             "error_power_share": part.share}
 
 
-def _mark_json(mark: Mark) -> dict[str, Any]:
-    return {"name": mark.name, "found": mark.found, "value": _finite(mark.value), "unit": mark.unit,
+def _mark_json(mark: Mark, found: bool) -> dict[str, Any]:
+    return {"name": mark.name, "found": found, "value": _finite(mark.value), "unit": mark.unit,
             "standard_error": _finite(mark.standard_error), "p_value": _finite(mark.p_value)}
 
 

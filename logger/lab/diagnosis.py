@@ -48,9 +48,9 @@ MOST_EFFECTS = 4
 """No more than so many are looked for."""
 CHANCE = 0.001
 """How often, at most, noise alone may look like an effect, all candidates together."""
-WORTH, DIFFER = 0.0025, 0.001
+WORTH, DIFFER, DIFFER_IF_IT_RUBS = 0.0025, 0.001, 0.003
 """The least that an effect has to lower the mean logarithm of the power that is left; and what two right simulations of
-a car may differ by, over what was measured, which is no effect either."""
+a car may differ by, over what was measured, which is no effect either: dry friction comes late by part of a step."""
 SHARE = 0.006
 """The least share that an effect has to add to what those before it explain: their laws are never quite the car's."""
 EASED, SHARE_EASED = 16.0, 0.002
@@ -394,7 +394,8 @@ def _worthy(problem: Problem, state: State, gain: float, eased: float, before: f
     """Whether what an effect of a model explains, or what it saves the car's numbers from, is worth naming beside what
     was explained before."""
     freedom = sum(float(cells.freedom.sum()) for cells in problem.cells(state, None))
-    least = max(WORTH, float(np.log1p((DIFFER / problem.error(state)) ** 2)))
+    differ = DIFFER_IF_IT_RUBS if problem.car(state.effects, state.logs).rubs else DIFFER
+    least = max(WORTH, float(np.log1p((differ / problem.error(state)) ** 2)))
     return gain > max(least * freedom, SHARE * before) or eased > max(EASED, SHARE_EASED * before)
 
 
@@ -526,7 +527,7 @@ def _excess(problem: Problem, state: State, noise: Noise) -> float:
 
 def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Sequence[_Taken],
             verdict: Sequence[str]) -> tuple[Candidate, ...]:
-    """The candidates, those of the verdict before the others."""
+    """The candidates, those of the verdict before the others, of which the least probable by chance come first."""
     values = {one.effect.name: one.values for one in after.effects}
     own = {one.name: one for one in taken}
     found = []
@@ -534,9 +535,9 @@ def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Seque
         one = own[name]
         rivals = tuple(rival for rival in one.rivals if rival.effect.name not in verdict)
         found.append(_candidate(one.tried, one.count, rivals, values[name]))
-    found += [_candidate(tried, _starts(first), _rivals(tried, first, problem), None)
+    others = [(_candidate(tried, _starts(first), _rivals(tried, first, problem), None), _merit(tried))
               for tried in first if tried.effect.name not in verdict]
-    return tuple(found)
+    return (*found, *(one for one, _ in sorted(others, key=lambda pair: (pair[0].p_value, pair[1]))))
 
 
 def _candidate(tried: Tried, count: int, rivals: tuple[Tried, ...],

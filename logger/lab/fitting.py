@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from logger.lab.nuisance import Nuisance, Tolerance, Wander, WanderSlopes, nuisance_of, wander_of
 from logger.lab.prediction import Runs, error
-from logger.lab.stretches import Cells, Stretches, Whitener, deviance
+from logger.lab.stretches import Cells, Stretches, Whitener, deviance, unseen_in
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen, Scale
 from logger.vehicle.vehicle import Vehicle
@@ -39,6 +39,10 @@ _LEAST_THAT_DAMPS = 1e-4
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _RIDGE = 1e-12
+
+
+LEAST_SHARE = 0.002
+"""Two right simulations of a car differ by so much of what was measured: what a model leaves counts as no less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +100,9 @@ class Problem:
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
         self._stands = stands or vehicle
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
-        self.stretches = [Stretches(run, whole) for run in runs.runs]
+        counted = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
+        self.least_mps2 = LEAST_SHARE * float(np.sqrt((counted**2).mean()))
+        self.stretches = [Stretches(run, whole, self.least_mps2) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
 
     def entire(self) -> Problem:
@@ -168,8 +174,8 @@ class Problem:
     def judged_error(self, state: State) -> float:
         """Of the samples that no fit saw; of all, where nothing was kept from the fits."""
         left = whole = 0.0
-        for stretches, residual, measured in zip(self.stretches, self.residuals(state), self.measured, strict=True):
-            unseen = ~stretches.fit if stretches.judges else stretches.fit
+        for stretches, residual, measured, unseen in zip(self.stretches, self.residuals(state), self.measured,
+                                                         unseen_in(self.stretches), strict=True):
             left += float((residual[stretches.first:][unseen] ** 2).sum())
             whole += float((measured[stretches.first:][unseen] ** 2).sum())
         return float(np.sqrt(left / whole)) if whole > 0 else float("nan")

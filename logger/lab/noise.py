@@ -19,7 +19,6 @@ from logger.lab.fitting import Problem, State
 _LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
 _FILTERED = 0.6
-_LEAST_SHARE = 0.002
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
 
@@ -50,8 +49,7 @@ def noise_of(problem: Problem, state: State) -> Noise:
         if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             break
         power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
-    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
-    power = max(power, _LEAST_SHARE**2 * float((counted**2).mean()))
+    power = max(power, problem.least_mps2**2)
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 

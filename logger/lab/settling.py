@@ -31,11 +31,12 @@ def aligned(problem: Problem, state: State, worth: float = 0.0) -> State:
     """
     numbers = len(state.logs)
     first = least = problem.deviance(state)
-    for _ in range(_ALIGNING_ROUNDS):
+    for done in range(1, _ALIGNING_ROUNDS + 1):
         nothing = [np.zeros((numbers, len(prediction))) for prediction in state.predictions]
         slopes = Slopes(nothing, problem.wander_slopes(state), state.wander, state.names)
         weighed = Weighed(problem, slopes, problem.whiteners(state), still=True)
-        trial = improved(weighed, state, [], 1, laid_out=True)  # slopes by the wander are cheaper than a simulation
+        # One step a round: slopes by the wander are cheaper than a simulation.
+        trial = improved(weighed, state, [], 1, True, FIRST_DAMPING if done == 1 else LAST_DAMPING)
         gained = least - problem.deviance(trial)
         if gained > 0:
             least, state = least - gained, trial

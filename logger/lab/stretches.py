@@ -25,6 +25,7 @@ FIT_S, JUDGE_S = 12.0, 6.0
 """Stretches take turns: so long to fit, then so long to judge; in a shorter run, two thirds and one third of it."""
 _BLOCK_S = 3.0
 _HIGHEST_OF_RATE = 0.37
+_NOTHING = 1e-12  # [m2/s4]
 # Ends of the bands at 100 samples a second [Hz].
 _EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
              30.0, 33.5, 37.0)
@@ -50,9 +51,15 @@ class Cells:
 
 
 class Stretches:
-    """How one run is cut."""
+    """How one run is cut. What a model leaves counts as no less than ``least_mps2`` in any band [m/s2].
 
-    def __init__(self, run: Run, whole: bool = False) -> None:
+    fit          which of the samples that count are fitted (n,); the others judge
+    judges       whether there are others
+    first        the first sample that counts, of ``count`` in the run
+    edges_hz     ends of the bands (b + 1,) [Hz]
+    """
+
+    def __init__(self, run: Run, whole: bool = False, least_mps2: float = 0.0) -> None:
         rate = run.rate_hz
         self.rate_hz, self.first, self.count = rate, run.first, run.count
         time_s = np.arange(run.count - run.first) / rate
@@ -78,6 +85,7 @@ class Stretches:
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
+        self._least_power = max(least_mps2**2, _NOTHING)
         self._width_hz = np.array([len(one) for one in self._members]) * rate / size
 
     def cells(self, residual: Array, fitted: bool | None = True) -> Cells:
@@ -88,7 +96,7 @@ class Stretches:
         spectrum = self._spectrum(residual, starts)
         power = np.array([spectrum[one].mean() for one in self._members])
         span_s = len(self.fit) if fitted is None else (self.fit == fitted).sum()
-        return Cells(np.maximum(power, 1e-12), 2 * self._width_hz * span_s / self.rate_hz)
+        return Cells(np.maximum(power, self._least_power), 2 * self._width_hz * span_s / self.rate_hz)
 
     def quiet(self, residual: Array) -> tuple[float, float]:
         """Mean power of a residual where nothing but the sensor's noise is, as if it were white, and its freedom."""
@@ -122,6 +130,13 @@ class Whitener:
         part = samples[..., self._first:]
         white = np.fft.irfft(np.fft.rfft(part, axis=-1) * self._gain, self._count, axis=-1)
         return np.asarray(white[..., self._fit])
+
+
+def unseen_in(stretches: Sequence[Stretches]) -> list[Bools]:
+    """Which of the samples that count no fit saw (n,), per run; all, where nothing was kept from the fits."""
+    if not any(one.judges for one in stretches):
+        return [np.ones_like(one.fit) for one in stretches]
+    return [~one.fit for one in stretches]
 
 
 def deviance(cells: Sequence[Cells]) -> float:

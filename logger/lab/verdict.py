@@ -19,7 +19,7 @@ from logger.lab.blind import Blind, blind
 from logger.lab.diagnosis import CHANCE, LEAST_OF_LEFT, Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
-from logger.lab.stretches import Stretches
+from logger.lab.stretches import Stretches, unseen_in
 from logger.lab.unexplained import Shape, sentences, shape_of
 from logger.vehicle.effect import Chosen, Effect
 
@@ -133,9 +133,9 @@ def floor_where_judged(diagnosis: Diagnosis) -> float | None:
     where it is not known."""
     if diagnosis.noise is None or not diagnosis.judged:
         return diagnosis.noise_floor_error
-    measured = np.concatenate([
-        run.measured_mps2[run.first:][~cut.fit if cut.judges else cut.fit]
-        for run, cut in ((run, Stretches(run)) for run in diagnosis.problem.runs.runs)])
+    runs = diagnosis.problem.runs.runs
+    measured = np.concatenate([run.measured_mps2[run.first:][unseen] for run, unseen in zip(
+        runs, unseen_in([Stretches(run) for run in runs]), strict=True)])
     return float(diagnosis.noise.deviation_mps2 / np.sqrt((measured**2).mean()))
 
 
@@ -185,7 +185,8 @@ def as_json(found: Verdict) -> dict[str, Any]:
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     return {
         "baseline_error": diagnosis.baseline_error, "noise_floor_error": diagnosis.noise_floor_error,
-        "unseen_noise_floor_error": floor_where_judged(diagnosis),
+        "unseen_noise_floor_error": floor_where_judged(diagnosis) if diagnosis.judged else None,
+        "judged_on": diagnosis.judged_on,
         "candidates": [
             {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
              "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from logger.lab.beside import Beside, Part, frequencies, paired, segments, short_names
 from logger.lab.compare import Comparison, Standing, conclusion, evidence, headline
 from logger.lab.force_map import Curve, ForceMap
-from logger.lab.marks import Mark, worst_places
+from logger.lab.marks import worst_places
 from logger.report.document import document, tiles
 from logger.studies.pictures import picture
 from logger.studies.study import Curves, Line
@@ -38,7 +38,7 @@ def page(found: Comparison) -> str:
         f"<section><h2>After the refit</h2><ul>{''.join(f'<li>{escape(one)}</li>' for one in evidence(found))}</ul>"
         f"<p>{escape(conclusion(found))}</p></section>",
         _worst_place(found.refitted), spectra_section(beside), _tables(found), _places(found.refitted),
-        forces_section(found.marks.forces), _alignment(found), _marks(found.marks.marks), _numbers(found),
+        forces_section(found.marks.forces), _alignment(found), _marks(found), _numbers(found),
     ])
 
 
@@ -46,7 +46,7 @@ def _tiles(found: Comparison) -> str:
     beside = found.plain.beside
     return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
                   ("Error after the refit", f"{found.refitted.error:.3f}", ""),
-                  ("Marks found", f"{len(found.marks.found)}", f"of {len(found.marks.marks)}"),
+                  ("Marks found", f"{len(found.marks_found)}", f"of {len(found.marks.marks)}"),
                   ("Runs", f"{len(beside.runs)}", f"{sum(map(len, beside.left)) / beside.rate_hz:.0f} s")])
 
 
@@ -158,11 +158,12 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
             f"{'<th class=n>Before the refit</th>' if stands else ''}</tr>{rows}</table></div></section>")
 
 
-def _marks(marks: Sequence[Mark]) -> str:
+def _marks(found: Comparison) -> str:
     rows = "".join(
         f"<tr><td>{escape(mark.name)}</td><td class=n>{_measured(mark.value, mark.unit)}"
         f"</td><td class=n>{_measured(mark.standard_error)}</td>"
-        f"<td class=n>{_chance(mark.p_value)}</td><td>{'found' if mark.found else ''}</td></tr>" for mark in marks)
+        f"<td class=n>{_chance(mark.p_value)}</td><td>{'found' if mark in found.marks_found else ''}</td></tr>"
+        for mark in found.marks.marks)
     return ('<section><h2>All marks</h2><div class="scroll"><table><tr><th>Mark</th><th class=n>Value</th>'
             "<th class=n>Standard error</th><th class=n>Chance in noise</th><th></th></tr>"
             f'{rows}</table></div><p class="hint">A mark is found when it is improbable in noise and large enough to '

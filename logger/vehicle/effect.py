@@ -95,6 +95,13 @@ class Parameter:
         here = self.coordinate(value)
         return any(abs(here - self.coordinate(end)) < _AT_END for end in (self.low, self.high))
 
+    def at_its_weakest(self, value: float) -> bool:
+        """Whether a strength is at the end of its range beyond which lies the value at which it does nothing."""
+        if self.null is None or self.low < self.null < self.high:
+            return False
+        weakest = self.low if self.null <= self.low else self.high
+        return abs(self.coordinate(value) - self.coordinate(weakest)) < _AT_END
+
 
 @dataclass(frozen=True)
 class Misalignment:
@@ -221,9 +228,11 @@ class Chosen:
 
     @property
     def at_an_end(self) -> bool:
-        """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping):
-        what looks like it is something else."""
+        """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
+        can be no weaker: what looks like it is something else."""
         numbers = [one for one in self.effect.parameters if not one.choices]
+        if any(one.at_its_weakest(self.values[one.name]) for one in numbers):
+            return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
 

@@ -47,6 +47,8 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
     assert best["parameters"]["offset_m"] == pytest.approx(0.4, abs=0.04)
     assert best["p_value"] < 1e-6 and best["confused_with"] == []
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= others[0].keys()
+    assert [one["p_value"] for one in others] == sorted(one["p_value"] for one in others)
+    assert told["judged_on"] == "stretches that no fit saw"
     assert best["error"] < 0.7 * min(one["error"] for one in others)
     assert told["not_tried"].keys() == {"roll"}
     assert {one["effect"] for one in told["candidates"]} == set(FEW) - {"roll"}
@@ -66,6 +68,35 @@ def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "Next: nothing" in told
     assert "roll: could not be tried" in told
     assert all(len(line) <= 100 for line in lines)
+
+
+def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+                              ) -> None:
+    """As ``ridelog simulate`` writes them: a right model is right, and friction is no late clock besides."""
+    names = ("dry_friction", "sensor_bandwidth", "sensor_offset", "time_offset")
+    few = {name: shipped_effects()[name] for name in names}
+    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    right = write_runs(tmp_path / "right", [], noise_mps2=0.0)
+    assert diagnose(*right, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] == [] and told["unexplained"] is False
+    assert "sensor_offset" not in told["hidden"]
+    assert main(["compare", "--vehicle", "rav4-2009", *right, "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)
+    assert compared["missing"] is False and not any(mark["found"] for mark in compared["marks"])
+    rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
+    assert diagnose(*write_runs(tmp_path / "rubbing", rubbing, noise_mps2=0.0), "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] == ["dry_friction"] and told["unexplained"] is False
+    assert told["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)
+
+
+def test_short_runs_say_that_nothing_was_kept_from_the_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                                            ) -> None:
+    assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["unseen_noise_floor_error"] is None
+    assert told["judged_on"].startswith("all samples")
 
 
 def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -150,6 +150,9 @@ def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
     assert chosen(bending, usual | {"damping_ratio": 0.003}).at_an_end
     assert not chosen(bending, usual | {"participation": 10.0}).at_an_end  # a strength, which may be large
     shapes = {one.name: one.high for one in roll.parameters}
+    bandwidth = EFFECTS["sensor_bandwidth"]
+    assert chosen(bandwidth, {"cutoff_hz": 2000.0, "order": 2.0}).at_an_end  # where it does nothing
+    assert not chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_an_end
     assert not chosen(roll, shapes).at_an_end  # it has no strength that could make up for a shape
 
 

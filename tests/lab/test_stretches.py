@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from logger.lab.prediction import Run
-from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance
+from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance, unseen_in
 from logger.roads.track import Track
 
 
@@ -71,3 +71,16 @@ def test_what_is_twice_as_strong_costs_the_logarithm_of_four_for_each_degree_of_
     stretches = Stretches(run_of(6000))
     once, twice = stretches.cells(noise, None), stretches.cells(2 * noise, None)
     assert deviance([twice]) - deviance([once]) == pytest.approx(np.log(4) * once.freedom.sum())
+
+
+def test_what_no_fit_saw_is_of_the_runs_that_judge() -> None:
+    short, long = Stretches(run_of(200 + 800)), Stretches(run_of(200 + 3600))
+    assert [int(unseen.sum()) for unseen in unseen_in([short, long])] == [0, 1200]
+    assert [int(unseen.sum()) for unseen in unseen_in([short])] == [800]
+
+
+def test_what_is_left_counts_as_no_less_than_simulations_differ_by() -> None:
+    stretches = Stretches(run_of(6000), least_mps2=0.01)
+    quiet, loud = (np.random.default_rng(1).normal(0, size, 6000) for size in (1e-6, 1.0))
+    assert np.allclose(stretches.cells(quiet).power, 0.01**2)
+    assert stretches.cells(loud).power.min() > 0.1
