@@ -70,7 +70,7 @@ where much is still to be found."""
 _WORTH_FITTING = 0.03
 _LEAST_PROMISE, _SHARE_PROMISED = 6.0, 0.001
 _HAS_A_SHAPE = 2  # numbers, so that an effect may explain much as what it is not
-_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.5, 3
+_MOST_FITTED, _MOST_FINALISTS, _FINALIST_SHARE, _FINAL_ROUNDS = 6, 3, 0.7, 3
 _HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fitted, and when only screened
 _THE_SAME_PLACE = 20.0  # steps
 _THE_SAME_M = 0.001
