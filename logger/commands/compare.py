@@ -17,7 +17,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import check_model, check_out, paragraphs
+from logger.commands.lab_model import add_tolerance, check_model, check_out, deviation_of, paragraphs
 from logger.commands.lab_runs import lab_runs
 from logger.errors import EXIT_DONE, BadInput
 from logger.store.naming import naming
@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
+    add_tolerance(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
@@ -41,9 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog compare``."""
     from logger.lab.compare import as_json, compare
+    from logger.lab.nuisance import Tolerance
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_model
 
+    tolerance = Tolerance(numbers=deviation_of(args.tolerance))
     path = vehicle_path(args.vehicle)
     model = read_model(path)
     if args.out is not None:
@@ -51,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     runs = lab_runs(args.runs)
     check_model(args.vehicle, model, runs)
     try:
-        found = compare(runs, model.vehicle, model.effects, model.given)
+        found = compare(runs, model.vehicle, model.effects, model.given, tolerance)
     except ValueError as error:
         raise BadInput(f"{args.vehicle}: {error}") from None
     if args.out is not None:

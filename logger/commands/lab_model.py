@@ -94,12 +94,17 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
-    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="SHARE",
-                        help="how far off the vehicle's masses, springs and dampers may well be (default: "
-                             f"{TOLERANCE:g}, 4 %%)")
+    add_tolerance(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
                         help="an effect of your own to be tried as well; may repeat")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def add_tolerance(parser: argparse.ArgumentParser) -> None:
+    """--tolerance, for ``deviation_of``."""
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="SHARE",
+                        help="how far off the vehicle's masses, springs and dampers may well be (default: "
+                             f"{TOLERANCE:g}, 4 %%)")
 
 
 def bench(args: argparse.Namespace) -> Bench:

@@ -57,6 +57,16 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert all(len(line) <= 80 for line in told[told.index("Where"):].splitlines())
 
 
+def test_numbers_are_far_off_by_what_is_granted(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    told = []
+    for tolerance in ("0.01", "0.4"):
+        assert compare(*runs, "--json", "--tolerance", tolerance) == 0
+        told.append(json.loads(capsys.readouterr().out)["refitted"])
+    firm, loose = told
+    assert firm["moved_far"] and not loose["moved_far"]
+    assert max(map(abs, loose["moves"].values())) > max(map(abs, firm["moves"].values()))
+
+
 def test_what_cannot_be_compared(runs: list[str], tmp_path: Path) -> None:
     profile = (Path(runs[0]) / "profile.csv").read_text("utf-8")
     drive = (Path(runs[0]) / "drive.csv").read_text("utf-8").splitlines(keepends=True)
@@ -79,6 +89,7 @@ def test_what_cannot_be_compared(runs: list[str], tmp_path: Path) -> None:
         ((wrong(changed(3, "99999"), "away"),), "on the profile"),
         ((wrong(changed(1, "0"), "silent"),), "zeros only"),
         ((str(tmp_path / "none"),), "expected a folder"),
+        ((runs[0], "--tolerance", "nan"), "--tolerance nan: expected 0.001 to 0.5"),
     ):
         with pytest.raises(BadInput, match=words):
             compare(*arguments)
