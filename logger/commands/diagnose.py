@@ -103,7 +103,8 @@ def lines(found: Verdict, most: int | None) -> list[str]:
         shown += ["", "What it looks like:", paragraphs(described, "- ")]
     rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
     more = len(found.diagnosis.candidates) - len(rows) + 1
-    shown += ["", "Each tried by itself, those of the verdict first:", *columns(rows)]
+    shown += ["", "Each tried by itself, those of the verdict first, then the least likely to be chance:",
+              *columns(rows)]
     if more > 0:
         shown.append(f"and {more} more (ridelog diagnose --all)")
     if hidden := untested(found):
