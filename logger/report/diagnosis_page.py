@@ -82,8 +82,9 @@ def falling(title: str, steps: Sequence[tuple[str, float]], floor: float | None)
 
 def _candidates(found: Verdict) -> str:
     return (grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
-            + '<p class="hint">Each tried alone on the model of its round, those of the verdict first, then the least likely to be '
-            f"chance. The error is on {found.diagnosis.judged_on}; the chance holds for all candidates together.</p>")
+            + '<p class="hint">Each tried alone on the model of its round, those of the verdict first, then the least '
+            f"likely to be chance. The error is on {found.diagnosis.judged_on}; the chance holds for all candidates "
+            "together.</p>")
 
 
 def _where(shape: Shape) -> str:
