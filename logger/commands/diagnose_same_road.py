@@ -1,8 +1,8 @@
 """``ridelog diagnose --same-road``: which effect is missing, from drives over one road that nobody measured.
 
 Each RUN is a folder with drive.csv; a profile.csv in it is not read. The runs are drives over the same road at
-different speeds, their distances counted from the same place (to about 3 m). An error is rms(measured - model) /
-rms(measured) of each drive over the road that the other drives tell.
+different speeds, their distances counted from the same place (to about 3 m); drives that are plainly over two roads are
+refused. An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives tell.
 """
 
 from __future__ import annotations

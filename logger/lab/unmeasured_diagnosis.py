@@ -149,7 +149,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
 
 def _two_roads(one: str, other: str) -> str:
     return (f"{one} and {other}: expected drives over the same road, found that neither tells what the other met. "
-            f"{NOT_ONE_ROAD}; leave one of them out")
+            f"{NOT_ONE_ROAD}; name drives over one road only")
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -320,6 +320,7 @@ def as_json(found: Found) -> dict[str, Any]:
         "left_over_noise": 1 + found.excess,
         "steps": [{"step": words, "error": error} for words, error in found.steps],
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
+        "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
         "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),
         "sentences": [*summary(found), *cannot_tell(found)],
     }

@@ -210,4 +210,5 @@ def test_what_was_not_fitted_has_no_error() -> None:
                   (("slow", "brisk"),))
     told = as_json(found)
     assert told["candidates"][0]["error"] is None and told["candidates"][0]["fitted"] is False
+    assert told["maybe_over_two_roads"] == [["slow", "brisk"]]
     assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
