@@ -33,7 +33,7 @@ class Coherence:
     raw        before that correction
     inputs     q
     segments   n, as many as independent ones
-    power      of the residual
+    power      of the residual [m2/s4 in each frequency]
     """
 
     f_hz: Array

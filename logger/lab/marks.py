@@ -20,6 +20,7 @@ from logger.lab.alignment import Alignment, aligned, constant, drift
 from logger.lab.beside import BAND_NAMES, Beside, Located, Part, block_means, short_names
 from logger.lab.coherence import Coherence, with_road
 from logger.lab.force_map import Curve, ForceMap, Term, force_map
+from logger.lab.tones import NEIGHBOURS, loudest
 
 Array = npt.NDArray[np.float64]
 
@@ -31,8 +32,7 @@ _LEAST_LEAN = 0.3
 _ALIKE = 0.5
 _HIGHEST_OF_RATE = 0.38
 _LONG_BLOCK_S = 2.0
-_TONE_WIDTH_HZ, _TONE_NEIGHBOURS, _TONE_GAP = 0.4, 15, 3
-_HANN_ALIKE = 1.94
+_TONE_WIDTH_HZ = 0.4
 _SPEED_SPREAD = 1.15
 _LEAST_LOG_FACTOR = 0.25
 _GROWN = 1.3
@@ -146,24 +146,15 @@ def _lean(beside: Beside) -> Mark:
 
 
 def _tone(beside: Beside) -> Mark:
-    """The largest of the periodograms' ordinates over the mean of its neighbours: an F(2, 2 m) test for each."""
+    """The frequency that stands out most, of all runs."""
     best = (1.0, 0.0, "")
     for run, left in zip(beside.runs, beside.left, strict=True):
-        power = np.abs(np.fft.rfft(left * np.hanning(len(left)))) ** 2
         f_hz = np.fft.rfftfreq(len(left), 1 / beside.rate_hz)
-        reach = max(_TONE_NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / beside.rate_hz))
-        around = np.ones(2 * reach + 1)
-        around[reach - _TONE_GAP : reach + _TONE_GAP + 1] = 0.0
-        level = np.convolve(power, around / around.sum(), mode="same")
-        inner = slice(reach, len(power) - reach)
-        ratio = np.divide(power[inner], level[inner], out=np.zeros_like(power[inner]), where=level[inner] > 0)
-        if not len(ratio):
-            continue
-        # A Hann taper makes neighbours alike: they count for so many fewer.
-        worth = around.sum() / _HANN_ALIKE
-        p_value = len(ratio) * len(beside.runs) * float((1 + ratio.max() / worth) ** -worth)
-        if p_value < best[0]:
-            best = (p_value, float(f_hz[inner][ratio.argmax()]), short_names(beside.runs)[run.name])
+        reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / beside.rate_hz))
+        number = np.arange(len(f_hz))
+        found = loudest(left, (number >= reach) & (number < len(f_hz) - reach), reach)
+        if found is not None:
+            best = min(best, (found[1] * len(beside.runs), float(f_hz[found[0]]), short_names(beside.runs)[run.name]))
     p_value, at_hz, name = best
     return Mark("tone", at_hz, "Hz", None, p_value, True, False,
                 f"A single frequency stands out in what is left: {at_hz:.1f} Hz, in {name}. Something hums or rings "

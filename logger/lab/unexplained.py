@@ -15,14 +15,13 @@ import numpy.typing as npt
 from logger.lab.beside import Beside, Located, located, short_names
 from logger.lab.fitting import Problem, State
 from logger.lab.marks import DOUBT, Marks, read_marks
+from logger.lab.tones import NEIGHBOURS, loudest
 
 Array = npt.NDArray[np.float64]
 
 _SLOWEST_MPS = 1.0
 _FROM_PER_M, _TO_PER_M = 0.3, 2.2
 _WHEEL_M = (0.22, 0.5)
-_NEIGHBOURS, _GAP = 15, 3
-_HANN_ALIKE = 1.94
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def sentences(shape: Shape) -> list[str]:
 
 
 def turns_of(beside: Beside) -> Turns | None:
-    """What repeats along the way: as for a tone in time, the largest ordinate over the mean of its neighbours."""
+    """What repeats along the way: as for a tone in time."""
     found = []
     names = short_names(beside.runs)
     for run, left in zip(beside.runs, beside.left, strict=True):
@@ -90,20 +89,13 @@ def turns_of(beside: Beside) -> Turns | None:
         step_m = float(np.median(speed)) / run.rate_hz
         along = np.interp(np.arange(way[0], way[-1], step_m), way, left)
         per_m = np.fft.rfftfreq(len(along), step_m)
-        power = np.abs(np.fft.rfft(along * np.hanning(len(along)))) ** 2
-        around = np.ones(2 * _NEIGHBOURS + 1)
-        around[_NEIGHBOURS - _GAP : _NEIGHBOURS + _GAP + 1] = 0.0
-        level = np.convolve(power, around / around.sum(), mode="same")
-        inner = np.flatnonzero((per_m > _FROM_PER_M) & (per_m < _TO_PER_M) & (level > 0))
-        if len(inner) < _NEIGHBOURS:
+        asked = (per_m > _FROM_PER_M) & (per_m < _TO_PER_M)
+        stands_out = loudest(along, asked)
+        if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
-        ratio = power[inner] / level[inner]
-        # A Hann taper makes neighbours alike: they count for so many fewer.
-        worth = around.sum() / _HANN_ALIKE
-        p_value = len(inner) * float((1 + ratio.max() / worth) ** -worth)
-        at_per_m = np.asarray(per_m[inner], float)
-        found.append(Turns(names[run.name], float(at_per_m[ratio.argmax()]), p_value, at_per_m,
-                           power[inner] / float(power[inner].mean())))
+        power = np.abs(np.fft.rfft(along * np.hanning(len(along))))[asked] ** 2
+        found.append(Turns(names[run.name], float(per_m[stands_out[0]]), stands_out[1], np.asarray(per_m[asked], float),
+                           power / float(power.mean())))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None

@@ -1,0 +1,37 @@
+"""Whether a single frequency stands out of a spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+NEIGHBOURS = 15
+"""An ordinate is held against so many on either side, or more."""
+_GAP = 3
+# A Hann taper makes neighbours alike: they count for so many fewer.
+_HANN_ALIKE = 1.94
+
+
+def loudest(samples: Array, among: Bools, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
+    """The frequency that stands out most of evenly spaced samples, by its number in their transform, and how probable
+    one so loud would be by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of
+    ``reach`` neighbours on either side is F(2, 2 m) in noise, the best of so many.
+
+    samples    (n,) of any unit
+    among      (n // 2 + 1,) which frequencies are asked
+
+    None where no frequency that is asked has power around it.
+    """
+    power = np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2
+    around = np.ones(2 * reach + 1)
+    around[reach - _GAP : reach + _GAP + 1] = 0.0
+    level = np.convolve(power, around / around.sum(), mode="same")
+    asked = np.flatnonzero(among & (level > 0))
+    if not len(asked):
+        return None
+    ratio = power[asked] / level[asked]
+    worth = around.sum() / _HANN_ALIKE
+    return int(asked[ratio.argmax()]), len(asked) * float((1 + ratio.max() / worth) ** -worth)
