@@ -151,8 +151,7 @@ def _tone(beside: Beside) -> Mark:
     for run, left in zip(beside.runs, beside.left, strict=True):
         f_hz = np.fft.rfftfreq(len(left), 1 / beside.rate_hz)
         reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / beside.rate_hz))
-        number = np.arange(len(f_hz))
-        found = loudest(left, (number >= reach) & (number < len(f_hz) - reach), reach)
+        found = loudest(left, reach=reach)
         if found is not None:
             best = min(best, (found[1] * len(beside.runs), float(f_hz[found[0]]), short_names(beside.runs)[run.name]))
     p_value, at_hz, name = best

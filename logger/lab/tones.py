@@ -15,13 +15,13 @@ _GAP = 3
 _HANN_ALIKE = 1.94
 
 
-def loudest(samples: Array, among: Bools, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
+def loudest(samples: Array, among: Bools | None = None, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
     """The frequency that stands out most of evenly spaced samples, by its number in their transform, and how probable
     one so loud would be by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of
     ``reach`` neighbours on either side is F(2, 2 m) in noise, the best of so many.
 
     samples    (n,) of any unit
-    among      (n // 2 + 1,) which frequencies are asked
+    among      (n // 2 + 1,) which frequencies are asked, of those with so many neighbours; None: all
 
     None where no frequency that is asked has power around it.
     """
@@ -29,7 +29,9 @@ def loudest(samples: Array, among: Bools, reach: int = NEIGHBOURS) -> tuple[int,
     around = np.ones(2 * reach + 1)
     around[reach - _GAP : reach + _GAP + 1] = 0.0
     level = np.convolve(power, around / around.sum(), mode="same")
-    asked = np.flatnonzero(among & (level > 0))
+    number = np.arange(len(power))
+    whole = (number >= reach) & (number < len(power) - reach) & (level > 0)
+    asked = np.flatnonzero(whole if among is None else whole & among)
     if not len(asked):
         return None
     ratio = power[asked] / level[asked]
