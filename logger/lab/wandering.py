@@ -43,6 +43,9 @@ _PROMISING = 0.4
 _TOO_FAR = 3.0
 """A factor or a start of a run that is off by more deviations of what is granted asks for a look."""
 _FOLLOWED = 3  # times: windows that were lost are found once those around them lie right
+_NEAR_M = 0.02
+"""A model that lies no farther off than this, a quarter of the shortest wave at walking pace, is aligned to the same
+places."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,9 +271,12 @@ def _followed(problem: Problem, state: State, places: list[Array]) -> State:
     whichever is likelier; well enough to tell that."""
     best = _aligned_from(problem, state, places)
     for _ in range(_FOLLOWED):
-        followed = [place + followed_m(run, prediction) for place, run, prediction in zip(
-            _places(problem, best), problem.runs.runs, best.predictions, strict=True)]
-        there = _aligned_from(problem, state, followed)
+        farther_m = [followed_m(run, prediction) for run, prediction in zip(
+            problem.runs.runs, best.predictions, strict=True)]
+        if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
+            break
+        there = _aligned_from(problem, state, [
+            place + one for place, one in zip(_places(problem, best), farther_m, strict=True)])
         if problem.deviance(there) > problem.deviance(best) - _CLEARLY:
             break
         best = there
