@@ -186,7 +186,7 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
     base = base.without(problem, effect.replaces)
     best: dict[tuple[float, ...], Trial] = {}
     astray = effect.realigns and far(problem, base.state)
-    lying: list[State] = []
+    lying: State | None = None
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         one = chosen(effect, values)
@@ -194,8 +194,8 @@ def screened(problem: Problem, base: Base, effect: Effect, seen: Misalignment) -
         if effect.realigns:
             found.append(_of(base, _as_given(problem, base, one)))
         if astray and values is not trials[0]:
-            lying = [_aligned(problem, base, one, lying)]
-            found.append(_of(base, lying[0]))
+            lying = _aligned(problem, base, one, lying)
+            found.append(_of(base, lying))
         trial = max(found, key=lambda one: one.gain)
         if choice not in best or trial.gain > best[choice].gain:
             best[choice] = trial
@@ -331,12 +331,13 @@ def _as_given(problem: Problem, base: Base, one: Chosen) -> State:
     return problem.laid_out((*base.state.effects, one), *base.weighed.parted(np.zeros(base.weighed.count)))
 
 
-def _aligned(problem: Problem, base: Base, one: Chosen, nearby: Sequence[State]) -> State:
-    """A trial of the car as it is, aligned anew from the runs as they are or from where some other trials lie: where a
+def _aligned(problem: Problem, base: Base, one: Chosen, nearby: State | None) -> State:
+    """A trial of the car as it is, aligned anew from the runs as they are or from where another trial lies: where a
     wander that is hardly granted puts positions right, others do with the effect."""
     effects = (*base.state.effects, one)
     starts = [problem.unmoved(effects, base.state.logs)]
-    starts += [problem.laid_out(effects, base.state.logs, other.wander) for other in nearby]
+    if nearby is not None:
+        starts.append(problem.laid_out(effects, base.state.logs, nearby.wander))
     return aligned(problem, min(starts, key=problem.deviance), WORTH_ALIGNING)
 
 

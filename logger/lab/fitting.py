@@ -39,8 +39,6 @@ _LEAST_THAT_DAMPS = 1e-4
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _RIDGE = 1e-12
-
-
 LEAST_SHARE = 0.002
 """Two right simulations of a car differ by so much of what was measured: what a model leaves counts as no less."""
 
@@ -92,6 +90,8 @@ class Problem:
     whole     fit all of the runs, and leave no stretch to judge
     stands    the vehicle as it stands, where fits begin, if that is another than was given
     firm      hold on to the car's numbers: a car that may bend as it likes makes up for effects that it lacks
+
+    size_mps2 is the r.m.s. of what was measured, by which errors are divided; least_mps2 what a model leaves at least.
     """
 
     def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
@@ -101,7 +101,8 @@ class Problem:
         self._stands = stands or vehicle
         self.wander: list[Wander] = [wander_of(run, tolerance) for run in runs.runs]
         counted = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
-        self.least_mps2 = LEAST_SHARE * float(np.sqrt((counted**2).mean()))
+        self.size_mps2 = float(np.sqrt((counted**2).mean()))
+        self.least_mps2 = LEAST_SHARE * self.size_mps2
         self.stretches = [Stretches(run, whole, self.least_mps2) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
 

@@ -20,7 +20,7 @@ from logger.lab.alignment import Alignment, aligned, constant, drift
 from logger.lab.beside import BAND_NAMES, Beside, Located, Part, block_means, short_names
 from logger.lab.coherence import Coherence, with_road
 from logger.lab.force_map import Curve, ForceMap, Term, force_map
-from logger.lab.tones import NEIGHBOURS, loudest
+from logger.lab.tones import NEIGHBOURS, loudest, periodogram
 
 Array = npt.NDArray[np.float64]
 
@@ -151,7 +151,7 @@ def _tone(beside: Beside) -> Mark:
     for run, left in zip(beside.runs, beside.left, strict=True):
         f_hz = np.fft.rfftfreq(len(left), 1 / beside.rate_hz)
         reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / beside.rate_hz))
-        found = loudest(left, reach=reach)
+        found = loudest(periodogram(left), reach=reach)
         if found is not None:
             best = min(best, (found[1] * len(beside.runs), float(f_hz[found[0]]), short_names(beside.runs)[run.name]))
     p_value, at_hz, name = best

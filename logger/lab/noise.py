@@ -62,5 +62,4 @@ def left_to_explain(problem: Problem, state: State) -> float:
 
 def floor_error(problem: Problem, noise: Noise) -> float:
     """rms(noise) / rms(measured) over all samples that count."""
-    counted = np.concatenate([run.measured_mps2[run.first:] for run in problem.runs.runs])
-    return float(noise.deviation_mps2 / np.sqrt((counted**2).mean()))
+    return noise.deviation_mps2 / problem.size_mps2

@@ -15,17 +15,21 @@ _GAP = 3
 _HANN_ALIKE = 1.94
 
 
-def loudest(samples: Array, among: Bools | None = None, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
-    """The frequency that stands out most of evenly spaced samples, by its number in their transform, and how probable
-    one so loud would be by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of
+def periodogram(samples: Array) -> Array:
+    """Power of evenly spaced samples (n,) at each frequency of their transform (n // 2 + 1,), tapered (Hann)."""
+    return np.asarray(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2)
+
+
+def loudest(power: Array, among: Bools | None = None, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
+    """The frequency that stands out most of a periodogram, by its number in it, and how probable one so loud would be
+    by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of
     ``reach`` neighbours on either side is F(2, 2 m) in noise, the best of so many.
 
-    samples    (n,) of any unit
-    among      (n // 2 + 1,) which frequencies are asked, of those with so many neighbours; None: all
+    power    (f,) of any unit
+    among    (f,) which frequencies are asked, of those with so many neighbours; None: all
 
     None where no frequency that is asked has power around it.
     """
-    power = np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2
     around = np.ones(2 * reach + 1)
     around[reach - _GAP : reach + _GAP + 1] = 0.0
     level = np.convolve(power, around / around.sum(), mode="same")

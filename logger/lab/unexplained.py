@@ -15,7 +15,7 @@ import numpy.typing as npt
 from logger.lab.beside import Beside, Located, located, short_names
 from logger.lab.fitting import Problem, State
 from logger.lab.marks import DOUBT, Marks, read_marks
-from logger.lab.tones import NEIGHBOURS, loudest
+from logger.lab.tones import NEIGHBOURS, loudest, periodogram
 
 Array = npt.NDArray[np.float64]
 
@@ -90,12 +90,12 @@ def turns_of(beside: Beside) -> Turns | None:
         along = np.interp(np.arange(way[0], way[-1], step_m), way, left)
         per_m = np.fft.rfftfreq(len(along), step_m)
         asked = (per_m > _FROM_PER_M) & (per_m < _TO_PER_M)
-        stands_out = loudest(along, asked)
+        power = periodogram(along)
+        stands_out = loudest(power, asked)
         if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
-        power = np.abs(np.fft.rfft(along * np.hanning(len(along))))[asked] ** 2
         found.append(Turns(names[run.name], float(per_m[stands_out[0]]), stands_out[1], np.asarray(per_m[asked], float),
-                           power / float(power.mean())))
+                           power[asked] / float(power[asked].mean())))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None
