@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.roads.calibration import Array, Line, Settings, SpeedCalibration
@@ -72,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         with_people = Load(args.passengers, args.sprung_mass_factor, vehicle.sprung_mass_kg, heavy.sprung_mass_kg,
                            answer(ask, heavy, f"{vehicle.name} with its load"))
     if args.out is not None:
-        args.out.write_text("".join(_csv(with_people.speeds if with_people else plain)), encoding="ascii")
+        write_text(args.out, "".join(_csv(with_people.speeds if with_people else plain)), "ascii")
     if args.json:
         print(json.dumps(as_json(vehicle, ask.settings, plain, with_people), allow_nan=False))
     else:

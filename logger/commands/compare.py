@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from logger.commands.lab_model import add_tolerance, check_model, check_out, deviation_of, paragraphs
 from logger.commands.lab_runs import lab_runs
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import naming
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.lab.beside import Part
@@ -60,8 +60,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.lab_page import page
 
-        with naming(args.out):
-            args.out.write_text(page(found), "utf-8")
+        write_text(args.out, page(found))
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:

@@ -29,7 +29,7 @@ from logger.commands.lab_model import (
     wipe,
 )
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import naming
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.lab.verdict import Verdict
@@ -62,8 +62,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.diagnosis_page import page
 
-        with naming(args.out):
-            args.out.write_text(page(found, given.model.vehicle.name), "utf-8")
+        write_text(args.out, page(found, given.model.vehicle.name))
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
         return EXIT_DONE

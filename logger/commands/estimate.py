@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.estimation.limit import Limits
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     result = estimate(args.run, vehicle, args.noise, args.step, window_m)
     files = [] if args.profile_out is None else _write_road(args.profile_out, result)
     if args.out is not None:
-        args.out.write_text("".join(_csv(result)), encoding="ascii")
+        write_text(args.out, "".join(_csv(result)), "ascii")
     print(json.dumps(as_json(result, files), allow_nan=False) if args.json else "\n".join(screen(result, files)))
     if args.profile_out is not None and not files:
         print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.dsp.fixed_scaling import FixedCascade
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     headers = [_weighting(args), _golden_car(args)]
     args.out.mkdir(parents=True, exist_ok=True)
     for header in headers:
-        (args.out / header.file).write_text(header.text(), encoding="ascii")
+        write_text(args.out / header.file, header.text(), "ascii")
     if args.json:
         print(json.dumps({"data_bits": args.data_bits, "filters": [header.as_json(args.out) for header in headers]}))
         return EXIT_DONE

@@ -39,6 +39,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.identification.axle_response import AxleResponse
@@ -439,4 +440,4 @@ def _write(path: Path, car: VehicleModel | AxleResponse, found: Fit | RoadFit) -
                 f"{found.error_after:.4f} after"]
     comments += [f"# {name}: {value:.6g}, standard error {found.standard_errors[name]:.2g}"
                  for name, value in found.parameters.items()]
-    path.write_text("\n".join([*comments, path.read_text("utf-8")]), "utf-8")
+    write_text(path, "\n".join([*comments, path.read_text("utf-8")]))

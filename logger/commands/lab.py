@@ -23,7 +23,7 @@ from logger.commands.diagnose import diagnosed
 from logger.commands.diagnose import lines as diagnosis_lines
 from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import naming
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison
@@ -108,8 +108,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
                 going = True
                 break
     story = Story(first, tuple(verdicts), tuple(rounds), tuple(refused))
-    with naming(out / STORY):
-        (out / STORY).write_text(page(story), "utf-8")
+    write_text(out / STORY, page(story))
     tell(_chapter("The end", why.get("end")))
     tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
     return story

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.modal.mode import FoundMode, ModalResult
@@ -68,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     except ValueError as error:
         raise BadInput(f"{args.file}: {error}") from None
     if args.diagram is not None:
-        args.diagram.write_text(_diagram_csv(result), encoding="ascii")
+        write_text(args.diagram, _diagram_csv(result), "ascii")
     if args.json:
         print(json.dumps(as_json(result, record, args.method), allow_nan=False))
     else:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import naming, write_text
 
 if TYPE_CHECKING:
     from logger.roads.gd_iri import Expected
@@ -90,7 +91,7 @@ def _generate(args: argparse.Namespace) -> int:
     if args.out is None:
         sys.stdout.writelines(_csv(elevation, args.spacing))
     else:
-        with args.out.open("w", encoding="ascii", newline="\n") as file:
+        with naming(args.out), args.out.open("w", encoding="ascii", newline="\n") as file:
             file.writelines(_csv(elevation, args.spacing))
     if args.json:
         print(json.dumps(made | {"file": str(args.out)}))
@@ -148,7 +149,7 @@ def _classify(args: argparse.Namespace) -> int:
     except ValueError as error:
         raise BadInput(f"{args.profile}: {error}") from None
     if args.psd is not None:
-        args.psd.write_text(_psd_csv(profile, told[0].roughness), encoding="ascii")
+        write_text(args.psd, _psd_csv(profile, told[0].roughness), "ascii")
     if args.json:
         print(json.dumps(told[0].as_json() | ({"right": told[1].as_json()} if len(told) > 1 else {})))
         return EXIT_DONE

@@ -19,6 +19,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.store.naming import write_text
 
 if TYPE_CHECKING:
     from logger.studies.study import Cell, Curves, Field, Result, Study, Table
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.studies.page import page
 
-        args.out.write_text(page(study, result), encoding="utf-8")
+        write_text(args.out, page(study, result))
     if args.json:
         print(json.dumps(as_json(study, result), allow_nan=False))
     else:

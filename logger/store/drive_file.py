@@ -17,6 +17,7 @@ import numpy.typing as npt
 from logger.errors import BadInput
 from logger.roads.track import Track
 from logger.store.bounded import read_bounded
+from logger.store.naming import naming
 from logger.store.number_table import parse_columns
 from logger.store.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.profile_file import Profile, read_profile
@@ -144,7 +145,7 @@ def write_profile(path: Path, track: Track) -> None:
 
 def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
     line = ",".join([form] * len(names)) + "\n"
-    with path.open("w", encoding="ascii", newline="\n") as file:
+    with naming(path), path.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(names) + "\n")
         for first in range(0, len(table), _LINES_AT_ONCE):
             block = table[first : first + _LINES_AT_ONCE]

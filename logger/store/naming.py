@@ -20,3 +20,9 @@ def naming(path: Path | str) -> Iterator[None]:
         if error.filename is None:
             error.filename = str(path)
         raise
+
+
+def write_text(path: Path | str, text: str, encoding: str = "utf-8") -> None:
+    """Write a whole file of text. Raises OSError with the file's name, on a full disk too."""
+    with naming(path):
+        Path(path).write_text(text, encoding)

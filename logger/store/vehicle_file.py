@@ -16,7 +16,7 @@ import yaml
 
 from logger.errors import BadInput
 from logger.identification.parameters import changed, read, sized
-from logger.store.naming import naming
+from logger.store.naming import write_text
 from logger.store.yaml_lines import Node, load_mapping
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
@@ -214,8 +214,7 @@ def write_model(path: Path | str, model: Model) -> None:
         keys["history"] = [_OneLine(step=one.step, error=float(one.error),
                                     noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
     text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
-    with naming(path):
-        Path(path).write_text(text, "utf-8")
+    write_text(path, text)
 
 
 def _float_or_none(value: float | None) -> float | None:
