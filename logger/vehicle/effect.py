@@ -96,8 +96,8 @@ class Parameter:
         return any(abs(here - self.coordinate(end)) < _AT_END for end in (self.low, self.high))
 
     def at_its_weakest(self, value: float) -> bool:
-        """Whether a strength is at the end of its range beyond which lies the value at which it does nothing: as near as
-        a small share of the way to its start, on the scale that fits move on."""
+        """Whether a strength is at the end of its range beyond which lies the value at which it does nothing: within a
+        small share of the way to its start, on the scale that fits move on."""
         if self.null is None or self.low < self.null < self.high:
             return False
         weakest = self.coordinate(self.low if self.null <= self.low else self.high)

@@ -27,10 +27,11 @@ EFFECTS = shipped_effects()
 NOISE_MPS2 = 0.05
 
 
-def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0) -> Runs:
+def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0, rougher: float = 1.0) -> Runs:
     """Three drives of a car with effects, and noise."""
     rng = np.random.default_rng(8)
     plain = [a_run(f"run{i}", speed, lasts_s, i) for i, speed in enumerate((7.0, 12.0, 18.0))]
+    plain = [replace(one, track=replace(one.track, elevation_m=rougher * one.track.elevation_m)) for one in plain]
     return Runs([measuring(run, one + rng.normal(0, NOISE_MPS2, run.count)) for run, one in zip(
         plain, Runs(plain).predict(compose(car, effects)), strict=True)], 500.0)
 
@@ -88,6 +89,19 @@ def test_one_effect_is_enough_to_ask_for() -> None:
     strong = chosen(EFFECTS["sensor_gain"], {"gain": 1.2})
     found = searched(runs_of(CAR, [strong]), names=("sensor_gain",))
     assert found.verdict == ("sensor_gain",) and not found.unexplained
+
+
+ALONE = tuple(name for name, one in EFFECTS.items() if one.obstacle(CAR, two_tracks=False) is None)
+STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": {"mass_kg": 250.0},
+            "tire_enveloping": {"contact_patch_m": 0.5 * CAR.contact_patch_m}, "bump_stop": {"clearance_m": 0.02}}
+ROUGHER = {"bump_stop": 2.0, "wheel_lift": 6.0}
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_every_effect_is_accepted_where_it_is_what_is_missing(name: str) -> None:
+    there = chosen(EFFECTS[name], EFFECTS[name].usual | STRONGER.get(name, {}))
+    found = searched(runs_of(CAR, [there], rougher=ROUGHER.get(name, 1.0)), names=(name,))
+    assert found.verdict == (name,) and not found.unexplained
 
 
 def test_what_only_another_car_would_explain_is_unexplained() -> None:
@@ -154,6 +168,21 @@ def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
     assert chosen(bandwidth, {"cutoff_hz": 2000.0, "order": 2.0}).at_an_end  # where it does nothing
     assert not chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_an_end
     assert not chosen(roll, shapes).at_an_end  # it has no strength that could make up for a shape
+
+
+STRENGTHS = [(name, one.name) for name, effect in EFFECTS.items() for one in effect.parameters
+             if one.null is not None and not one.low < one.null < one.high]
+
+
+@pytest.mark.parametrize(("name", "strength"), STRENGTHS)
+def test_a_strength_is_at_its_weakest_at_one_end_and_not_where_it_is_usual(name: str, strength: str) -> None:
+    one = next(one for one in EFFECTS[name].parameters if one.name == strength)
+    ends = [one.at_its_weakest(value) for value in (one.low, one.high)]
+    assert sorted(ends) == [False, True] and ends[0] == (one.null == one.low)
+    assert not any(one.at_its_weakest(value) for value in (one.start, *one.trials))
+    weakest = one.coordinate(one.low if ends[0] else one.high)
+    tenth = one.value(weakest + 0.1 * (one.coordinate(one.start) - weakest))
+    assert not one.at_its_weakest(tenth)  # whatever its unit
 
 
 def test_of_choices_the_usual_one_wins_unless_another_explains_clearly_more() -> None:
