@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.commands.lab_model import columns, deviation_of, known_effects, on_screen, paragraphs, wipe
-from logger.commands.lab_runs import check_record
+from logger.commands.lab_runs import usable
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -71,8 +71,7 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
     drives: list[Drive] = []
     for folder in folders:
         drive = read_drive(folder / DRIVE)
-        check_record(drive, drive.path, drives)
-        drives.append(drive)
+        drives.append(usable(drive, drive.path, drives))
     return [Run(str(folder), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, Track(1.0, np.zeros(2)))
             for folder, one in zip(folders, drives, strict=True)]
 
@@ -83,7 +82,7 @@ def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
     from logger.lab.unmeasured_diagnosis import cannot_tell, summary
 
     rows = [("Effect", "Error", "Chance", "Numbers")]
-    rows += [(one.one.effect.name, "not fitted" if one.error is None else f"{one.error:.3f}", chance(one.p_value),
+    rows += [(one.one.effect.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
               numbers_of(one.one)) for one in found.candidates[:most]]
     by_run = [("Run", "Error before", "after"),
               *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in

@@ -88,6 +88,8 @@ def run() -> NoReturn:
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         status = _complain(f"{place}{error.strerror or error}", EXIT_BAD_INPUT)
+    except MemoryError:
+        status = _complain("not enough memory for so much data; cut it into shorter files", EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         status = EXIT_INTERRUPTED
     sys.exit(status)

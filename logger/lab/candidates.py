@@ -280,7 +280,7 @@ def in_place_of(problem: Problem, base: Base, one: Tried, counts: Mapping[str, i
 
 def _tried(problem: Problem, base: Base, state: State, slopes: Slopes, starts: int) -> Tried:
     effect = state.effects[-1].effect
-    numbers = sum(not parameter.choices for parameter in effect.parameters)
+    numbers = sum(parameter.moves for parameter in effect.parameters)
     seen = located(problem, state, slopes)
     return Tried(
         effect, state, base.fitted - problem.deviance(state), base.judged - problem.deviance(seen, fitted=False),

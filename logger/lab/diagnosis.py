@@ -519,10 +519,16 @@ def _strained(problem: Problem, state: State) -> dict[str, float]:
 
 
 def _excess(problem: Problem, state: State, noise: Noise) -> float:
-    """By what share the residual is above the noise in the run where it is most."""
-    ratios = [float(cells.freedom @ cells.power / cells.freedom.sum()) / noise.deviation_mps2**2
-              for cells in problem.cells(state, None)]
-    return float(np.sqrt(max(ratios)) - 1)
+    """By what share the residual is above the noise in the run where it is most. A run so short that noise alone may do
+    the same counts only as far as asks for no explanation."""
+    from scipy.special import gammainccinv
+
+    cells = problem.cells(state, None)
+    freedom = np.array([one.freedom.sum() for one in cells])
+    power = np.array([one.freedom @ one.power for one in cells]) / freedom
+    above = np.sqrt(power) / noise.deviation_mps2 - 1
+    by_chance = np.sqrt(gammainccinv(freedom / 2, CHANCE / len(cells)) / (freedom / 2)) - 1
+    return float(np.where(above > by_chance, above, np.minimum(above, UNEXPLAINED)).max())
 
 
 def _listed(problem: Problem, after: State, first: Sequence[Tried], taken: Sequence[_Taken],

@@ -103,8 +103,10 @@ class Problem:
         counted = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.least_mps2 = LEAST_SHARE * self.size_mps2
-        self.stretches = [Stretches(run, whole, self.least_mps2) for run in runs.runs]
         self.measured = [run.measured_mps2 for run in runs.runs]
+        self.stretches = [Stretches(run, whole, self.least_mps2) for run in runs.runs]
+        if self._unseen_square(self.measured) <= self.least_mps2**2:  # nothing was measured there that could judge
+            self.stretches = [Stretches(run, True, self.least_mps2) for run in runs.runs]
 
     def entire(self) -> Problem:
         """All of the runs, finely simulated, by a car that is not held, so that it shows when it has to bend too far.
@@ -174,12 +176,13 @@ class Problem:
 
     def judged_error(self, state: State) -> float:
         """Of the samples that no fit saw; of all, where nothing was kept from the fits."""
-        left = whole = 0.0
-        for stretches, residual, measured, unseen in zip(self.stretches, self.residuals(state), self.measured,
-                                                         unseen_in(self.stretches), strict=True):
-            left += float((residual[stretches.first:][unseen] ** 2).sum())
-            whole += float((measured[stretches.first:][unseen] ** 2).sum())
-        return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+        return float(np.sqrt(self._unseen_square(self.residuals(state)) / self._unseen_square(self.measured)))
+
+    def _unseen_square(self, samples: Sequence[Array]) -> float:
+        """Mean square of samples (n,), per run, that no fit saw; of all, where nothing was kept from the fits."""
+        unseen = np.concatenate([one[stretches.first:][which] for one, stretches, which in zip(
+            samples, self.stretches, unseen_in(self.stretches), strict=True)])
+        return float((unseen**2).mean())
 
     def whiteners(self, state: State) -> list[Whitener]:
         """Weights by what the state leaves in the fitted stretches."""
@@ -348,7 +351,7 @@ class Move:
 def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
     """Every number that can be moved, of all effects or of some."""
     chosen = range(len(effects)) if which is None else which
-    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if not one.choices]
+    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.moves]
 
 
 def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
@@ -381,10 +384,10 @@ def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float =
     steps = []
     for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
-        usual = abs(parameter.coordinate(parameter.start))
         step = parameter.step
         if step is None:
-            step = log_step if parameter.scale is Scale.LOG else share_step * max(abs(here), _LEAST_SHARE * usual)
+            size = max(abs(here), _LEAST_SHARE * parameter.usual_way())
+            step = log_step if parameter.scale is Scale.LOG else share_step * size
         forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
         steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
     return np.array(steps)

@@ -130,7 +130,7 @@ def judgement(found: Gained) -> list[str]:
     lines = [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += wandering.told(found.added.moved_m)
     for one in found.new:
-        at = [parameter.name for parameter in one.effect.parameters if not parameter.choices
+        at = [parameter.name for parameter in one.effect.parameters if parameter.moves
               and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
                       if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
         if at:

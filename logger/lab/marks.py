@@ -147,15 +147,17 @@ def _lean(beside: Beside) -> Mark:
 
 def _tone(beside: Beside) -> Mark:
     """The frequency that stands out most, of all runs."""
-    best = (1.0, 0.0, "")
+    tones = []
     for run, left in zip(beside.runs, beside.left, strict=True):
         f_hz = np.fft.rfftfreq(len(left), 1 / beside.rate_hz)
         reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / beside.rate_hz))
         found = loudest(periodogram(left), reach=reach)
         if found is not None:
-            best = min(best, (found[1] * len(beside.runs), float(f_hz[found[0]]), short_names(beside.runs)[run.name]))
-    p_value, at_hz, name = best
-    return Mark("tone", at_hz, "Hz", None, p_value, True, False,
+            tones.append((found[1] * len(beside.runs), float(f_hz[found[0]]), short_names(beside.runs)[run.name]))
+    if not tones:
+        return _nothing("tone", "Hz")
+    p_value, at_hz, name = min(tones)
+    return Mark("tone", at_hz, "Hz", None, min(p_value, 1.0), True, False,
                 f"A single frequency stands out in what is left: {at_hz:.1f} Hz, in {name}. Something hums or rings "
                 "there.")
 

@@ -8,11 +8,16 @@ quietest first. No noise is taken for less than what two right simulations of a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.lab.fitting import Problem, State
+from logger.lab.stretches import Stretches
+
+Array = npt.NDArray[np.float64]
 
 # A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty alone, which
 # is two deviations of its own below the others by chance, from so many.
@@ -33,10 +38,19 @@ class Noise:
 
 def noise_of(problem: Problem, state: State) -> Noise:
     """The sensor's noise under what a state leaves."""
-    quiet = [one.quiet(left) for one, left in zip(problem.stretches, problem.residuals(state), strict=True)]
+    return sensor_noise(problem.stretches, problem.residuals(state), problem.least_mps2)
+
+
+def sensor_noise(stretches: Sequence[Stretches], left_mps2: Sequence[Array], least_mps2: float,
+                 louder_too: bool = True) -> Noise:
+    """The sensor's noise under what is left (n,), per run; no less than ``least_mps2``.
+
+    louder_too    bands that are hardly louder than the highest frequencies tell of it too
+    """
+    quiet = [one.quiet(left) for one, left in zip(stretches, left_mps2, strict=True)]
     freedom = sum(n for _, n in quiet)
     power = sum(level * n for level, n in quiet) / freedom
-    cells = problem.cells(state, None)
+    cells = [one.cells(left, None) for one, left in zip(stretches, left_mps2, strict=True)]
     bands = range(min(len(one.power) for one in cells))
     freedoms = [sum(float(one.freedom[band]) for one in cells) for band in bands]
     levels = [sum(float(one.freedom[band] * one.power[band]) for one in cells) / freedoms[band] for band in bands]
@@ -45,11 +59,13 @@ def noise_of(problem: Problem, state: State) -> Noise:
     if power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
         louder = _LOUDER_THAN_QUIETEST
+    elif not louder_too:
+        by_level = []
     for level, n in by_level:
         if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             break
         power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
-    power = max(power, problem.least_mps2**2)
+    power = max(power, least_mps2**2)
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 
 

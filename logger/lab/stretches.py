@@ -26,6 +26,7 @@ FIT_S, JUDGE_S = 12.0, 6.0
 _BLOCK_S = 3.0
 _HIGHEST_OF_RATE = 0.37
 _NOTHING = 1e-12  # [m2/s4]
+_ROUNDED = 1e-3  # samples: a rate is read off times that were rounded
 # Ends of the bands at 100 samples a second [Hz].
 _EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
              30.0, 33.5, 37.0)
@@ -62,24 +63,28 @@ class Stretches:
     def __init__(self, run: Run, whole: bool = False, least_mps2: float = 0.0) -> None:
         rate = run.rate_hz
         self.rate_hz, self.first, self.count = rate, run.first, run.count
-        time_s = np.arange(run.count - run.first) / rate
+        time_s = (np.arange(run.count - run.first) + _ROUNDED) / rate
         turn_s = min(FIT_S + JUDGE_S, len(time_s) / rate)
         half_s = 0.5 * _BLOCK_S  # blocks begin so far apart: one has to begin where judging does
         fit_s = half_s * round(turn_s * FIT_S / (FIT_S + JUDGE_S) / half_s)
         fit = np.mod(time_s, turn_s) < fit_s
         if whole or turn_s - fit_s < _BLOCK_S:
             fit = np.ones_like(fit)
-        self.fit: Bools = fit
-        self.judges = bool((~fit).any())
-        size = min(round(_BLOCK_S * rate), len(fit))
+        size = min(int(_BLOCK_S * rate + _ROUNDED), len(fit))
         self._size = size
         taper = np.hanning(size + 1)[:-1]
         self._taper = taper / np.sqrt((taper**2).mean())
-        self._starts = np.arange(0, len(fit) - size + 1, max(1, size // 2))
+        # The first samples at or behind these times, as where fitting and judging change.
+        starts = np.ceil(np.arange(np.ceil(len(fit) / (half_s * rate)) + 1) * half_s * rate - _ROUNDED).astype(int)
+        self._starts = starts[starts <= len(fit) - size]
         inside = np.array([fit[start : start + size].mean() for start in self._starts])
-        self._sets = {True: self._starts[inside > 0.999], False: self._starts[inside < 0.001]}
+        self._sets = {True: self._starts[inside == 1], False: self._starts[inside == 0]}
         if not len(self._sets[True]):
             self._sets[True] = self._starts
+        if not len(self._sets[False]):
+            fit = np.ones_like(fit)
+        self.fit: Bools = fit
+        self.judges = bool(len(self._sets[False]))
         f_hz = np.fft.rfftfreq(size, 1 / rate)
         edges = np.array([one for one in _EDGES_HZ if one < _HIGHEST_OF_RATE * rate - 0.5] + [_HIGHEST_OF_RATE * rate])
         self.edges_hz = edges

@@ -7,7 +7,7 @@ instead of along the time: what a wheel does once in a turn repeats every so man
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,18 +22,27 @@ Array = npt.NDArray[np.float64]
 _SLOWEST_MPS = 1.0
 _FROM_PER_M, _TO_PER_M = 0.3, 2.2
 _WHEEL_M = (0.22, 0.5)
+# A tone in time that slips by a cycle along the way is no line there any more; a line is so many ordinates wide.
+_CYCLE, _LINE, _OTHER_SPEED = 1.0, 2.0, 0.05
 
 
 @dataclass(frozen=True)
 class Turns:
-    """What repeats along the way in the run where that is clearest: how often [1/m], how probable by chance, and the
-    powers (n,) at all wave numbers (n,) [1/m] over their mean."""
+    """What repeats along the way in the run where that is clearest: how often [1/m] and, at the speed that it mostly
+    had, in time [Hz]; how probable by chance; and the powers (n,) at all wave numbers (n,) [1/m] over their mean.
+
+    steady         the speed hardly changed, so that it may as well repeat in time
+    width_per_m    how near two wave numbers are that are one
+    """
 
     run: str
     at_per_m: float
+    at_hz: float
     p_value: float
     per_m: Array
     power: Array
+    steady: bool
+    width_per_m: float
 
     @property
     def found(self) -> bool:
@@ -43,6 +52,9 @@ class Turns:
     @property
     def sentence(self) -> str:
         """What it says when it is found."""
+        if self.steady:
+            return (f"It repeats every {1 / self.at_per_m:.2f} m of the way or {self.at_hz:.1f} times a second: at a "
+                    f"steady speed that is the same (clearest in {self.run}). A drive at another speed would tell.")
         radius_m = 1 / (2 * np.pi * self.at_per_m)
         wheel = (f" A wheel of {radius_m:.2f} m radius turns so often: look at its balance and roundness."
                  if _WHEEL_M[0] < radius_m < _WHEEL_M[1] else "")
@@ -78,7 +90,8 @@ def sentences(shape: Shape) -> list[str]:
 
 
 def turns_of(beside: Beside) -> Turns | None:
-    """What repeats along the way: as for a tone in time."""
+    """What repeats along the way: as for a tone in time, which it is told from where the speed changes or where another
+    run, at another speed, has it too."""
     found = []
     names = short_names(beside.runs)
     for run, left in zip(beside.runs, beside.left, strict=True):
@@ -94,9 +107,20 @@ def turns_of(beside: Beside) -> Turns | None:
         stands_out = loudest(power, asked)
         if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
-        found.append(Turns(names[run.name], float(per_m[stands_out[0]]), stands_out[1], np.asarray(per_m[asked], float),
-                           power[asked] / float(power[asked].mean())))
+        at_per_m = float(per_m[stands_out[0]])
+        at_hz = at_per_m * float(np.median(speed))
+        steady = _slips(way, run.rate_hz) * at_hz < _CYCLE
+        found.append(Turns(names[run.name], at_per_m, at_hz, stands_out[1], np.asarray(per_m[asked], float),
+                           power[asked] / float(power[asked].mean()), steady, _LINE * float(per_m[1])))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None
-    return Turns(best.run, best.at_per_m, min(1.0, best.p_value * len(found)), best.per_m, best.power)
+    again = any(abs(one.at_per_m - best.at_per_m) < max(one.width_per_m, best.width_per_m)
+                and abs(one.at_hz / best.at_hz - 1) > _OTHER_SPEED and one.found for one in found)
+    return replace(best, p_value=min(1.0, best.p_value * len(found)), steady=best.steady and not again)
+
+
+def _slips(way_m: Array, rate_hz: float) -> float:
+    """How much earlier or later than at a steady speed a car was along its way, from most to most [s]."""
+    time_s = np.arange(len(way_m)) / rate_hz
+    return float(np.ptp(time_s - np.polyval(np.polyfit(way_m, time_s, 1), way_m)))

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -26,8 +27,9 @@ import numpy.typing as npt
 from logger.identification.crossing import Drive
 from logger.identification.shared_road import Options, RoadState, UnknownRoad
 from logger.lab.candidates import scaled_by
-from logger.lab.fitting import Move, coordinates_of, moved, moves_of, steps_of
+from logger.lab.fitting import LEAST_SHARE, Move, coordinates_of, moved, moves_of, steps_of
 from logger.lab.linear_response import Tabulated, response_of
+from logger.lab.noise import Noise, sensor_noise
 from logger.lab.nuisance import Nuisance, Tolerance, nuisance_of
 from logger.lab.prediction import Run
 from logger.lab.stretches import Stretches
@@ -225,14 +227,24 @@ class SameRoad:
         return float(np.sqrt(squares / self.samples))
 
     @property
+    def least_mps2(self) -> float:
+        """What is left is no less than two right simulations differ by."""
+        return LEAST_SHARE * self.size_mps2
+
+    @property
     def samples(self) -> int:
         """How many there are, of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
-    def quiet_mps2(self) -> float:
-        """The sensor's noise, from where no car moves it: the highest frequencies."""
-        parts = [Stretches(run, whole=True).quiet(run.measured_mps2) for run in self.runs]
-        return float(np.sqrt(sum(power * freedom for power, freedom in parts) / sum(freedom for _, freedom in parts)))
+    def noise(self, state: State) -> Noise:
+        """The sensor's noise, under what each drive has that the others do not tell: that is more than noise where the
+        road moves the car, so that it is asked only for noise that the recorder filtered."""
+        left: dict[int, list[Array]] = {}
+        for run, read, expected in self.told(state):
+            left.setdefault(run, []).append(read - expected)
+        runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
+        return sensor_noise([Stretches(one, whole=True) for one in runs], [one.measured_mps2 for one in runs],
+                            self.least_mps2, louder_too=False)
 
     def _at(self, own: Array, count: int) -> RoadState:
         places = np.append(0.0, own[_TILT + 1 : -1])
@@ -246,7 +258,7 @@ class SameRoad:
             level, noise = road.first_guess(np.zeros(0))
             first[part[_LEVEL]], first[part[_TILT]] = level, _WAVINESS
             noises.append(noise)
-        first[-1] = np.log(np.median(noises))
+        first[-1] = np.log(max(np.median(noises), self.least_mps2))
         offsets = self._offsets(first)
         for part, parts in zip(self._parts, self.stretches, strict=True):
             own = [offsets[run] for run, _ in parts]
@@ -254,14 +266,22 @@ class SameRoad:
         return first
 
     def _offsets(self, first: Array) -> Array:
-        """By how much each run's places are off against the first's [m], from the stretch that most runs share."""
-        offsets = np.zeros(len(self.runs))
-        index = max(range(len(self.stretches)), key=lambda one: len(self.stretches[one]))
-        road, part, parts = self._roads[index], self._parts[index], self.stretches[index]
-        for number, (run, _) in enumerate(parts):
-            if number:
-                offsets[run] = road.offset(self._at(first[part], 0), number)
-        return offsets
+        """By how much each run's places are off [m] against those of the first run of the stretch that most runs share;
+        where some are not over that one, by way of runs that share another stretch with both."""
+        offsets: dict[int, float] = {}
+        while left := [one for one, parts in enumerate(self.stretches) if any(run not in offsets for run, _ in parts)]:
+            tied = [one for one in left if any(run in offsets for run, _ in self.stretches[one])]
+            index = max(tied or left, key=lambda one: len(self.stretches[one]))
+            runs = [run for run, _ in self.stretches[index]]
+            at = self._at(first[self._parts[index]], 0)
+            offset = partial(self._roads[index].offset, at)  # against the first run of the stretch
+            if runs[0] not in offsets:
+                known = next((number for number, run in enumerate(runs) if run in offsets), None)
+                offsets[runs[0]] = 0.0 if known is None else offsets[runs[known]] - offset(known)
+            for number, run in enumerate(runs):
+                if run not in offsets:
+                    offsets[run] = offsets[runs[0]] + offset(number)
+        return np.array([offsets[run] for run in range(len(self.runs))])
 
 
 def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
@@ -286,6 +306,13 @@ def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
         if len(parts) > 1:
             found.append(parts)
     return found
+
+
+def _joined(run: Run, parts: Sequence[Array]) -> Run:
+    """What was left in parts of a run, as a run."""
+    left = np.concatenate([np.zeros(run.first), *parts])
+    own = slice(len(left))
+    return replace(run, measured_mps2=left, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])
 
 
 # --- fits ---
@@ -314,6 +341,7 @@ def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
     p, q = len(state.logs), len(moves)
     here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
     low, high = _bounds(state.effects, moves, len(here), p)
+    low[-1] = np.log(problem.least_mps2)
     longest = _longest(state.effects, moves, len(here), p)
     for count in range(steps):
         logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
@@ -387,7 +415,7 @@ def _longest(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first
     for index, move in enumerate(moves, first):
         parameter = effects[move.effect].effect.parameters[move.parameter]
         if parameter.scale is not Scale.LOG:
-            longest[index] = max(abs(parameter.coordinate(parameter.start)),
+            longest[index] = max(parameter.usual_way(),
                                  0.5 * abs(coordinates_of(effects, [move])[0]))
     return longest
 

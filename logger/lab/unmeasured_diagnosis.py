@@ -20,7 +20,7 @@ from logger.identification.verdict import NOT_ONE_ROAD, structural
 from logger.lab.blind import SEEN
 from logger.lab.candidates import alike_within
 from logger.lab.diagnosis import CHANCE, WORTH, p_value
-from logger.lab.noise import UNEXPLAINED
+from logger.lab.noise import UNEXPLAINED, Noise
 from logger.lab.one_road import apart, in_doubt, likenesses
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_errors
@@ -37,23 +37,26 @@ _FITTED, _STARTS, _FIRST_STEPS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 4, 0.1, 6
 _NOTHING = 1e-2
 # Of a sample's freedom the recorder's filter leaves this share.
 _FREEDOM = 0.74
+_CERTAIN = 3.3  # deviations: less than one time in a thousand
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An effect that was tried on the model of its round.
 
-    error          of all drives, each with the road that the others tell; None where it was not fitted
+    error          of all drives, each with the road that the others tell
     p_value        how often noise alone would gain as much, times the number of candidates
     gain           of minus twice the log-likelihood; where it was not fitted, what its slopes promise
     confused_with  effects that explain about as much
+    fitted         with the car's numbers and the road; else it was added at the strength that its slopes promise
     """
 
     one: Chosen
-    error: float | None
+    error: float
     p_value: float
     gain: float
     confused_with: tuple[str, ...] = ()
+    fitted: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,7 @@ class Found:
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
     together      of the car's numbers: what these drives cannot tell, in words
-    noise_mps2    what no road explains; ``quiet_mps2``: the sensor's noise where no car moves it
+    noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
     doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
     """
 
@@ -81,13 +84,8 @@ class Found:
     hidden: Mapping[str, float]
     together: tuple[str, ...]
     noise_mps2: float
-    quiet_mps2: float
+    excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def excess(self) -> float:
-        """By what share more is left than the sensor's noise."""
-        return self.noise_mps2 / self.quiet_mps2 - 1
 
     @property
     def unexplained(self) -> bool:
@@ -133,18 +131,27 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         steps.append((f"with {best.one.effect.name}", base.problem.error(base.state)))
         del left[best.one.effect.name]
     listed = [*taken, *(one for one in fits if one.one.effect.name not in [own.one.effect.name for own in taken])]
-    listed += _promises(first, {one.one.effect.name for one in listed}, len(effects) - len(untried))
+    listed += _promises(before, first, {one.one.effect.name for one in listed}, len(effects) - len(untried))
     usual = trials(base.problem, base, [chosen(one, one.usual) for one in left.values()])
     road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
+    noise = base.problem.noise(base.state)
     return Found(
         tuple(listed), _with_spread(base, len(present)), tuple(steps),
         tuple(zip(base.problem.errors(before.state), base.problem.errors(base.state), strict=True)),
-        problem.quiet_mps2() / problem.size_mps2, untried, road,
+        noise.deviation_mps2 / problem.size_mps2, untried, road,
         {one.one.effect.name: one.deviations for one in usual
          if one.deviations < SEEN and one.one.effect.name not in road},
-        _together(base), base.state.noise_mps2, problem.quiet_mps2(),
+        _together(base), base.state.noise_mps2, _excess(base, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in in_doubt(alike)),
     )
+
+
+def _excess(model: Fitted, noise: Noise) -> float:
+    """By what share what no road explains is above the noise; no more than that asks for no explanation where chance
+    would make so much."""
+    above = model.state.noise_mps2 / noise.deviation_mps2 - 1
+    error = np.hypot(noise.standard_error_mps2 / noise.deviation_mps2, (2 * _FREEDOM * model.problem.samples) ** -0.5)
+    return float(above if above > _CERTAIN * error else min(above, UNEXPLAINED))
 
 
 def _two_roads(one: str, other: str) -> str:
@@ -197,8 +204,13 @@ def _starts(base: Fitted, ranked: Sequence[Trial]) -> list[State]:
     """Where fits of an effect begin: its best trials as they are, and the best at the strength that it promises, which
     holds for small changes only."""
     ones = [ranked[0].at, *(trial.one for trial in ranked[:_STARTS])]
-    return [replace(base.state, effects=(*base.state.effects, one),
-                    gains=base.problem.response((*base.state.effects, one), base.state.logs)) for one in ones]
+    return [_beside(base, one) for one in ones]
+
+
+def _beside(base: Fitted, one: Chosen) -> State:
+    """The model with an effect."""
+    effects = (*base.state.effects, one)
+    return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
 
 
 @dataclass(frozen=True)
@@ -211,8 +223,8 @@ class Bar:
 
     def passed(self, one: Candidate) -> bool:
         """Whether it is there: not by chance, worth naming, and of help in telling each drive by the others."""
-        return (one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * self.samples
-                and one.error is not None and one.error <= self.error)
+        return (one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * self.samples and one.fitted
+                and one.error <= self.error)
 
 
 def _judged(base: Fitted, models: Mapping[str, Fitted], bar: Bar) -> list[Candidate]:
@@ -227,7 +239,7 @@ def _judged(base: Fitted, models: Mapping[str, Fitted], bar: Bar) -> list[Candid
 
 
 def _numbers(one: Chosen) -> int:
-    return sum(not parameter.choices for parameter in one.effect.parameters)
+    return sum(parameter.moves for parameter in one.effect.parameters)
 
 
 def _rivals(one: Candidate, found: Sequence[Candidate], bar: Bar) -> tuple[str, ...]:
@@ -237,12 +249,13 @@ def _rivals(one: Candidate, found: Sequence[Candidate], bar: Bar) -> tuple[str, 
                  if one in worthy and other is not one and abs(other.gain - one.gain) < near)
 
 
-def _promises(tried: Sequence[Trial], told: set[str], count: int) -> list[Candidate]:
-    """What was tried by its slopes only, best first."""
+def _promises(base: Fitted, tried: Sequence[Trial], told: set[str], count: int) -> list[Candidate]:
+    """What was tried beside a model by its slopes only, best first."""
     best: dict[str, Trial] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
         best.setdefault(one.one.effect.name, one)
-    return [Candidate(one.at, None, p_value(one.gain, _numbers(one.at), count), one.gain)
+    return [Candidate(one.at, base.problem.error(_beside(base, one.at)), p_value(one.gain, _numbers(one.at), count),
+                      one.gain, fitted=False)
             for name, one in best.items() if name not in told]
 
 
@@ -305,7 +318,7 @@ def cannot_tell(found: Found) -> list[str]:
 
 
 def as_json(found: Found) -> dict[str, Any]:
-    """The diagnosis as one JSON object. An effect that was not fitted has no error: null."""
+    """The diagnosis as one JSON object."""
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     values = {one.effect.name: dict(one.values) for one in found.missing}
     return {
@@ -313,7 +326,7 @@ def as_json(found: Found) -> dict[str, Any]:
         "candidates": [
             {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
              "error": one.error, "p_value": one.p_value,
-             "confused_with": list(one.confused_with), "fitted": one.error is not None,
+             "confused_with": list(one.confused_with), "fitted": one.fitted,
              "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
             for one in found.candidates],
         "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,

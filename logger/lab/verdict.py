@@ -94,7 +94,7 @@ def summary(found: Verdict) -> list[str]:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
         lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "
                      "vehicle's file is wrong there, or something else is missing that no candidate explains.")
-    lines += wandering.told(diagnosis.moved_m)
+    lines += wandering.told(diagnosis.moved_m) + wandering.too_long(diagnosis.problem)
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]
@@ -212,5 +212,5 @@ def _shape_json(shape: Shape) -> dict[str, Any]:
                             "standard_error_n": forces.by_travel.error_n.tolist(), "share": forces.by_travel.share},
         "frequency": [{"from_hz": part.low, "to_hz": part.high, "error_power_share": part.share, "name": part.name}
                       for part in shape.where.frequency],
-        "repeats_every_m": 1 / turns.at_per_m if turns is not None and turns.found else None,
+        "repeats_every_m": 1 / turns.at_per_m if turns is not None and turns.found and not turns.steady else None,
     }

@@ -175,6 +175,14 @@ def told(farther_m: float) -> list[str]:
             f"to {farther_m:.2g} m from where they were recorded."]
 
 
+def too_long(problem: Problem) -> list[str]:
+    """What a person should know of runs that are too long to ask whether their distances wander."""
+    if _in_reach(problem, _SMALL[1]):
+        return []
+    return ["These runs are too long, together, to ask whether their distances wander by more than usual: cut them, or "
+            "take fewer, if the distance signal is no better than a car's speedometer."]
+
+
 def _promises(problem: Problem, state: State) -> bool:
     """Whether a larger wander may well be worth it, and more so than a factor and a start of each run, to first order:
     that takes no simulation."""

@@ -90,6 +90,17 @@ class Parameter:
             found = coordinate
         return float(min(max(found, self.low), self.high))
 
+    @property
+    def moves(self) -> bool:
+        """Whether a fit may move it."""
+        return not self.choices and self.low < self.high
+
+    def usual_way(self, origin: float = 0.0) -> float:
+        """How far the values that it usually has lie from a coordinate: that of its start or, where that is there, the
+        farthest that a search begins at, or the width of its range."""
+        ways = [abs(self.coordinate(one) - origin) for one in (self.start, *self.trials)]
+        return ways[0] or max(ways) or abs(self.coordinate(self.high) - self.coordinate(self.low))
+
     def at_an_end(self, value: float) -> bool:
         """Whether a value is at an end of what it may be."""
         here = self.coordinate(value)
@@ -97,11 +108,11 @@ class Parameter:
 
     def at_its_weakest(self, value: float) -> bool:
         """Whether a strength is at the end of its range beyond which lies the value at which it does nothing: within a
-        small share of the way to its start, on the scale that fits move on."""
+        small share of the usual way from there, on the scale that fits move on."""
         if self.null is None or self.low < self.null < self.high:
             return False
         weakest = self.coordinate(self.low if self.null <= self.low else self.high)
-        return abs(self.coordinate(value) - weakest) < _AT_END * abs(self.coordinate(self.start) - weakest)
+        return abs(self.coordinate(value) - weakest) < _AT_END * self.usual_way(weakest)
 
 
 @dataclass(frozen=True)
@@ -231,7 +242,7 @@ class Chosen:
     def at_an_end(self) -> bool:
         """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
         can be no weaker: what looks like it is something else."""
-        numbers = [one for one in self.effect.parameters if not one.choices]
+        numbers = [one for one in self.effect.parameters if one.moves]
         if any(one.at_its_weakest(self.values[one.name]) for one in numbers):
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 
 from logger.commands.lab_model import check_out
+from logger.commands.lab_runs import lab_runs
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.roads.track import Track
@@ -311,3 +312,35 @@ def test_a_centre_of_gravity_beyond_an_axle(ridelog: Path, runs: list[str], tmp_
     assert done.returncode == 2
     assert done.stderr == ("ridelog: cg_shift: expected the centre of gravity between the axles, found it 0.0161 m "
                            "beyond the front axle\n")
+
+
+def rated(source: str, folder: Path, rate_hz: float, digits: int) -> str:
+    """A run again, at another rate and with times of so many digits."""
+    given = read_run(source)
+    time_s = np.arange(int(given.time_s[-1] * rate_hz)) / rate_hz
+    columns = {name: np.interp(time_s, given.time_s, getattr(given, name))
+               for name in ("accel_z_mps2", "speed_mps", "distance_m")}
+    folder.mkdir()
+    write_drive(folder / "drive.csv", {"t_s": np.round(time_s, digits), **columns})
+    write_profile(folder / "profile.csv", given.track)
+    return str(folder)
+
+
+def test_times_that_are_rounded_differently_are_of_one_rate(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+    folders = [rated(runs[0], tmp_path / "60", 60.0, 3), rated(runs[1], tmp_path / "again", 60.0, 3)]
+    cut = (tmp_path / "again" / "drive.csv").read_text().splitlines()[:-61]
+    (tmp_path / "again" / "drive.csv").write_text("\n".join(cut) + "\n")
+    done = command_line(ridelog, "compare", "--vehicle", "rav4-2009", *folders, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_fast_records_are_thinned_where_an_effect_is_sought(runs: list[str], tmp_path: Path) -> None:
+    folders = [Path(rated(runs[0], tmp_path / f"{rate_hz:g}", rate_hz, 6)) for rate_hz in (100.0, 200.0, 400.0, 1000.0)]
+    (usual,) = lab_runs(folders[:1]).runs
+    for thinned in lab_runs(folders).runs:
+        assert thinned.rate_hz == pytest.approx(100.0)
+        count = min(len(thinned.measured_mps2), len(usual.measured_mps2)) - 50
+        assert thinned.distance_m[:count] == pytest.approx(usual.distance_m[:count])
+        off = (thinned.measured_mps2 - usual.measured_mps2[: len(thinned.measured_mps2)])[50:count]
+        assert off.std() < 0.05 * usual.measured_mps2.std()
+    assert [one.count for one in lab_runs(folders[2:3], thin=False).runs] == [len(read_run(folders[2]).time_s)]

@@ -66,6 +66,7 @@ def fault(error: BaseException) -> Callable[[object], int]:
     (SettingsError("range_g 3"), 2, "ridelog: range_g 3\n"),
     (NotPresent("/dev/ttyUSB7: no such port"), 2, "ridelog: /dev/ttyUSB7: no such port\n"),
     (PermissionError(13, "Permission denied", "/x"), 2, "ridelog: /x: Permission denied\n"),
+    (MemoryError(), 2, "ridelog: not enough memory for so much data; cut it into shorter files\n"),
     (KeyboardInterrupt(), 130, ""),
 ])
 def test_an_expected_fault_is_one_line_and_its_status(

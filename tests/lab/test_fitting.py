@@ -4,6 +4,7 @@ import json
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,14 +12,14 @@ import pytest
 from logger.identification.parameters import read
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
-from logger.lab.fitting import Problem, located, steps_apart
+from logger.lab.fitting import Problem, located, moves_of, steps_apart, steps_of
 from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.prediction import Run, Runs
 from logger.lab.settling import settled
 from logger.store.drive_file import read_run
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
-from logger.vehicle.effect import chosen
+from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.vehicle import Vehicle
 
 EXAMINATION = Path(__file__).parents[1] / "examination"
@@ -170,3 +171,23 @@ def test_a_rough_simulation_of_friction_tells_what_a_change_does() -> None:
                                                     strict=True)] for rough in (False, True)]
     fine, rough = (np.concatenate(one) for one in changes)
     assert 0 < np.sqrt(np.mean((rough - fine) ** 2)) < 0.2 * np.sqrt(np.mean(fine**2))
+
+
+def own(name: str, start: float, low: float, high: float, trials: tuple[float, ...]) -> Parameter:
+    return Parameter(name, start, low, high, low, Scale.LINEAR, trials, "of an own effect")
+
+
+def test_numbers_that_begin_at_nothing_are_stepped_and_those_that_cannot_move_are_not() -> None:
+    class Own(SensorEffect):
+        name = "own"
+        parameters = (own("mass_kg", 0.0, 0.0, 100.0, (20.0,)), own("width_m", 0.0, 0.0, 3.0, (0.0,)),
+                      own("fixed_hz", 5.0, 5.0, 5.0, (5.0,)))
+
+        def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+            return np.ones_like(s)
+
+    effects = [chosen(Own(), {"mass_kg": 0.0, "width_m": 0.0, "fixed_hz": 5.0})]
+    moves = moves_of(effects)
+    assert [move.parameter for move in moves] == [0, 1]
+    assert steps_of(effects, moves) == pytest.approx([0.02 * 0.1 * 20, 0.02 * 0.1 * 3])
+    assert effects[0].at_an_end and not chosen(Own(), {"mass_kg": 1.0, "width_m": 1.0, "fixed_hz": 5.0}).at_an_end

@@ -217,3 +217,10 @@ def test_a_model_that_leaves_nothing() -> None:
     """No division by nothing where measurements are the model's to the last bit."""
     beside = beside_with(lambda run, prediction, rng: np.zeros(len(prediction)), lasts_s=14.0)
     assert not marks(beside).found
+
+
+def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
+    for seed in range(6):
+        beside = beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)
+        tone = mark(marks(beside), "tone")
+        assert tone.value > 0 and tone.p_value <= 1

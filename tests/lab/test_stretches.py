@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from logger.lab.prediction import Run
+from logger.lab.fitting import Problem
+from logger.lab.nuisance import Tolerance
+from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance, unseen_in
 from logger.roads.track import Track
+
+from compared import CAR, a_run, measuring
 
 
 def run_of(samples: int, rate_hz: float = 100.0) -> Run:
@@ -84,3 +88,22 @@ def test_what_is_left_counts_as_no_less_than_simulations_differ_by() -> None:
     quiet, loud = (np.random.default_rng(1).normal(0, size, 6000) for size in (1e-6, 1.0))
     assert np.allclose(stretches.cells(quiet).power, 0.01**2)
     assert stretches.cells(loud).power.min() > 0.1
+
+
+@pytest.mark.parametrize("rate_hz", [49.6, 75.0, 99.5, 99.8, 99.99999, 100.00001, 101.0, 119.8, 174.0])
+@pytest.mark.parametrize("seconds", [11.5, 12.0, 20.0, 33.0, 61.3])
+def test_what_judges_has_a_power_whatever_the_rate(rate_hz: float, seconds: float) -> None:
+    run = run_of(round(seconds * rate_hz), rate_hz)
+    stretches = Stretches(run)
+    noise = np.random.default_rng(2).normal(0, 0.05, run.count)
+    cells = stretches.cells(noise, False)
+    assert stretches.judges and (~stretches.fit).any()
+    assert cells.freedom @ cells.power / cells.freedom.sum() == pytest.approx(0.05**2, rel=0.5)
+
+
+def test_where_nothing_was_measured_that_could_judge_all_is_fitted() -> None:
+    run = a_run("run", 10.0, 20.0, 1)
+    measured = np.where(np.arange(run.count) < 1400, np.sin(np.arange(run.count)), 0.0)
+    problem = Problem(Runs([measuring(run, measured)], 500.0), CAR, Tolerance())
+    assert not any(one.judges for one in problem.stretches)
+    assert problem.judged_error(problem.start()) == pytest.approx(problem.error(problem.start()))

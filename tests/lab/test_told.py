@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from logger.lab.beside import Beside
-from logger.lab.prediction import Run
+from logger.lab.prediction import Run, Runs
 from logger.lab.quantities import chance, measured, numbers_of, unit_of
 from logger.lab.unexplained import turns_of
 from logger.store.effect_file import shipped_effects
+from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-from compared import beside_with
+from compared import CAR, a_run, beside_with, measuring
 
 
 @pytest.mark.parametrize(("value", "error", "words"), [
@@ -94,3 +95,39 @@ def test_what_a_wheel_does_in_each_turn_is_found_and_noise_is_not() -> None:
     assert "A wheel of 0.31 m radius" in turns.sentence
     noise = [turns_of(beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)) for seed in range(10)]
     assert not [one for one in noise if one is None or one.found]
+
+
+def humming(speeds_mps: list[float], swing: float, at_hz: float | None, at_per_m: float | None = None) -> Beside:
+    """Runs in which something hums in time, or along the way."""
+    rng = np.random.default_rng(4)
+
+    def shaken(run: Run) -> np.ndarray:
+        time_s = np.arange(run.count) / run.rate_hz
+        turns = at_hz * time_s if at_hz is not None else (at_per_m or 0.0) * run.distance_m
+        return 0.05 * np.sin(2 * np.pi * turns) + rng.normal(0, 0.03, run.count)
+
+    runs = Runs([a_run(f"run{i}", speed, 40.0, i, swing) for i, speed in enumerate(speeds_mps)])
+    car = compose(CAR)
+    predictions = runs.predict(car)
+    measured = [measuring(run, one + shaken(run)) for run, one in zip(runs.runs, predictions, strict=True)]
+    return Beside(measured, car, predictions, runs.respond(car))
+
+
+def test_what_hums_at_a_steady_speed_may_repeat_in_time_or_along_the_way() -> None:
+    turns = turns_of(humming([14.0], 0.0, 7.0))
+    assert turns is not None and turns.found and turns.steady
+    assert "every 2.00 m of the way or 7.0 times a second" in turns.sentence and "wheel" not in turns.sentence
+
+
+def test_two_steady_speeds_tell_a_wheel_from_a_hum() -> None:
+    wheel = turns_of(humming([10.0, 14.0], 0.0, None, 0.5))
+    assert wheel is not None and wheel.found and not wheel.steady and "A wheel of 0.32 m" in wheel.sentence
+    hum = turns_of(humming([10.0, 14.0], 0.0, 7.0))
+    assert hum is not None and (hum.steady or not hum.found)
+
+
+def test_a_speed_that_swings_tells_them_too() -> None:
+    wheel = turns_of(humming([14.0], 0.1, None, 0.5))
+    assert wheel is not None and wheel.found and not wheel.steady
+    hum = turns_of(humming([14.0], 0.1, 7.0))
+    assert hum is not None and not hum.found

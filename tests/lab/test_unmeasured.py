@@ -201,14 +201,61 @@ def test_what_does_not_help_to_tell_each_drive_is_not_accepted() -> None:
     helps = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.49, 1e-12, 500.0)
     assert bar.passed(helps)
     assert not bar.passed(replace(helps, error=0.51))
-    assert not bar.passed(replace(helps, error=None))
+    assert not bar.passed(replace(helps, fitted=False))
 
 
-def test_what_was_not_fitted_has_no_error() -> None:
-    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), None, 0.5, 1.0)
+def test_what_was_not_fitted_says_so() -> None:
+    one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
     found = Found((one,), (), (("as its file says", 0.4), ("refitted", 0.3)), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
     told = as_json(found)
-    assert told["candidates"][0]["error"] is None and told["candidates"][0]["fitted"] is False
+    assert told["candidates"][0]["error"] == 0.28 and told["candidates"][0]["fitted"] is False
     assert told["maybe_over_two_roads"] == [["slow", "brisk"]]
     assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
+
+
+def test_no_noise_at_all_breaks_nothing() -> None:
+    runs = [run_of([], speed, 85.0, seed, noise_mps2=0.0) for seed, speed in ((1, 9.0), (2, 15.0))]
+    problem = SameRoad(runs, CAR, Tolerance())
+    bandwidth = shipped_effects()["sensor_bandwidth"]
+    found = diagnose_same_road(problem, {bandwidth.name: bandwidth})
+    assert found.missing == () and not found.unexplained
+    assert 0.002 <= found.floor_error < 0.01
+    assert problem.least_mps2 <= found.noise_mps2 < 0.01 * problem.size_mps2
+
+
+def test_noise_that_went_through_the_recorders_filter_is_noise_all_the_same() -> None:
+    rng = np.random.default_rng(5)
+
+    def filtered(run: Run) -> Run:
+        f_hz = np.fft.rfftfreq(len(run.measured_mps2), 1 / RATE_HZ)
+        spectrum = np.fft.rfft(rng.normal(0.0, NOISE_MPS2, len(run.measured_mps2))) / (1 + (f_hz / 44.0) ** 60)
+        return replace(run, measured_mps2=run.measured_mps2 + np.fft.irfft(spectrum, len(run.measured_mps2)))
+
+    runs = [filtered(run_of([], speed, 140.0, seed, noise_mps2=0.0)) for seed, speed in ((1, 9.0), (2, 14.0))]
+    bandwidth = shipped_effects()["sensor_bandwidth"]
+    found = diagnose_same_road(SameRoad(runs, CAR, Tolerance()), {bandwidth.name: bandwidth})
+    assert found.missing == () and not found.unexplained
+    assert found.floor_error * SameRoad(runs, CAR, Tolerance()).size_mps2 == pytest.approx(NOISE_MPS2, rel=0.2)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (0, 2, 1), (2, 0, 1)])
+def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_other(order: tuple[int, ...]) -> None:
+    road = Track(SPACING_M, generate(64.0, 500.0, SPACING_M, 5), -110.0)
+
+    def part(speed_mps: float, seed: int, low_m: float, high_m: float, off_m: float) -> Run:
+        run = run_of([], speed_mps, 330.0, seed, road)
+        own = slice(*np.searchsorted(run.distance_m, (low_m, high_m)))
+        return replace(run, measured_mps2=run.measured_mps2[own], distance_m=run.distance_m[own] + off_m,
+                       speed_mps=run.speed_mps[own])
+
+    off_m = (0.0, 0.6, -1.2)
+    parts = [part(12.0, 1, 0.0, 150.0, off_m[0]), part(15.0, 2, 0.0, 320.0, off_m[1]),
+             part(13.0, 3, 170.0, 320.0, off_m[2])]
+    problem = SameRoad([parts[one] for one in order], CAR, Tolerance())
+    assert [len(shared) for shared in problem.stretches] == [2, 2]
+    first = problem.start().roads
+    for own, shared in zip(problem._parts, problem.stretches, strict=True):
+        there_m = np.array([off_m[order[run]] for run, _ in shared])
+        assert first[own[2:-1]] == pytest.approx(there_m[0] - there_m[1:], abs=0.15)
+    assert all(one.seen for one in likenesses(problem, problem.start()))
