@@ -205,11 +205,15 @@ def diagnose(problem: Problem, effects: Mapping[str, Effect], present: Sequence[
     on_the_way = now
     now, taken = _reconsidered(problem, now, way.taken, len(present), progress)
     now, needed = _needed(problem, before, now, taken, len(present), progress, workers)
-    if now is not on_the_way:
-        steps.append(Step("as it ends", now.judged_error))
     progress("fitting all stretches")
     whole = problem.entire()
     after, slopes = settled(whole, now.state, slopes=now.slopes, worth=_WORTH_SETTLING)
+    while ended := [one.effect.name for one in after.effects[len(present):] if one.at_an_end]:
+        now = _without(problem, now, ended[0])  # finely simulated, it is nothing, or something else
+        needed.pop(ended[0])
+        after, slopes = settled(whole, now.state, slopes=now.slopes, worth=_WORTH_SETTLING)
+    if now is not on_the_way:
+        steps.append(Step("as it ends", now.judged_error))
     noise = noise_of(whole, after)
     verdict = tuple(needed)
     return Diagnosis(
