@@ -34,8 +34,8 @@ def lab_runs(folders: Sequence[Path], thin: bool = True) -> Runs:
     """The runs in some folders, of one sample rate; of about 100 samples a second if they have many more and may be
     thinned (``thin``).
 
-    Raises BadInput for one that cannot be read, is there twice, is not what ``usable`` asks for, or stands nowhere on
-    its own profile.
+    Raises BadInput for one that cannot be read, is there twice, is not what ``check_record`` asks for, or stands
+    nowhere on its own profile.
     """
     from logger.lab.prediction import Run, Runs
     from logger.store.drive_file import DRIVE, read_run
@@ -49,39 +49,32 @@ def lab_runs(folders: Sequence[Path], thin: bool = True) -> Runs:
         if last_m < drive.track.start_m or first_m > drive.track.end_m:
             raise BadInput(f"{folder / DRIVE}: expected distances on the profile, {drive.track.start_m:g} to "
                            f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
-        drives.append(usable(drive, folder / DRIVE, drives, thin))
+        check_record(drive, folder / DRIVE, drives)
+        drives.append(drive)
     return Runs([Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
-                 for one in drives])
+                 for one in (thinned_drives(drives) if thin else drives)])
 
 
-def usable(drive: AnyDrive, file: Path, others: Sequence[Drive], thin: bool = True) -> AnyDrive:
-    """The drive, thinned if it may be.
+def thinned_drives(drives: Sequence[AnyDrive]) -> list[AnyDrive]:
+    """Drives of one rate, of about 100 samples a second if they had many more."""
+    from logger.dsp.thinning import thinned
 
-    Raises BadInput for one of fewer than 50, that is shorter than 5 s, has another rate than the others, recorded
-    nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed.
-    """
-    _check(drive, file)
-    found = _thinned(drive) if thin else drive
-    if others and abs(found.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
-        raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
-                       f"{found.rate_hz:g}")
+    factor = int(drives[0].rate_hz / _RATE_HZ + _NEARLY)
+    if factor < 2:
+        return list(drives)
+    own = slice(None, None, factor)
+    found = []
+    for one in drives:
+        lat_deg, lon_deg = (None if place is None else place[own] for place in (one.lat_deg, one.lon_deg))
+        found.append(replace(
+            one, rate_hz=one.rate_hz / factor, time_s=one.time_s[own], accel_z_mps2=thinned(one.accel_z_mps2, factor),
+            speed_mps=one.speed_mps[own], distance_m=one.distance_m[own], lat_deg=lat_deg, lon_deg=lon_deg))
     return found
 
 
-def _thinned(drive: AnyDrive) -> AnyDrive:
-    from logger.dsp.thinning import thinned
-
-    factor = int(drive.rate_hz / _RATE_HZ + _NEARLY)
-    if factor < 2:
-        return drive
-    own = slice(None, None, factor)
-    lat_deg, lon_deg = (None if one is None else one[own] for one in (drive.lat_deg, drive.lon_deg))
-    return replace(drive, rate_hz=drive.rate_hz / factor, time_s=drive.time_s[own],
-                   accel_z_mps2=thinned(drive.accel_z_mps2, factor), speed_mps=drive.speed_mps[own],
-                   distance_m=drive.distance_m[own], lat_deg=lat_deg, lon_deg=lon_deg)
-
-
-def _check(drive: Drive, file: Path) -> None:
+def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
+    """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
+    others, recorded nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed."""
     import numpy as np
 
     from logger.store.drive_file import MAX_SPEED_MPS
@@ -92,6 +85,9 @@ def _check(drive: Drive, file: Path) -> None:
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < LEAST_S:
         raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")
+    if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
+        raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
+                       f"{drive.rate_hz:g}")
     counted = drive.accel_z_mps2[int(_SKIP_S * drive.rate_hz):]
     if np.ptp(counted) == 0:
         found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"

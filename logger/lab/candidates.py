@@ -349,7 +349,7 @@ def _of(base: Base, state: State) -> Trial:
 def scaled_by(one: Chosen, strength: float) -> Chosen | None:
     """The effect at a share of its strength: of the way from its null to where it stands; None if it has no null."""
     for place, parameter in enumerate(one.effect.parameters):
-        if parameter.null is None or parameter.choices:
+        if parameter.null is None or not parameter.moves:
             continue
         move = Move(0, place)
         null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)

@@ -24,6 +24,10 @@ Array = npt.NDArray[np.float64]
 _LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
 _FILTERED = 0.6
+# Where no fit was made, bands that hold so large a share and are equally loud are flat noise if next to nothing of it
+# is left behind the filter: what a car leaves falls towards the highest of them, and the sensor's own noise is
+# still there. Below so many hertz all bands are full of what the road does.
+_FLAT, _DEAF, _MOVED_HZ = 0.22, 0.01, 30.0
 UNEXPLAINED = 0.10
 """What stays above the noise is unexplained from this share of it on."""
 
@@ -42,14 +46,16 @@ def noise_of(problem: Problem, state: State) -> Noise:
 
 
 def sensor_noise(stretches: Sequence[Stretches], left_mps2: Sequence[Array], least_mps2: float,
-                 louder_too: bool = True) -> Noise:
+                 fitted: bool = True) -> Noise:
     """The sensor's noise under what is left (n,), per run; no less than ``least_mps2``.
 
-    louder_too    bands that are hardly louder than the highest frequencies tell of it too
+    fitted    a fit left it, so that where little is left it is noise; else bands have to be as loud as each other to be
+              taken for noise that was filtered, and none but the highest frequencies tell of noise that was not
     """
     quiet = [one.quiet(left) for one, left in zip(stretches, left_mps2, strict=True)]
     freedom = sum(n for _, n in quiet)
     power = sum(level * n for level, n in quiet) / freedom
+    highest = power, freedom
     cells = [one.cells(left, None) for one, left in zip(stretches, left_mps2, strict=True)]
     bands = range(min(len(one.power) for one in cells))
     freedoms = [sum(float(one.freedom[band]) for one in cells) for band in bands]
@@ -59,12 +65,13 @@ def sensor_noise(stretches: Sequence[Stretches], left_mps2: Sequence[Array], lea
     if power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
         louder = _LOUDER_THAN_QUIETEST
-    elif not louder_too:
-        by_level = []
     for level, n in by_level:
         if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             break
         power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
+    flat = freedom > _FLAT * sum(freedoms) and all(one.edges_hz[-1] > _MOVED_HZ for one in stretches)
+    if not fitted and not (flat and highest[0] < _DEAF * power):
+        power, freedom = highest
     power = max(power, least_mps2**2)
     return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
 

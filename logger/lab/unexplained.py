@@ -28,8 +28,9 @@ _CYCLE, _LINE, _OTHER_SPEED = 1.0, 2.0, 0.05
 
 @dataclass(frozen=True)
 class Turns:
-    """What repeats along the way in the run where that is clearest: how often [1/m] and, at the speed that it mostly
-    had, in time [Hz]; how probable by chance; and the powers (n,) at all wave numbers (n,) [1/m] over their mean.
+    """What repeats along the way in the run where that is clearest: how often [1/m], and the speed that it mostly had;
+    how probable by chance, which is certain where runs at other speeds do not have it; and the powers (n,) at all wave
+    numbers (n,) [1/m] over their mean.
 
     steady         the speed hardly changed, so that it may as well repeat in time
     width_per_m    how near two wave numbers are that are one
@@ -37,7 +38,7 @@ class Turns:
 
     run: str
     at_per_m: float
-    at_hz: float
+    speed_mps: float
     p_value: float
     per_m: Array
     power: Array
@@ -53,8 +54,9 @@ class Turns:
     def sentence(self) -> str:
         """What it says when it is found."""
         if self.steady:
-            return (f"It repeats every {1 / self.at_per_m:.2f} m of the way or {self.at_hz:.1f} times a second: at a "
-                    f"steady speed that is the same (clearest in {self.run}). A drive at another speed would tell.")
+            at_hz = self.at_per_m * self.speed_mps
+            return (f"It repeats every {1 / self.at_per_m:.2f} m of the way or {at_hz:.1f} times a second: at a steady "
+                    f"speed that is the same (clearest in {self.run}). A drive at another speed would tell.")
         radius_m = 1 / (2 * np.pi * self.at_per_m)
         wheel = (f" A wheel of {radius_m:.2f} m radius turns so often: look at its balance and roundness."
                  if _WHEEL_M[0] < radius_m < _WHEEL_M[1] else "")
@@ -108,16 +110,20 @@ def turns_of(beside: Beside) -> Turns | None:
         if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
         at_per_m = float(per_m[stands_out[0]])
-        at_hz = at_per_m * float(np.median(speed))
-        steady = _slips(way, run.rate_hz) * at_hz < _CYCLE
-        found.append(Turns(names[run.name], at_per_m, at_hz, stands_out[1], np.asarray(per_m[asked], float),
+        usual_mps = float(np.median(speed))
+        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < _CYCLE
+        found.append(Turns(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
                            power[asked] / float(power[asked].mean()), steady, _LINE * float(per_m[1])))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None
-    again = any(abs(one.at_per_m - best.at_per_m) < max(one.width_per_m, best.width_per_m)
-                and abs(one.at_hz / best.at_hz - 1) > _OTHER_SPEED and one.found for one in found)
-    return replace(best, p_value=min(1.0, best.p_value * len(found)), steady=best.steady and not again)
+    best = replace(best, p_value=min(1.0, best.p_value * len(found)))
+    others = [one for one in found if abs(one.speed_mps / best.speed_mps - 1) > _OTHER_SPEED]
+    if not best.steady or not others:
+        return best
+    again = any(abs(one.at_per_m - best.at_per_m) < max(one.width_per_m, best.width_per_m) and one.found
+                for one in others)
+    return replace(best, steady=False) if again else replace(best, p_value=1.0)
 
 
 def _slips(way_m: Array, rate_hz: float) -> float:

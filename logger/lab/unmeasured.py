@@ -244,7 +244,7 @@ class SameRoad:
             left.setdefault(run, []).append(read - expected)
         runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
         return sensor_noise([Stretches(one, whole=True) for one in runs], [one.measured_mps2 for one in runs],
-                            self.least_mps2, louder_too=False)
+                            self.least_mps2, fitted=False)
 
     def _at(self, own: Array, count: int) -> RoadState:
         places = np.append(0.0, own[_TILT + 1 : -1])

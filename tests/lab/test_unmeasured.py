@@ -259,3 +259,14 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
         there_m = np.array([off_m[order[run]] for run, _ in shared])
         assert first[own[2:-1]] == pytest.approx(there_m[0] - there_m[1:], abs=0.15)
     assert all(one.seen for one in likenesses(problem, problem.start()))
+
+
+def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:
+    """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be told."""
+    rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
+    runs = [run_of([rubbing], speed, 110.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))]
+    gain = shipped_effects()["sensor_gain"]
+    problem = SameRoad(runs, CAR, Tolerance())
+    found = diagnose_same_road(problem, {gain.name: gain})
+    assert found.unexplained and found.excess > 2
+    assert found.floor_error * problem.size_mps2 == pytest.approx(0.01, rel=0.2)

@@ -472,6 +472,7 @@ def test_complaints_about_the_history_name_the_line(tmp_path: Path, step: str, w
     ("5000.0, 0.0", 'float("inf"), 0.0', ": drag_n_s2_per_m2: expected finite low <= start <= high, found 0.0"),
     ("Scale.LINEAR", "Scale.LOG", ": drag_n_s2_per_m2: expected low above 0 for a scale that is log, found 0.0"),
     ("(100.0,)", "()", ": drag_n_s2_per_m2: expected trials, the values that a search begins at"),
+    ("(100.0,)", "(0.0,)", ": drag_n_s2_per_m2: expected trials away from 0.0, where the effect does nothing"),
     ("(100.0,)", "(-100.0,)", ": drag_n_s2_per_m2: expected trials, choices and default within 0.0 to 5000.0"),
     ('Parameter("drag_n_s2_per_m2"', 'Parameter("file"', ": expected a parameter's name of letters"),
     ("parameters = (", "parameters = [] or (1,", ": expected parameters to be a tuple of Parameter"),
