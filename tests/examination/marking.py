@@ -250,8 +250,8 @@ def goals(records: Sequence[Record]) -> list[Goal]:
         Goal("Two effects: both named", 0.75, True, share(of_kind(records, "two"), all_named)),
         Goal("Off the list: unexplained", 0.80, True, share(of_kind(records, "outsider", "two_outsider"), unexplained)),
         Goal("Nothing off the list, distances right: unexplained", 0.05, False, share(others, unexplained)),
-        Goal("Distances that wander, one effect or nothing missing: right one first (or confused) or nothing, and "
-             "nothing unexplained", 0.80, True, share(of_kind(records, "wandering"), right_on_wandering)),
+        Goal("Distances that wander: one effect or nothing, rightly, nothing unexplained", 0.80, True,
+             share(of_kind(records, "wandering"), right_on_wandering)),
         Goal("Effects found: error after adding within 10 % of the noise floor", 0.85, True, share(found, near)),
         Goal("Effects found: numbers within 10 % or three standard errors", 0.85, True, share(found, numbers_right)),
         Goal("Effects found: both of these", 0.85, True,
