@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.commands.lab_model import columns, deviation_of, known_effects, on_screen, paragraphs, wipe
-from logger.commands.lab_runs import check_record, thinned_drives
+from logger.commands.lab_runs import check_record, thinned_runs
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -73,8 +73,9 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
         drive = read_drive(folder / DRIVE)
         check_record(drive, drive.path, drives)
         drives.append(drive)
-    return [Run(str(folder), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, Track(1.0, np.zeros(2)))
-            for folder, one in zip(folders, thinned_drives(drives), strict=True)]
+    return thinned_runs([
+        Run(str(folder), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, Track(1.0, np.zeros(2)))
+        for folder, one in zip(folders, drives, strict=True)])
 
 
 def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from logger.errors import BadInput
 
 if TYPE_CHECKING:
-    from logger.lab.prediction import Runs
+    from logger.lab.prediction import Run, Runs
     from logger.store.drive_file import Drive
     from logger.store.drive_file import Run as DriveOnRoad
-
-AnyDrive = TypeVar("AnyDrive", bound="Drive")
 
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
 # What the lab looks at lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
@@ -51,25 +49,20 @@ def lab_runs(folders: Sequence[Path], thin: bool = True) -> Runs:
                            f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
         check_record(drive, folder / DRIVE, drives)
         drives.append(drive)
-    return Runs([Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
-                 for one in (thinned_drives(drives) if thin else drives)])
+    runs = [Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
+            for one in drives]
+    return Runs(thinned_runs(runs) if thin else runs)
 
 
-def thinned_drives(drives: Sequence[AnyDrive]) -> list[AnyDrive]:
-    """Drives of one rate, of about 100 samples a second if they had many more."""
+def thinned_runs(runs: Sequence[Run]) -> list[Run]:
+    """Runs of one rate, of about 100 samples a second if they had many more."""
     from logger.dsp.thinning import thinned
 
-    factor = int(drives[0].rate_hz / _RATE_HZ + _NEARLY)
+    factor = int(runs[0].rate_hz / _RATE_HZ + _NEARLY)
     if factor < 2:
-        return list(drives)
-    own = slice(None, None, factor)
-    found = []
-    for one in drives:
-        lat_deg, lon_deg = (None if place is None else place[own] for place in (one.lat_deg, one.lon_deg))
-        found.append(replace(
-            one, rate_hz=one.rate_hz / factor, time_s=one.time_s[own], accel_z_mps2=thinned(one.accel_z_mps2, factor),
-            speed_mps=one.speed_mps[own], distance_m=one.distance_m[own], lat_deg=lat_deg, lon_deg=lon_deg))
-    return found
+        return list(runs)
+    return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=thinned(one.measured_mps2, factor),
+                    distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor]) for one in runs]
 
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:

@@ -32,8 +32,7 @@ class Turns:
     how probable by chance, which is certain where runs at other speeds do not have it; and the powers (n,) at all wave
     numbers (n,) [1/m] over their mean.
 
-    steady         the speed hardly changed, so that it may as well repeat in time
-    width_per_m    how near two wave numbers are that are one
+    steady    the speed hardly changed, so that it may as well repeat in time
     """
 
     run: str
@@ -43,7 +42,11 @@ class Turns:
     per_m: Array
     power: Array
     steady: bool
-    width_per_m: float
+
+    @property
+    def width_per_m(self) -> float:
+        """How near two wave numbers are that are one."""
+        return _LINE * float(self.per_m[1] - self.per_m[0])
 
     @property
     def found(self) -> bool:
@@ -113,7 +116,7 @@ def turns_of(beside: Beside) -> Turns | None:
         usual_mps = float(np.median(speed))
         steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < _CYCLE
         found.append(Turns(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
-                           power[asked] / float(power[asked].mean()), steady, _LINE * float(per_m[1])))
+                           power[asked] / float(power[asked].mean()), steady))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None
