@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from zipfile import ZipFile
 
 from logger.commands.lab import STORY, say, silent, take, walk
-from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs
+from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs, require_compiler
 from logger.errors import BadInput
 from logger.store.naming import naming
 
@@ -37,7 +37,10 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.demo.lab_drives import VEHICLE
     from logger.lab.story import as_json as story_json
+    from logger.store.effect_file import shipped_effects
 
+    if not unpack_only:
+        require_compiler("ridelog demo --lab", shipped_effects().values())
     folders = unpack(out)
     drives = " ".join(map(str, folders))
     if unpack_only:

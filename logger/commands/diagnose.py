@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         from logger.commands.diagnose_same_road import run_same_road
 
         return run_same_road(args)
-    given = bench(args)
+    given = bench(args, searches="ridelog diagnose")
     if args.out is not None:
         check_out(args.out, args.runs, given.files_read)
     found = diagnosed(given)

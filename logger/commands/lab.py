@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
     from logger.lab.story import as_json
 
-    given = bench(args)
+    given = bench(args, searches="ridelog lab")
     asks = not (args.yes or args.json) and sys.stdin.isatty()
     ask = _asked if asks else take if args.yes or args.json else _taking()
     story = walk(given, args.out, ask, silent if args.json else say)

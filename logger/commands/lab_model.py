@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
@@ -107,19 +107,25 @@ def add_tolerance(parser: argparse.ArgumentParser) -> None:
                              f"{TOLERANCE:g}, 4 %%)")
 
 
-def bench(args: argparse.Namespace) -> Bench:
-    """The model, runs and effects of a command line. Raises BadInput for whatever is wrong with them."""
-    return bench_of(args.vehicle, args.runs, args.effect_file, args.tolerance)
+def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
+    """The model, runs and effects of a command line, as ``bench_of``."""
+    return bench_of(args.vehicle, args.runs, args.effect_file, args.tolerance, searches)
 
 
-def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str], tolerance: float) -> Bench:
-    """The model, runs and effects. Raises BadInput for whatever is wrong with them."""
+def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str], tolerance: float,
+             searches: str | None = None) -> Bench:
+    """The model, runs and effects. Raises BadInput for whatever is wrong with them.
+
+    searches    the command that will search through all effects, and so needs the compiler; None: it will not
+    """
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_model
 
     numbers = deviation_of(tolerance)
     model = read_model(vehicle_path(vehicle))
     effects, files = known_effects(model, effect_files)
+    if searches is not None:
+        require_compiler(searches, effects.values())
     found = Bench(vehicle, model, lab_runs(folders), effects, files, numbers)
     check_model(vehicle, model, found.runs)
     _try_own(found, effect_files)
@@ -225,6 +231,16 @@ def tell_slow(effects: Iterable[Effect]) -> None:
     if names := slow(effects):
         print(f"Without the lab extra (pip install '.[lab]') simulations with {' and '.join(names)} take some hundred "
               f"times longer: {_SLOW}.", file=sys.stderr, flush=True)
+
+
+def require_compiler(command: str, effects: Collection[Effect]) -> None:
+    """Raise BadInput where a search over these effects would take hours: it needs the compiler of the ``lab`` extra.
+
+    A search over the rest alone could not say that nothing is missing, nor that an effect explains most.
+    """
+    if names := slow(effects):
+        raise BadInput(f"{command} needs the lab extra (pip install '.[lab]'), which is not installed: without it "
+                       f"{len(names)} of {len(effects)} effects cannot be tried, and what it says would mislead")
 
 
 def _try_own(found: Bench, files: Sequence[str]) -> None:

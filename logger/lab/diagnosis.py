@@ -40,7 +40,7 @@ from logger.lab.fitting import Problem, Slopes, State, located, steps_apart
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import settled
 from logger.lab.wandering import ASTRAY, aligned_anew, lying, moved_m, relaid
-from logger.vehicle.effect import Chosen, Effect, ForceEffect, Misalignment
+from logger.vehicle.effect import Chosen, Effect, Misalignment
 
 Progress = Callable[[str], None]
 
@@ -75,7 +75,6 @@ _HALFWAY, _SHARE_OF_NEEDED = 0.5, 0.05  # of what an effect has to gain: when fi
 _THE_SAME_PLACE = 20.0  # steps
 _THE_SAME_M = 0.001
 _UNDECIDED = 0.05  # of what is left to explain
-_NOT_COMPILED = "it is nonlinear, and trying it takes hours without the lab extra (pip install '.[lab]')"
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,15 +286,11 @@ def _way(problem: Problem, recorded: Problem, before: Base, effects: Sequence[Ef
 
 def _obstacles(problem: Problem, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
-    from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
-
     two_tracks = all(run.two_tracks for run in problem.runs.runs)
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
         why = "the model has it" if name in there else effect.obstacle(problem.vehicle, two_tracks)
-        if why is None and isinstance(effect, ForceEffect) and not COMPILED:
-            why = _NOT_COMPILED
         if why is not None:
             found[name] = why
     return found

@@ -106,7 +106,7 @@ def test_a_page_or_a_story_is_not_written_over_the_vehicle(runs: list[str], tmp_
         main(["lab", "--yes", "--vehicle", str(car), *runs, "--out", str(tmp_path)])
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ["compare", "add-effect"])
 def test_what_takes_long_without_a_compiler_is_said_before(
     command: str, runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -118,6 +118,22 @@ def test_what_takes_long_without_a_compiler_is_said_before(
     told = capsys.readouterr().err
     assert "Without the lab extra (pip install '.[lab]') simulations with wheel_lift take" in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["diagnose", "lab", "demo"])
+def test_a_search_that_could_not_try_every_effect_is_refused(
+    command: str, runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without a compiler nine of twenty effects cannot be tried: "nothing is missing" would be no answer."""
+    monkeypatch.setattr("logger.vehicle.stepping_loop.COMPILED", False)
+    out = tmp_path / "out"
+    given = ["demo", "--lab", "--out", str(out)] if command == "demo" else [
+        *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", *runs]
+    with pytest.raises(BadInput, match=r"the lab extra \(pip install '\.\[lab\]'\).* of 20 effects") as refused:
+        main(given)
+    assert "\n" not in str(refused.value)
+    assert capsys.readouterr().out == ""
+    assert not out.exists()
 
 
 def changed(run: str, folder: Path, **columns: Callable[[npt.NDArray[np.float64]], object]) -> str:

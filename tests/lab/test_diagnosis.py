@@ -13,8 +13,7 @@ from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import Cells
 from logger.roads.track import Track
 from logger.store.effect_file import shipped_effects
-from logger.vehicle import stepping_loop
-from logger.vehicle.effect import ForceEffect, chosen
+from logger.vehicle.effect import chosen
 
 from compared import CAR, a_run
 
@@ -29,15 +28,6 @@ def test_effects_that_cannot_be_tried_are_named_with_the_reason() -> None:
     present = [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})]
     found = diagnosis._obstacles(problem(), EFFECTS, present)
     assert found == {"sensor_gain": "the model has it", "roll": EFFECTS["roll"].obstacle(CAR, False)}
-
-
-def test_without_a_compiler_nonlinear_effects_are_not_tried_and_it_is_said_how_to_get_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(stepping_loop, "COMPILED", False)
-    found = diagnosis._obstacles(problem(), EFFECTS, [])
-    left_out = {name for name, why in found.items() if "lab extra" in why}
-    assert left_out == {name for name, effect in EFFECTS.items() if isinstance(effect, ForceEffect)}
 
 
 def excess_of(lasts_s: list[float], above: float, seed: int) -> float:
