@@ -1,0 +1,213 @@
+"""A folder of logs put right after a cut of the power: each open part is finished, and no row is lost or repeated."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from drivers.disk import FileSystem
+from logger.records import WindowRecord
+from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
+from logger.store.segment_log import HEADER, format_row, scan
+from logger.store.session_counter import COUNTER_NAME
+from logger.store.sidecar import ClockMap, Tally, clock_of, sidecar_or_nothing, store_sidecar
+from logger.store.whole_file import replace_file, temporary_path, write_file
+
+_OWN_TEMPORARY = re.compile(r"(\d{5,}-\d{3,}\.(csv|json)|" + COUNTER_NAME + r")\.tmp")
+_BLOCK_ROWS = 256
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What became of a part that was found open: the finished file, or None when it held no row.
+
+    problem    why the disk did not let it be finished; it is left as it is until the next repair
+    """
+
+    part: Path
+    finished: Path | None
+    tally: Tally
+    problem: str = ""
+
+
+def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
+    """Put the folder right after a service that was killed: finish its parts, in order of their names.
+
+    Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
+    session had learnt it. Repairing twice does nothing more. Must not run while a service writes to the folder.
+    A part on which the disk fails does not keep the others from being finished. Raises ``OSError`` for the folder.
+    """
+    files = files or FileSystem()
+    for path in list(directory.iterdir()):
+        if _OWN_TEMPORARY.fullmatch(path.name):
+            files.remove(path)
+    sessions: dict[int, list[Path]] = defaultdict(list)
+    for path in directory.iterdir():
+        if name := LogName.of(path):
+            sessions[name.session].append(path)
+    done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs)]
+    for sidecar in directory.glob("*.json"):
+        log = sidecar.with_suffix(".csv")
+        if LogName.of(log) and not log.exists() and not open_path(log).exists() and _is_of_open_part(sidecar):
+            files.remove(sidecar)  # its part had not yet got its name
+    return done
+
+
+def _repair_session(files: FileSystem, logs: Sequence[Path]) -> list[Repaired]:
+    """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
+    which knows one; finished files get it first, for it is lost with the last part."""
+    parts = sorted((path for path in logs if path.suffix == ".part"), key=place)
+    clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part))) is not None]
+    clock = clocks[-1] if clocks else None
+    try:
+        for finished in sorted(set(logs).difference(parts)):
+            if clock is not None and _may_lack_utc(finished):
+                fill_finished(files, finished, take_tally(finished), clock)
+    except OSError as error:
+        return [Repaired(part, None, Tally(), str(error)) for part in parts]
+    later = first_segments_later(logs) if parts else {}
+    done = []
+    for part in parts:
+        try:
+            done.append(repair_part(files, part, later[part], clock))
+        except OSError as error:
+            done.append(Repaired(part, None, Tally(), str(error)))
+    return done
+
+
+def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None) -> Repaired:
+    """Finish one part, but for its rows of segments from ``limit`` on."""
+    tally = take_tally(part, limit)
+    finished = finished_path(part)
+    if finished.exists() and take_tally(finished).rows >= tally.rows:
+        # The cut came between the rename and the removal. After a mere kill the rename may not be on the disk yet, and
+        # the removal must not come there before it.
+        files.sync_directory(part.parent)
+        files.remove(part)
+        files.sync_directory(part.parent)
+    elif tally.rows:
+        _finish_copy(files, part, sidecar_or_nothing(part), tally, clock, limit)
+    else:
+        remove_part(files, part)
+        return Repaired(part, None, tally)
+    return Repaired(part, finished, tally)
+
+
+def first_segments_later(logs: Iterable[Path]) -> dict[Path, int | None]:
+    """For each file of a session the first segment that later parts hold. Rows from there on were written again: the
+    disk had failed, and what it kept of them in this part is not to be trusted. Each file is opened once."""
+    found: dict[Path, int | None] = {}
+    part = limit = upcoming = None
+    for log in sorted(logs, key=place, reverse=True):
+        if place(log)[0] != part:
+            part, limit = place(log)[0], upcoming
+        found[log] = limit
+        with suppress(OSError), log.open("rb") as file:  # what nobody can read is not there twice either
+            upcoming = next((row.record.segment for row in scan(file) if row.record is not None), upcoming)
+    return found
+
+
+def place(log: Path) -> tuple[int, Path]:
+    """Number of the part, then a finished file before an open one; by this the files of a session are in order."""
+    name = LogName.of(log)
+    return (name.part if name else 0), log
+
+
+def _may_lack_utc(finished: Path) -> bool:
+    """False where the sidecar says that no row does."""
+    said = sidecar_or_nothing(finished).get("log")
+    return not isinstance(said, dict) or said.get("rows_without_utc") != 0
+
+
+def take_tally(log: Path, limit: int | None = None) -> Tally:
+    """Count what a log holds; rows of segments from ``limit`` on are ``repeated``. Raises ``OSError``."""
+    rows = unset = damaged = repeated = 0
+    torn_tail = False
+    with log.open("rb") as file:
+        for row in scan(file):
+            torn_tail = row.torn
+            if row.record is None:
+                damaged += not row.torn
+            elif limit is not None and row.record.segment >= limit:
+                repeated += 1
+            else:
+                rows += 1
+                unset += row.record.utc_us is None
+    return Tally(rows, unset, damaged, torn_tail, repeated)
+
+
+def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None) -> Path:
+    """Turn a part that was written whole and synced into the finished file."""
+    if clock is not None and tally.unset:
+        return _finish_copy(files, part, given, tally, clock, None)
+    finished = finished_path(part)
+    store_sidecar(files, part, given, "finished", tally, clock)
+    files.rename(part, finished)
+    files.sync_directory(part.parent)
+    return finished
+
+
+def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None,
+                 limit: int | None) -> Path:
+    """Turn the good rows of a part into the finished file. They are written anew: of a part that was found open nobody
+    knows whether the disk holds what the system shows."""
+    finished = finished_path(part)
+    filled = tally if clock is None else replace(tally, unset=0)
+    write_file(files, temporary_path(finished), _kept_lines(part, clock, limit))
+    store_sidecar(files, part, given, "finished", filled, clock)
+    files.rename(temporary_path(finished), finished)
+    files.sync_directory(part.parent)
+    files.remove(part)
+    files.sync_directory(part.parent)
+    return finished
+
+
+def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None) -> None:
+    """Give UTC to the rows of a finished file that have none."""
+    if clock is None or not tally.unset:
+        return
+    given = sidecar_or_nothing(finished)
+    replace_file(files, finished, _kept_lines(finished, clock))
+    store_sidecar(files, finished, given, "finished", replace(tally, unset=0), clock)
+
+
+def _kept_lines(log: Path, clock: ClockMap | None, limit: int | None = None) -> Iterator[bytes]:
+    """The text of a log with its intact rows only, up to segment ``limit``, UTC filled in, in blocks."""
+    lines = [HEADER]
+    with log.open("rb") as file:
+        for row in scan(file):
+            if row.record is None or (limit is not None and row.record.segment >= limit):
+                continue
+            lines.append(row.text if clock is None or row.record.utc_us is not None
+                         else format_row(_with_utc(row.record, clock)))
+            if len(lines) >= _BLOCK_ROWS:
+                yield _joined(lines)
+                lines.clear()
+    yield _joined(lines)
+
+
+def _joined(lines: list[str]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def _with_utc(record: WindowRecord, clock: ClockMap) -> WindowRecord:
+    return replace(record, utc_us=record.t_us + clock.offset_us,
+                   flags=tuple(flag for flag in record.flags if flag != "time_unset"))
+
+
+def remove_part(files: FileSystem, part: Path) -> None:
+    """Remove a part that has no rows. Its sidecar goes first, so that none is ever left alone."""
+    files.remove(sidecar_path(part))
+    files.sync_directory(part.parent)
+    files.remove(part)
+    files.sync_directory(part.parent)
+
+
+def _is_of_open_part(sidecar: Path) -> bool:
+    said = sidecar_or_nothing(sidecar).get("log")
+    return isinstance(said, dict) and said.get("state") == "open"
