@@ -7,12 +7,23 @@ hands in one that fails. Every method raises ``OSError`` for what the system ref
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from pathlib import Path
+from typing import BinaryIO
 
 
 class FileSystem:
     """The disk as it is."""
+
+    def open(self, path: Path) -> BinaryIO:
+        """A regular file, for reading. Raises ``OSError`` for anything else; a pipe is never waited for."""
+        file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC), "rb")
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            file.close()
+            raise OSError(errno.EINVAL, "not a regular file", str(path))
+        return file
 
     def create(self, path: Path, new: bool = False) -> int:
         """Open an empty file for writing; give its descriptor. ``new``: raise ``FileExistsError`` where one is."""

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
-from logger.store.lasting import disk_words
+from logger.store.set_aside import disk_words
 from logger.units import US_PER_S
 
 ENDING = ".dump.gz"

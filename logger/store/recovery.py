@@ -15,7 +15,8 @@ from logger.records import WindowRecord
 from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
 from logger.store.segment_log import HEADER, format_row, scan
 from logger.store.session_counter import COUNTER_NAME
-from logger.store.sidecar import ClockMap, Tally, clock_of, sidecar_or_nothing, store_sidecar
+from logger.store.set_aside import Warn, disk_words, set_aside, warn_in_journal
+from logger.store.sidecar import ClockMap, Tally, clock_of, read_sidecar, sidecar_or_nothing, store_sidecar
 from logger.store.whole_file import replace_file, temporary_path, write_file
 
 _OWN_TEMPORARY = re.compile(r"(\d{5,}-\d{3,}\.(csv|json)|" + COUNTER_NAME + r")\.tmp")
@@ -35,7 +36,7 @@ class Repaired:
     problem: str = ""
 
 
-def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
+def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> list[Repaired]:
     """Put the folder right after a service that was killed: finish its parts, in order of their names.
 
     Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
@@ -50,7 +51,7 @@ def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
     for path in directory.iterdir():
         if name := LogName.of(path):
             sessions[name.session].append(path)
-    done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs)]
+    done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
     for sidecar in directory.glob("*.json"):
         log = sidecar.with_suffix(".csv")
         if LogName.of(log) and not log.exists() and not open_path(log).exists() and _is_of_open_part(sidecar):
@@ -58,29 +59,30 @@ def repair(directory: Path, files: FileSystem | None = None) -> list[Repaired]:
     return done
 
 
-def _repair_session(files: FileSystem, logs: Sequence[Path]) -> list[Repaired]:
+def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list[Repaired]:
     """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
     which knows one; finished files get it first, for it is lost with the last part."""
-    parts = sorted((path for path in logs if path.suffix == ".part"), key=place)
+    parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
     clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part))) is not None]
     clock = clocks[-1] if clocks else None
     try:
         for finished in sorted(set(logs).difference(parts)):
             if clock is not None and _may_lack_utc(finished):
-                fill_finished(files, finished, take_tally(finished), clock)
+                fill_finished(files, finished, take_tally(finished), clock, warn)
     except OSError as error:
         return [Repaired(part, None, Tally(), str(error)) for part in parts]
     later = first_segments_later(logs) if parts else {}
     done = []
     for part in parts:
         try:
-            done.append(repair_part(files, part, later[part], clock))
+            done.append(repair_part(files, part, later[part], clock, warn))
         except OSError as error:
             done.append(Repaired(part, None, Tally(), str(error)))
     return done
 
 
-def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None) -> Repaired:
+def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
+                warn: Warn = warn_in_journal) -> Repaired:
     """Finish one part, but for its rows of segments from ``limit`` on."""
     tally = take_tally(part, limit)
     finished = finished_path(part)
@@ -91,7 +93,7 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMa
         files.remove(part)
         files.sync_directory(part.parent)
     elif tally.rows:
-        _finish_copy(files, part, sidecar_or_nothing(part), tally, clock, limit)
+        _finish_copy(files, part, _facts_of(files, part, warn), tally, clock, limit)
     else:
         remove_part(files, part)
         return Repaired(part, None, tally)
@@ -103,16 +105,16 @@ def first_segments_later(logs: Iterable[Path]) -> dict[Path, int | None]:
     disk had failed, and what it kept of them in this part is not to be trusted. Each file is opened once."""
     found: dict[Path, int | None] = {}
     part = limit = upcoming = None
-    for log in sorted(logs, key=place, reverse=True):
-        if place(log)[0] != part:
-            part, limit = place(log)[0], upcoming
+    for log in sorted(logs, key=_place, reverse=True):
+        if _place(log)[0] != part:
+            part, limit = _place(log)[0], upcoming
         found[log] = limit
         with suppress(OSError), log.open("rb") as file:  # what nobody can read is not there twice either
             upcoming = next((row.record.segment for row in scan(file) if row.record is not None), upcoming)
     return found
 
 
-def place(log: Path) -> tuple[int, Path]:
+def _place(log: Path) -> tuple[int, Path]:
     """Number of the part, then a finished file before an open one; by this the files of a session are in order."""
     name = LogName.of(log)
     return (name.part if name else 0), log
@@ -152,6 +154,18 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tal
     return finished
 
 
+def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
+    """The sidecar, to be written anew. One that is damaged or cannot be read is put aside."""
+    try:
+        return read_sidecar(log, files) or {}
+    except ValueError as error:
+        why = f"damaged: {error}"
+    except OSError as error:
+        why = disk_words(error)
+    set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock", warn)
+    return {}
+
+
 def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None,
                  limit: int | None) -> Path:
     """Turn the good rows of a part into the finished file. They are written anew: of a part that was found open nobody
@@ -167,11 +181,12 @@ def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Ta
     return finished
 
 
-def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None) -> None:
+def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None,
+                  warn: Warn = warn_in_journal) -> None:
     """Give UTC to the rows of a finished file that have none."""
     if clock is None or not tally.unset:
         return
-    given = sidecar_or_nothing(finished)
+    given = _facts_of(files, finished, warn)
     replace_file(files, finished, _kept_lines(finished, clock))
     store_sidecar(files, finished, given, "finished", replace(tally, unset=0), clock)
 

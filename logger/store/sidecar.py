@@ -1,4 +1,9 @@
-"""The sidecar of a log file: what a reader needs beside the rows (settings, versions, scales, clock), as JSON."""
+"""The sidecar of a log file: what a reader needs beside the rows (settings, versions, scales, clock), as JSON.
+
+Problem. A scale or a clock with one wrong digit makes every row wrong, though each fits its own check value. Solution.
+The content carries a checksum of itself, and nothing is read of a sidecar that does not fit it. Those of older versions
+have none; they are read, and said to be unchecked.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from drivers.disk import FileSystem
+from logger.store.checksum import json_sha256
 from logger.store.log_name import LogName, sidecar_path
 from logger.store.whole_file import replace_file
 
 SIDECAR_BYTES = 1_000_000
 """Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
 
+_FORMAT = 1
+_SEAL = frozenset({"format", "sha256"})
 LATEST_UTC_US = 4_102_444_800_000_000  # 2100-01-01
 
 
@@ -42,11 +50,19 @@ class Tally:
     repeated: int = 0
 
 
-def read_sidecar(log: Path) -> dict[str, Any] | None:
-    """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is
-    damaged, nested too deep or larger than ``SIDECAR_BYTES``."""
+@dataclass(frozen=True)
+class Sidecar:
+    """What lies beside a log. ``is_checked``: it fits its checksum; False: an older version wrote it, without one."""
+
+    content: dict[str, Any]
+    is_checked: bool
+
+
+def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
+    """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is damaged,
+    nested too deep or larger than ``SIDECAR_BYTES``, and ``OSError``."""
     try:
-        with sidecar_path(log).open("rb") as file:
+        with (files or FileSystem()).open(sidecar_path(log)) as file:
             text = file.read(SIDECAR_BYTES + 1)
     except FileNotFoundError:
         return None
@@ -60,11 +76,22 @@ def read_sidecar(log: Path) -> dict[str, Any] | None:
         raise ValueError("expected a JSON object") from None
     if not isinstance(found, dict):
         raise ValueError("expected a JSON object")
-    return found
+    content = {key: value for key, value in found.items() if key not in _SEAL}
+    is_checked = not _SEAL.isdisjoint(found)
+    if is_checked and not _fits(found, content):
+        raise ValueError("expected content that fits its checksum")
+    return Sidecar(content, is_checked)
+
+
+def read_sidecar(log: Path, files: FileSystem | None = None) -> dict[str, Any] | None:
+    """The content of ``load_sidecar``."""
+    sidecar = load_sidecar(log, files)
+    return None if sidecar is None else sidecar.content
 
 
 def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: str, tally: Tally,
-                   clock: ClockMap | None) -> None:
+                  clock: ClockMap | None) -> None:
+    """Write the sidecar of a log, in place of the old one, in one step."""
     name = LogName.of(log)
     content = given | {
         "clock_map": None if clock is None else asdict(clock),
@@ -78,15 +105,29 @@ def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: st
             "torn_tail_repaired": tally.torn_tail,
         },
     }
-    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
+    plain = json.loads(json.dumps(content, allow_nan=False))  # keys and lists as a reader will find them
+    text = json.dumps(_sealed(plain), indent=2) + "\n"
     replace_file(files, sidecar_path(log), [text.encode()])
 
 
-def sidecar_or_nothing(log: Path) -> dict[str, Any]:
-    """The sidecar for writing it anew; one that is lost cannot be brought back."""
+def _sealed(content: dict[str, Any]) -> dict[str, Any]:
+    """Content with its checksum. There are two keys, so that no single damage makes it one that never had any."""
+    sealed = content | {"format": _FORMAT}
+    return sealed | {"sha256": json_sha256(sealed)}
+
+
+def _fits(found: dict[str, Any], content: dict[str, Any]) -> bool:
     try:
-        return read_sidecar(log) or {}
-    except ValueError:
+        return found == _sealed(content)
+    except RecursionError:  # nested as no content of ours
+        return False
+
+
+def sidecar_or_nothing(log: Path, files: FileSystem | None = None) -> dict[str, Any]:
+    """The content of the sidecar; nothing where it is missing, damaged or cannot be read."""
+    try:
+        return read_sidecar(log, files) or {}
+    except (ValueError, OSError):
         return {}
 
 

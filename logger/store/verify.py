@@ -21,10 +21,11 @@ from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
+from logger.store.log_name import LogName
 from logger.store.manifest import is_of_export, parse_manifest
 from logger.store.open_folder import OpenFolder
-from logger.store.rotation import LogName, read_sidecar
 from logger.store.segment_log import Row, scan
+from logger.store.sidecar import load_sidecar
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
@@ -49,6 +50,7 @@ class FileCheck:
     records_corrupt    lines that are damaged; a dump is read up to the first
     gaps               places where records are missing or time goes back
     problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
+    notes              what is not wrong and should be known, as many at most
     ok                 nothing is wrong
     """
 
@@ -60,6 +62,7 @@ class FileCheck:
     records_corrupt: int
     gaps: int
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -76,6 +79,7 @@ class _Findings:
     corrupt: int = 0
     gaps: int = 0
     problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     first: WindowRecord | None = None
     last: WindowRecord | None = None
     damaged_before_first: int = 0
@@ -85,8 +89,13 @@ class _Findings:
         if len(self.problems) < SHOWN_PROBLEMS:
             self.problems.append(problem)
 
+    def note(self, words: str) -> None:
+        if len(self.notes) < SHOWN_PROBLEMS:
+            self.notes.append(words)
+
     def check(self, path: Path, kind: str, state: str) -> FileCheck:
-        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems))
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems),
+                         tuple(self.notes))
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
@@ -192,15 +201,17 @@ def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, dam
 
 def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
     try:
-        sidecar = read_sidecar(path)
-    except ValueError as error:
-        findings.wrong(f"sidecar: {error}")
+        sidecar = load_sidecar(path)
+    except (ValueError, OSError) as error:
+        findings.wrong(f"sidecar: {error.strerror if isinstance(error, OSError) else error}")
         return
     if sidecar is None:
         if LogName.of(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
         return
-    said = sidecar.get("log")
+    if not sidecar.is_checked:
+        findings.note("sidecar: not checked: it was written without a checksum")
+    said = sidecar.content.get("log")
     rows = said.get("rows") if isinstance(said, dict) else None
     if not isinstance(rows, int):
         findings.wrong("sidecar: expected the number of rows of a finished log")
