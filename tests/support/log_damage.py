@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 from collections.abc import Iterable, Sequence
@@ -10,7 +11,7 @@ from pathlib import Path
 from logger.commands.report import read_logged
 from logger.records import WindowRecord
 from logger.store.rotation import ClockMap, SegmentLog, read_sidecar, repair
-from logger.store.segment_log import format_row, parse_row, read_log
+from logger.store.segment_log import HEADER, format_row, parse_row, read_log
 from logger.store.space import Limits, SpaceKeeper
 
 from crashes import FACTS, OFFSET_US, problems, window
@@ -111,6 +112,96 @@ def flipped(data: bytes, rng: random.Random) -> bytes:
     return data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1:]
 
 
+def damaged_part(folder: Path, case: tuple[int, int]) -> Found:
+    """So many sessions of one to three parts that were left open, or of which the last was, each with damage inside. A
+    row is kept when its line is as it was; nothing but a hole is missing, and nobody finds fault with that."""
+    seed, trials = case
+    rng = random.Random(seed)
+    lost = 0
+    for _ in range(trials):
+        image, last = _session_image(rng)
+        name = rng.choice([name for name in image if name.endswith(".part")])
+        image[name] = damaged(image[name], rng)
+        lines = {line for name, data in image.items() if ".csv" in name for line in data.split(b"\n")}
+        kept = [segment for segment in range(1, last + 1) if format_row(window(segment, utc=True)).encode() in lines]
+        after = lay_out(folder / "after", image)
+        repair(after, RefusingFiles())
+        assert not list(after.glob("*.part")), f"{name}: left open"
+        logs = sorted(after.glob("*.csv"))
+        assert logs or not kept
+        records = [record for log in logs for record in read_log(log).records]
+        assert {record.segment for record in records} >= set(kept), f"{name}: rows are lost"
+        _as_written(records, sorted({record.segment for record in records}))
+        wrong = problems(after) if logs else []
+        assert not wrong, f"{name}: {wrong}"
+        lost += last - len(records)
+        shutil.rmtree(after)
+    return found(trials, lost=lost)
+
+
+def _session_image(rng: random.Random) -> tuple[dict[str, bytes], int]:
+    """The files of a session that was cut off, and its last row."""
+    rows = [rng.randrange(1, 9) for _ in range(rng.randrange(1, 4))]
+    first_open = rng.randrange(len(rows))
+    image = {}
+    segment = 0
+    for part, count in enumerate(rows):
+        lines = [HEADER, *(format_row(window(segment + 1 + n, utc=True)) for n in range(count))]
+        segment += count
+        is_open = part >= first_open
+        image[f"00001-{part + 1:03d}.csv{'.part' * is_open}"] = "".join(f"{line}\n" for line in lines).encode()
+        if not is_open:
+            image[f"00001-{part + 1:03d}.json"] = json.dumps({"log": {"rows": count}}).encode()
+    return image, segment
+
+
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """Other bits, bytes, sectors or lengths somewhere; never a whole number of lines, which leaves no trace."""
+    begin = rng.randrange(len(data))
+    length = min(rng.choice((1, 3, 40, 512, 3000)), len(data) - begin)
+    kind = rng.randrange(6)
+    if kind == 0:
+        return flipped(data, rng)
+    if kind == 1:
+        return data[:begin] + bytes(length) + data[begin + length:]
+    if kind == 2:
+        return data[:begin] + rng.randbytes(length) + data[begin + length:]
+    if kind == 3:  # two lines become one
+        newline = data.index(b"\n", begin)
+        return data[:newline] + data[newline + 1:]
+    if kind == 4 and begin and data[begin - 1:begin] != b"\n":  # torn
+        return data[:begin]
+    return data[:begin] + b"0123456789"[:length] + data[begin + length:]
+
+
+def both_damaged(folder: Path, case: tuple[int, int]) -> Found:
+    """A part and the file that was made of it, left beside each other by a cut, each with damage of its own."""
+    seed, trials = case
+    rng = random.Random(seed)
+    missing = 0
+    for _ in range(trials):
+        rows = range(1, rng.randrange(2, 12))
+        lines = {ending: [HEADER, *(format_row(window(n, utc=ending == "csv")) for n in rows)]
+                 for ending in ("csv", "csv.part")}
+        image = {f"00001-001.{ending}": "".join(f"{line}\n" for line in text).encode()
+                 for ending, text in lines.items()}
+        for name in image:
+            for _ in range(rng.randrange(1, 3)):
+                image[name] = damaged(image[name], rng)
+        written = {line.encode(): max(0, place) for text in lines.values() for place, line in enumerate(text)}
+        kept = {written.get(line, 0) for data in image.values() for line in data.split(b"\n")} - {0}
+        after = lay_out(folder / "after", image)
+        repair(after, RefusingFiles())
+        logs = list(after.glob("*.csv"))
+        records = read_log(logs[0]).records if logs else ()
+        assert {record.segment for record in records} >= kept, "rows are lost"
+        _as_written(records, sorted({record.segment for record in records}))
+        assert not logs or problems(after) == [], problems(after)
+        missing += len(rows) - len(records)
+        shutil.rmtree(after)
+    return found(trials, missing=missing)
+
+
 def _as_written(records: Sequence[WindowRecord], segments: Iterable[int]) -> None:
     """These rows, in this order, each as it was written, with the right UTC or none."""
     assert [record.segment for record in records] == list(segments)
@@ -129,4 +220,11 @@ HAZARDS = (
     Hazard("a bit flipped in the sidecar of a finished log", "at random places",
            "`ridelog verify` says so and `ridelog report` does not show it, or nothing that is read has changed",
            "{seen.total:.0f} seen", flipped_sidecar_of_a_finished_log, tuple((seed, 500) for seed in range(4)), 1),
+    Hazard("damage inside an open log", "bits, bytes, sectors, line ends and lengths of a session's open parts are "
+           "others", "the next start keeps every row whose line is as it was, `ridelog verify` has nothing against the "
+           "files, and the place of what was lost stands in the sidecar", "{lost.total:.0f} rows lost, none accepted",
+           damaged_part, tuple((seed, 1000) for seed in range(7)), 1),
+    Hazard("damage inside an open log and the file that was made of it", "a cut has left both, and each is damaged",
+           "every row that is intact in either is kept, once and in order", "{missing.total:.0f} rows damaged in both",
+           both_damaged, tuple((seed, 500) for seed in range(4)), 1),
 )
