@@ -12,11 +12,12 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
+from logger.store.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
 from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
-from logger.store.segment_log import HEADER, format_row, scan
+from logger.store.segment_log import HEADER, format_row
 from logger.store.session_counter import COUNTER_NAME
 from logger.store.set_aside import Warn, disk_words, set_aside, warn_in_journal
-from logger.store.sidecar import ClockMap, Tally, clock_of, read_sidecar, sidecar_or_nothing, store_sidecar
+from logger.store.sidecar import ClockMap, clock_of, read_sidecar, repairs_of, sidecar_or_nothing, store_sidecar
 from logger.store.whole_file import replace_file, temporary_path, write_file
 
 _OWN_TEMPORARY = re.compile(r"(\d{5,}-\d{3,}\.(csv|json)|" + COUNTER_NAME + r")\.tmp")
@@ -68,10 +69,10 @@ def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list
     try:
         for finished in sorted(set(logs).difference(parts)):
             if clock is not None and _may_lack_utc(finished):
-                fill_finished(files, finished, take_tally(finished), clock, warn)
+                fill_finished(files, finished, tally_of(files, finished), clock, warn)
     except OSError as error:
         return [Repaired(part, None, Tally(), str(error)) for part in parts]
-    later = first_segments_later(logs) if parts else {}
+    later = first_segments_later(files, logs) if parts else {}
     done = []
     for part in parts:
         try:
@@ -83,24 +84,59 @@ def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list
 
 def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
                 warn: Warn = warn_in_journal) -> Repaired:
-    """Finish one part, but for its rows of segments from ``limit`` on."""
-    tally = take_tally(part, limit)
+    """Finish one part, but for its rows of segments from ``limit`` on. A finished file of the same name is merged."""
     finished = finished_path(part)
-    if finished.exists() and take_tally(finished).rows >= tally.rows:
+    logs = (finished, part) if finished.exists() else (part,)
+    found = IntactRows(files, logs, limit)
+    tally = take_tally(found)
+    if len(logs) > 1 and not (found.only_in_last or tally.contradictions or _is_damaged(files, finished)):
         # The cut came between the rename and the removal. After a mere kill the rename may not be on the disk yet, and
         # the removal must not come there before it.
         files.sync_directory(part.parent)
         files.remove(part)
         files.sync_directory(part.parent)
-    elif tally.rows:
-        _finish_copy(files, part, _facts_of(files, part, warn), tally, clock, limit)
+    elif tally.rows or len(logs) > 1 or _explains_a_gap(files, part, tally, limit):
+        _finish_copy(files, part, logs, _facts_of(files, part, warn), tally, clock, limit)
+        if tally.contradictions:
+            set_aside(files, part, f"{tally.contradictions} of its rows are others than those in {finished.name}", warn)
+        else:
+            files.remove(part)
+            files.sync_directory(part.parent)
     else:
         remove_part(files, part)
         return Repaired(part, None, tally)
     return Repaired(part, finished, tally)
 
 
-def first_segments_later(logs: Iterable[Path]) -> dict[Path, int | None]:
+def _is_damaged(files: FileSystem, finished: Path) -> bool:
+    found = IntactRows(files, (finished,))
+    tally = take_tally(found)
+    return bool(tally.damaged_lines or tally.torn_tail)
+
+
+def _explains_a_gap(files: FileSystem, part: Path, tally: Tally, limit: int | None) -> bool:
+    """True for a part without an intact row where rows are missing between the parts around it, so that a file has to
+    stay that says why."""
+    if limit is None or not tally.damaged_rows:
+        return False
+    earlier = sorted((log for log in logs_of_session(part) if _place(log) < _place(part)), key=_place, reverse=True)
+    for log in earlier:
+        last = None
+        for row in IntactRows(files, (log,)):
+            last = row.record.segment
+        if last is not None:
+            return last + 1 < limit
+    return False
+
+
+def logs_of_session(log: Path) -> list[Path]:
+    """All files of the session that a log belongs to, open or finished, in no order."""
+    name = LogName.of(log)
+    return [path for path in log.parent.iterdir()
+            if (other := LogName.of(path)) and name and other.session == name.session]
+
+
+def first_segments_later(files: FileSystem, logs: Iterable[Path]) -> dict[Path, int | None]:
     """For each file of a session the first segment that later parts hold. Rows from there on were written again: the
     disk had failed, and what it kept of them in this part is not to be trusted. Each file is opened once."""
     found: dict[Path, int | None] = {}
@@ -109,8 +145,8 @@ def first_segments_later(logs: Iterable[Path]) -> dict[Path, int | None]:
         if _place(log)[0] != part:
             part, limit = _place(log)[0], upcoming
         found[log] = limit
-        with suppress(OSError), log.open("rb") as file:  # what nobody can read is not there twice either
-            upcoming = next((row.record.segment for row in scan(file) if row.record is not None), upcoming)
+        with suppress(OSError):  # what nobody can read is not there twice either
+            upcoming = next((row.record.segment for row in IntactRows(files, (log,))), upcoming)
     return found
 
 
@@ -126,30 +162,15 @@ def _may_lack_utc(finished: Path) -> bool:
     return not isinstance(said, dict) or said.get("rows_without_utc") != 0
 
 
-def take_tally(log: Path, limit: int | None = None) -> Tally:
-    """Count what a log holds; rows of segments from ``limit`` on are ``repeated``. Raises ``OSError``."""
-    rows = unset = damaged = repeated = 0
-    torn_tail = False
-    with log.open("rb") as file:
-        for row in scan(file):
-            torn_tail = row.torn
-            if row.record is None:
-                damaged += not row.torn
-            elif limit is not None and row.record.segment >= limit:
-                repeated += 1
-            else:
-                rows += 1
-                unset += row.record.utc_us is None
-    return Tally(rows, unset, damaged, torn_tail, repeated)
-
-
 def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None) -> Path:
     """Turn a part that was written whole and synced into the finished file."""
     if clock is not None and tally.unset:
-        return _finish_copy(files, part, given, tally, clock, None)
-    finished = finished_path(part)
-    store_sidecar(files, part, given, "finished", tally, clock)
-    files.rename(part, finished)
+        finished = _finish_copy(files, part, (part,), given, tally, clock, None)
+        files.remove(part)
+    else:
+        finished = finished_path(part)
+        store_sidecar(files, part, given, "finished", tally, clock)
+        files.rename(part, finished)
     files.sync_directory(part.parent)
     return finished
 
@@ -166,43 +187,49 @@ def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
     return {}
 
 
-def _finish_copy(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None,
-                 limit: int | None) -> Path:
-    """Turn the good rows of a part into the finished file. They are written anew: of a part that was found open nobody
-    knows whether the disk holds what the system shows."""
+def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: Tally,
+                 clock: ClockMap | None, limit: int | None) -> Path:
+    """Put the intact rows of a part, or of the part and the finished file that is there, into a finished file; the part
+    is still there. They are written anew: of a part that was found open nobody knows whether the disk holds what the
+    system shows."""
     finished = finished_path(part)
     filled = tally if clock is None else replace(tally, unset=0)
-    write_file(files, temporary_path(finished), _kept_lines(part, clock, limit))
+    if limit is not None and not tally.rows:
+        filled = replace(filled, holes=(Hole(limit - tally.damaged_rows, limit - 1),))
+    write_file(files, temporary_path(finished), _lines(IntactRows(files, logs, limit), clock))
     store_sidecar(files, part, given, "finished", filled, clock)
     files.rename(temporary_path(finished), finished)
-    files.sync_directory(part.parent)
-    files.remove(part)
     files.sync_directory(part.parent)
     return finished
 
 
 def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None,
                   warn: Warn = warn_in_journal) -> None:
-    """Give UTC to the rows of a finished file that have none."""
+    """Give UTC to the rows of a finished file that have none. What earlier repairs left out of it is still known."""
     if clock is None or not tally.unset:
         return
     given = _facts_of(files, finished, warn)
-    replace_file(files, finished, _kept_lines(finished, clock))
-    store_sidecar(files, finished, given, "finished", replace(tally, unset=0), clock)
+    before = repairs_of(given)
+    replace_file(files, finished, _lines(IntactRows(files, (finished,)), clock))
+    store_sidecar(files, finished, given, "finished", replace(
+        tally, unset=0, damaged_lines=tally.damaged_lines + before.damaged_lines,
+        torn_tail=tally.torn_tail or before.torn_tail, holes=before.holes + tally.holes), clock)
 
 
-def _kept_lines(log: Path, clock: ClockMap | None, limit: int | None = None) -> Iterator[bytes]:
-    """The text of a log with its intact rows only, up to segment ``limit``, UTC filled in, in blocks."""
+def tally_of(files: FileSystem, log: Path) -> Tally:
+    """Count what one file holds. Raises ``OSError``."""
+    return take_tally(IntactRows(files, (log,)))
+
+
+def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]:
+    """The text of a log with these rows, UTC filled in, in blocks."""
     lines = [HEADER]
-    with log.open("rb") as file:
-        for row in scan(file):
-            if row.record is None or (limit is not None and row.record.segment >= limit):
-                continue
-            lines.append(row.text if clock is None or row.record.utc_us is not None
-                         else format_row(_with_utc(row.record, clock)))
-            if len(lines) >= _BLOCK_ROWS:
-                yield _joined(lines)
-                lines.clear()
+    for row in rows:
+        lines.append(row.text if clock is None or row.record.utc_us is not None
+                     else format_row(_with_utc(row.record, clock)))
+        if len(lines) >= _BLOCK_ROWS:
+            yield _joined(lines)
+            lines.clear()
     yield _joined(lines)
 
 
@@ -211,8 +238,7 @@ def _joined(lines: list[str]) -> bytes:
 
 
 def _with_utc(record: WindowRecord, clock: ClockMap) -> WindowRecord:
-    return replace(record, utc_us=record.t_us + clock.offset_us,
-                   flags=tuple(flag for flag in record.flags if flag != "time_unset"))
+    return replace(without_utc(record), utc_us=record.t_us + clock.offset_us)
 
 
 def remove_part(files: FileSystem, part: Path) -> None:

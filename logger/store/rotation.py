@@ -35,20 +35,22 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
+from logger.store.intact_rows import Tally
 from logger.store.log_name import LogName, finished_path
 from logger.store.recovery import (
     Repaired,
     fill_finished,
     finish_part,
     first_segments_later,
+    logs_of_session,
     remove_part,
     repair,
     repair_part,
-    take_tally,
+    tally_of,
 )
 from logger.store.segment_log import HEADER, format_row
 from logger.store.session_counter import COUNTER_NAME, next_session
-from logger.store.sidecar import SIDECAR_BYTES, ClockMap, Tally, read_sidecar, store_sidecar
+from logger.store.sidecar import SIDECAR_BYTES, ClockMap, read_sidecar, store_sidecar
 
 __all__ = [
     "COUNTER_NAME", "SIDECAR_BYTES", "ClockMap", "FileSystem", "LogName", "Repaired", "SegmentLog", "Tally",
@@ -153,11 +155,10 @@ class SegmentLog:
             part = self._left[0]
             finished: Path | None = finished_path(part)
             if part.exists():
-                logs = [path for path in part.parent.glob(f"{self.session:05d}-*.csv*") if LogName.of(path)]
-                limit = first_segments_later(logs)[part]
+                limit = first_segments_later(self._files, logs_of_session(part))[part]
                 finished = repair_part(self._files, part, limit, self._clock).finished
             if finished is not None and finished.exists():
-                self._without_utc.append((finished, take_tally(finished)))
+                self._without_utc.append((finished, tally_of(self._files, finished)))
             self._left.pop(0)
         self._fill_earlier()
 

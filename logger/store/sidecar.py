@@ -14,6 +14,7 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.store.checksum import json_sha256
+from logger.store.intact_rows import Hole, Tally
 from logger.store.log_name import LogName, sidecar_path
 from logger.store.whole_file import replace_file
 
@@ -30,24 +31,6 @@ class ClockMap:
     """UTC of a session: ``utc_us = t_us + offset_us``."""
 
     offset_us: int
-
-
-@dataclass(frozen=True)
-class Tally:
-    """What a log holds.
-
-    rows             intact rows
-    unset            those of them without UTC
-    damaged_lines    lines that are not intact; the torn one is not among them
-    torn_tail        the file ends in the middle of a row
-    repeated         intact rows that stand in the next part too; they are not among ``rows``
-    """
-
-    rows: int = 0
-    unset: int = 0
-    damaged_lines: int = 0
-    torn_tail: bool = False
-    repeated: int = 0
 
 
 @dataclass(frozen=True)
@@ -103,6 +86,7 @@ def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: st
             "rows_without_utc": tally.unset if state == "finished" else None,
             "damaged_lines_left_out": tally.damaged_lines,
             "torn_tail_repaired": tally.torn_tail,
+            **({"segments_lost": tally.holes} if tally.holes else {}),
         },
     }
     plain = json.loads(json.dumps(content, allow_nan=False))  # keys and lists as a reader will find them
@@ -129,6 +113,21 @@ def sidecar_or_nothing(log: Path, files: FileSystem | None = None) -> dict[str, 
         return read_sidecar(log, files) or {}
     except (ValueError, OSError):
         return {}
+
+
+def repairs_of(content: dict[str, Any]) -> Tally:
+    """What a sidecar says of earlier repairs of its log: damaged lines, a torn tail, holes. What cannot be is left
+    out."""
+    said = content.get("log")
+    if not isinstance(said, dict):
+        return Tally()
+    lines, holes = said.get("damaged_lines_left_out"), said.get("segments_lost")
+    return Tally(damaged_lines=lines if type(lines) is int else 0, torn_tail=said.get("torn_tail_repaired") is True,
+                 holes=tuple(Hole(*hole) for hole in holes if _is_hole(hole)) if isinstance(holes, list) else ())
+
+
+def _is_hole(hole: object) -> bool:
+    return isinstance(hole, list) and len(hole) == 2 and all(type(end) is int for end in hole)
 
 
 def clock_of(sidecar: dict[str, Any]) -> ClockMap | None:

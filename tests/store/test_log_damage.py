@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store import recovery
+from logger.store.intact_rows import MOST_HOLES
 from logger.store.rotation import ClockMap, SegmentLog, read_sidecar, repair
 from logger.store.segment_log import HEADER, format_row, read_log
 from logger.store.verify import verify
@@ -34,10 +34,10 @@ def test_the_place_of_damaged_rows_stands_in_the_sidecar_and_verify_tells_it(tmp
     part.write_text(rows_of(1, 2, 3, 4, 5).replace(f"\n{format_row(window(3, utc=True))}\n", "\n?\n"))
     repair(tmp_path)
     sidecar = read_sidecar(tmp_path / "00001-001.csv") or {}
-    assert sidecar["log"]["rows_lost_between"] == [[2, 4]]
+    assert sidecar["log"]["segments_lost"] == [[3, 3]]
     check, = verify([tmp_path])
     assert (check.ok, check.gaps) == (True, 0)
-    assert check.notes == ("line 4: after segment 2 rows were damaged: a repair has left them out",)
+    assert check.notes == ("line 4: segments 3 to 3 were damaged: a repair has left them out",)
 
 
 def test_a_gap_without_damage_is_still_one(tmp_path: Path) -> None:
@@ -71,24 +71,24 @@ def test_what_was_lost_is_still_known_when_utc_is_filled_in(tmp_path: Path) -> N
     repair(tmp_path)
     assert all(record.utc_us is not None for record in read_log(tmp_path / "00001-001.csv").records)
     said = (read_sidecar(tmp_path / "00001-001.csv") or {})["log"]
-    assert (said["rows_lost_between"], said["damaged_lines_left_out"]) == ([[1, 3]], 1)
+    assert (said["segments_lost"], said["damaged_lines_left_out"]) == ([[2, 2]], 1)
     assert problems(tmp_path) == []
 
 
 def test_more_holes_than_are_listed_are_one(tmp_path: Path) -> None:
-    segments = range(1, 2 * recovery.MOST_HOLES + 9, 2)
+    segments = range(1, 2 * MOST_HOLES + 9, 2)
     text = "?\n".join(f"{format_row(window(segment, utc=True))}\n" for segment in segments)
     (tmp_path / "00001-001.csv.part").write_text(f"{HEADER}\n{text}")
     repair(tmp_path)
     said = (read_sidecar(tmp_path / "00001-001.csv") or {})["log"]
-    assert len(said["rows_lost_between"]) == recovery.MOST_HOLES
+    assert len(said["segments_lost"]) == MOST_HOLES
     assert problems(tmp_path) == []
 
 
-@pytest.mark.parametrize("holes", [7, [7], [[1]], [[1, "5"]], [[True, 5]], {"1": 5}])
+@pytest.mark.parametrize("holes", [7, [7], [[2]], [[2, "4"]], [[True, 5]], [[3, 4]], [[2, 3]], {"2": 4}])
 def test_holes_that_are_none_excuse_nothing(tmp_path: Path, holes: object) -> None:
     (tmp_path / "00001-001.csv").write_text(rows_of(1, 5))
-    (tmp_path / "00001-001.json").write_text(json.dumps({"log": {"rows": 2, "rows_lost_between": holes}}))
+    (tmp_path / "00001-001.json").write_text(json.dumps({"log": {"rows": 2, "segments_lost": holes}}))
     assert problems(tmp_path) == ["line 3: gap: expected segment 2, found 5"]
 
 

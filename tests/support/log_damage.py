@@ -120,8 +120,9 @@ def damaged_part(folder: Path, case: tuple[int, int]) -> Found:
     lost = 0
     for _ in range(trials):
         image, last = _session_image(rng)
-        name = rng.choice([name for name in image if name.endswith(".part")])
-        image[name] = damaged(image[name], rng)
+        parts = sorted(name for name in image if name.endswith(".part"))
+        name = rng.choice(parts)
+        image[name] = damaged(image[name], rng, may_be_cut=name == parts[-1])
         lines = {line for name, data in image.items() if ".csv" in name for line in data.split(b"\n")}
         kept = [segment for segment in range(1, last + 1) if format_row(window(segment, utc=True)).encode() in lines]
         after = lay_out(folder / "after", image)
@@ -155,8 +156,8 @@ def _session_image(rng: random.Random) -> tuple[dict[str, bytes], int]:
     return image, segment
 
 
-def damaged(data: bytes, rng: random.Random) -> bytes:
-    """Other bits, bytes, sectors or lengths somewhere; never a whole number of lines, which leaves no trace."""
+def damaged(data: bytes, rng: random.Random, may_be_cut: bool = True) -> bytes:
+    """Other bits, bytes, sectors or lengths somewhere; never cut to a whole number of lines, which leaves no trace."""
     begin = rng.randrange(len(data))
     length = min(rng.choice((1, 3, 40, 512, 3000)), len(data) - begin)
     kind = rng.randrange(6)
@@ -166,12 +167,12 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
         return data[:begin] + bytes(length) + data[begin + length:]
     if kind == 2:
         return data[:begin] + rng.randbytes(length) + data[begin + length:]
-    if kind == 3:  # two lines become one
+    if kind == 3 and b"\n" in data[begin:]:  # two lines become one
         newline = data.index(b"\n", begin)
         return data[:newline] + data[newline + 1:]
-    if kind == 4 and begin and data[begin - 1:begin] != b"\n":  # torn
+    if kind == 4 and may_be_cut and begin and data[begin - 1:begin] != b"\n":  # torn
         return data[:begin]
-    return data[:begin] + b"0123456789"[:length] + data[begin + length:]
+    return data[:begin] + bytes(rng.choices(b"0123456789", k=length)) + data[begin + length:]
 
 
 def both_damaged(folder: Path, case: tuple[int, int]) -> Found:
@@ -185,11 +186,12 @@ def both_damaged(folder: Path, case: tuple[int, int]) -> Found:
                  for ending in ("csv", "csv.part")}
         image = {f"00001-001.{ending}": "".join(f"{line}\n" for line in text).encode()
                  for ending, text in lines.items()}
-        for name in image:
+        for name in list(image):
             for _ in range(rng.randrange(1, 3)):
                 image[name] = damaged(image[name], rng)
         written = {line.encode(): max(0, place) for text in lines.values() for place, line in enumerate(text)}
         kept = {written.get(line, 0) for data in image.values() for line in data.split(b"\n")} - {0}
+        image["00001-001.json"] = json.dumps({"log": {"rows": len(rows)}}).encode()
         after = lay_out(folder / "after", image)
         repair(after, RefusingFiles())
         logs = list(after.glob("*.csv"))
