@@ -16,11 +16,19 @@ from logger.store.intact_rows import Hole, IntactRow, IntactRows, Tally, take_ta
 from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
 from logger.store.segment_log import HEADER, format_row
 from logger.store.session_counter import COUNTER_NAME
-from logger.store.set_aside import Warn, disk_words, set_aside, warn_in_journal
+from logger.store.set_aside import (
+    Warn,
+    disk_words,
+    file_words,
+    is_taken,
+    set_aside,
+    set_aside_if_possible,
+    warn_in_journal,
+)
 from logger.store.sidecar import ClockMap, clock_of, read_sidecar, repairs_of, sidecar_or_nothing, store_sidecar
-from logger.store.whole_file import replace_file, temporary_path, write_file
+from logger.store.whole_file import name_of_temporary, replace_file, write_temporary
 
-_OWN_TEMPORARY = re.compile(r"(\d{5,}-\d{3,}\.(csv|json)|" + COUNTER_NAME + r")\.tmp")
+_OWN_NAME = re.compile(r"\d{5,}-\d{3,}\.(csv|csv\.part|json)")
 _BLOCK_ROWS = 256
 
 
@@ -36,6 +44,20 @@ class Repaired:
     tally: Tally
     problem: str = ""
 
+    @property
+    def words(self) -> str:
+        """What was done, in a sentence."""
+        if self.problem:
+            return f"{self.part.name} could not be repaired: {self.problem}"
+        damaged = _counted(self.tally.damaged_lines, "damaged line") + " and a torn one" * self.tally.torn_tail
+        if self.finished is None:
+            return f"removed {self.part.name}: no intact row, {damaged}"
+        return f"finished {self.finished.name}: {_counted(self.tally.rows, 'row')}; left out {damaged}"
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
+
 
 def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> list[Repaired]:
     """Put the folder right after a service that was killed: finish its parts, in order of their names.
@@ -46,40 +68,79 @@ def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_i
     """
     files = files or FileSystem()
     for path in list(directory.iterdir()):
-        if _OWN_TEMPORARY.fullmatch(path.name):
-            files.remove(path)
+        _clear(files, path, warn)
     sessions: dict[int, list[Path]] = defaultdict(list)
     for path in directory.iterdir():
-        if name := LogName.of(path):
+        if (name := LogName.of(path)) and path.is_file():
             sessions[name.session].append(path)
     done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
-    for sidecar in directory.glob("*.json"):
+    for sidecar in list(directory.glob("*.json")):
         log = sidecar.with_suffix(".csv")
-        if LogName.of(log) and not log.exists() and not open_path(log).exists() and _is_of_open_part(sidecar):
-            files.remove(sidecar)  # its part had not yet got its name
+        if LogName.of(log) and not is_taken(log) and not is_taken(open_path(log)):
+            _remove_lone(files, sidecar, warn)
     return done
+
+
+def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
+    """Remove a temporary file that a cut has left. What has the name of a log, a sidecar or such a file and is none is
+    put aside."""
+    whole_name = name_of_temporary(path) or path.name
+    is_temporary = whole_name != path.name
+    if not (_OWN_NAME.fullmatch(whole_name) or (is_temporary and whole_name == COUNTER_NAME)):
+        return
+    why = "" if path.is_file() else "not a file"
+    if is_temporary:
+        try:
+            files.remove(path)
+        except OSError as error:
+            why = disk_words(error)
+        else:
+            return
+    if why:
+        set_aside_if_possible(files, path, why, warn)
+
+
+def _remove_lone(files: FileSystem, sidecar: Path, warn: Warn) -> None:
+    """Remove the sidecar of a part that had not yet got its name. That of a finished log which somebody took away
+    stays."""
+    try:
+        said = (read_sidecar(sidecar, files) or {}).get("log")
+        if isinstance(said, dict) and said.get("state") == "open":
+            files.remove(sidecar)
+    except (ValueError, OSError) as error:
+        set_aside_if_possible(files, sidecar, disk_words(error) if isinstance(error, OSError) else str(error), warn)
 
 
 def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list[Repaired]:
     """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
     which knows one; finished files get it first, for it is lost with the last part."""
     parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
-    clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part))) is not None]
+    clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part, files))) is not None]
     clock = clocks[-1] if clocks else None
     try:
         for finished in sorted(set(logs).difference(parts)):
-            if clock is not None and _may_lack_utc(finished):
-                fill_finished(files, finished, tally_of(files, finished), clock, warn)
+            if clock is not None and _may_lack_utc(files, finished):
+                _fill_if_readable(files, finished, clock, warn)
     except OSError as error:
-        return [Repaired(part, None, Tally(), str(error)) for part in parts]
+        return [Repaired(part, None, Tally(), file_words(error)) for part in parts]
     later = first_segments_later(files, logs) if parts else {}
     done = []
     for part in parts:
         try:
             done.append(repair_part(files, part, later[part], clock, warn))
         except OSError as error:
-            done.append(Repaired(part, None, Tally(), str(error)))
+            done.append(Repaired(part, None, Tally(), file_words(error)))
     return done
+
+
+def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: Warn) -> None:
+    """Give a finished file its UTC; one that cannot be read does not get it, and keeps no other from being finished."""
+    try:
+        tally = tally_of(files, finished)
+    except OSError as error:
+        warn(f"{finished.name}: {disk_words(error)}; its rows get no UTC")
+    else:
+        fill_finished(files, finished, tally, clock, warn)
 
 
 def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
@@ -156,9 +217,9 @@ def _place(log: Path) -> tuple[int, Path]:
     return (name.part if name else 0), log
 
 
-def _may_lack_utc(finished: Path) -> bool:
+def _may_lack_utc(files: FileSystem, finished: Path) -> bool:
     """False where the sidecar says that no row does."""
-    said = sidecar_or_nothing(finished).get("log")
+    said = sidecar_or_nothing(finished, files).get("log")
     return not isinstance(said, dict) or said.get("rows_without_utc") != 0
 
 
@@ -196,9 +257,9 @@ def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dic
     filled = tally if clock is None else replace(tally, unset=0)
     if limit is not None and not tally.rows:
         filled = replace(filled, holes=(Hole(limit - tally.damaged_rows, limit - 1),))
-    write_file(files, temporary_path(finished), _lines(IntactRows(files, logs, limit), clock))
+    temporary = write_temporary(files, finished, _lines(IntactRows(files, logs, limit), clock))
     store_sidecar(files, part, given, "finished", filled, clock)
-    files.rename(temporary_path(finished), finished)
+    files.rename(temporary, finished)
     files.sync_directory(part.parent)
     return finished
 
@@ -247,8 +308,3 @@ def remove_part(files: FileSystem, part: Path) -> None:
     files.sync_directory(part.parent)
     files.remove(part)
     files.sync_directory(part.parent)
-
-
-def _is_of_open_part(sidecar: Path) -> bool:
-    said = sidecar_or_nothing(sidecar).get("log")
-    return isinstance(said, dict) and said.get("state") == "open"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import re
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -19,6 +20,7 @@ Warn = Callable[[str], None]
 """Takes a sentence for the journal and for ``ridelog status``."""
 
 ENDING = ".aside"
+_ASIDE = re.compile(re.escape(ENDING) + r"(-\d+)?\Z")
 log = logging.getLogger(__name__)
 
 
@@ -35,7 +37,13 @@ def disk_words(error: OSError) -> str:
         errno.EROFS: "the disk has become read-only",
         errno.EIO: "the disk fails (input/output error)",
     }
-    return words.get(error.errno or 0, str(error))
+    return words.get(error.errno or 0, error.strerror or str(error))
+
+
+def file_words(error: OSError) -> str:
+    """The same, and at which file, where the system says it."""
+    names = [Path(str(name)).name for name in (error.filename, error.filename2) if name is not None]
+    return f"{disk_words(error)}{' at ' if names else ''}{' and '.join(names)}"
 
 
 def is_taken(path: Path) -> bool:
@@ -50,3 +58,16 @@ def set_aside(files: FileSystem, path: Path, why: str, warn: Warn) -> None:
     files.rename(path, aside)
     files.sync_directory(path.parent)
     warn(f"{path.name}: {why}; it is now called {aside.name}")
+
+
+def set_aside_if_possible(files: FileSystem, path: Path, why: str, warn: Warn) -> None:
+    """The same; what cannot be renamed stays, and that is said."""
+    try:
+        set_aside(files, path, why, warn)
+    except OSError as error:
+        warn(f"{path.name}: {why}; it cannot be renamed either ({disk_words(error)}) and is passed over")
+
+
+def names_set_aside(directory: Path) -> list[str]:
+    """What was put aside in a folder and is still there."""
+    return sorted(path.name for path in directory.iterdir() if _ASIDE.search(path.name))
