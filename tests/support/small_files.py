@@ -7,21 +7,24 @@ import os
 import signal
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from itertools import product
 from pathlib import Path
 from typing import BinaryIO, cast
+from unittest.mock import patch
 
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.rotation import ClockMap, SegmentLog
 from logger.store.segment_log import read_log
+from logger.store.space import Limits
 
-from crashes import FACTS, HEADER, OFFSET_US, WHOLE_DISK, event_of, problems, window
+from crashes import FACTS, HEADER, OFFSET_US, event_of, problems, window
 from fault_trials import Found, Hazard, found
 from faulty_disk import RefusingFiles
 
+ROOM = Limits(10**9, 0)
 SESSION = 2
 ROWS = 6
 OPEN_PART = f"{SESSION:05d}-002.csv.part"
@@ -93,10 +96,10 @@ def left_by_a_kill(folder: Path) -> None:
     """A finished session, and one of which the second part is open; counter, a dump, what an export leaves."""
     folder.mkdir()
     files = RefusingFiles()
-    first = Storage(folder, FACTS, 10**6, None, WHOLE_DISK, lambda: 0, files)
+    first = Storage(folder, FACTS, 10**6, None, ROOM, lambda: 0, files)
     first.log.append(window(1, utc=True))
     first.close()
-    killed = Storage(folder, FACTS, 10**6, HEADER, WHOLE_DISK, lambda: 0, files)
+    killed = Storage(folder, FACTS, 10**6, HEADER, ROOM, lambda: 0, files)
     for segment in range(1, ROWS + 1):
         killed.log.append(window(segment, utc=False))
         killed.record(event_of(segment))
@@ -128,6 +131,7 @@ FAULTS: dict[str, tuple[tuple[str, ...], int]] = {
     **{f"EIO on {kind}": ((kind,), errno.EIO) for kind in ("open", "read", "remove", "rename", "create")},
     "EIO on all": (("open", "read", "remove", "rename", "create"), errno.EIO),
     "no permission": (("open", "create"), errno.EACCES),
+    "dead inode": (("open", "read", "remove", "rename", "create", "stat"), errno.EUCLEAN),
 }
 
 
@@ -152,6 +156,20 @@ def at_most_s(seconds: int) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
+@contextmanager
+def not_even_looked_at(name: str) -> Iterator[None]:
+    """The system does not say what has this name."""
+    look = Path.stat
+
+    def stat(path: Path, *, follow_symlinks: bool = True) -> os.stat_result:
+        if path.name == name:
+            raise OSError(errno.EUCLEAN, os.strerror(errno.EUCLEAN), str(path))
+        return look(path, follow_symlinks=follow_symlinks)
+
+    with patch.object(Path, "stat", stat):
+        yield
+
+
 def _start_beside(folder: Path, name: str, fault: str) -> Found:
     folder = folder / "log"
     left_by_a_kill(folder)
@@ -163,9 +181,11 @@ def _start_beside(folder: Path, name: str, fault: str) -> Found:
             (folder / name).write_bytes(b"half")
         files = DeadFile(name, *FAULTS[fault])
     taken = {path.name[:5] for path in folder.iterdir()}
-    storage = Storage(folder, FACTS, 10**6, HEADER, WHOLE_DISK, lambda: 0, files)
+    with not_even_looked_at(name) if "stat" in FAULTS.get(fault, ((),))[0] else nullcontext():
+        storage = Storage(folder, FACTS, 10**6, HEADER, ROOM, lambda: 0, files)
     status = storage.status()
     assert status.trouble == "", f"no session begins: {status.trouble}"
+    assert status.room_bytes > 0
     assert storage.log.session is not None
     assert f"{storage.log.session:05d}" not in taken, "a session number was given twice"
     storage.log.append(window(1, utc=True))
@@ -177,7 +197,7 @@ def _start_beside(folder: Path, name: str, fault: str) -> Found:
     if (was_hit or stays) and not name.startswith(("exported", "logger")):  # those belong to the export
         assert any(name in words for words in status.notices), f"not named: {status.notices}"
     storage.close()
-    Storage(folder, FACTS, 10**6, None, WHOLE_DISK, lambda: 0, RefusingFiles()).close()
+    Storage(folder, FACTS, 10**6, None, ROOM, lambda: 0, RefusingFiles()).close()
     if name != OPEN_PART or fault not in THINGS:  # there the rows themselves were replaced
         rows = rows_of(folder)
         assert [record.segment for record in rows] == list(range(1, ROWS + 1)), f"rows: {len(rows)}"
@@ -209,8 +229,8 @@ def is_file(path: Path) -> bool:
 
 HAZARDS = (
     Hazard("small file that cannot be read, removed or replaced", f"each of {len(NAMES)} names in the folder of a "
-           "killed service: EIO on opening, reading, removing, renaming or writing it, or on all; no permission; a "
-           "folder, a pipe, a link to nothing or to itself in its place",
+           "killed service: EIO on opening, reading, removing, renaming or writing it, or on all; no permission; "
+           "an inode that cannot even be looked at; a folder, a pipe, a link to nothing or to itself in its place",
            "a new session begins and takes rows, under a number that was not used; what is in the way gets another "
            "name or is passed over, and `status` names it; no row of the session before is lost, and on a sound disk "
            "`ridelog verify` has nothing against the folder", "{asides.total:.0f} put aside", start_beside,
