@@ -18,7 +18,7 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
-from logger.store.set_aside import Warn, disk_words, set_aside_if_possible, warn_in_journal
+from logger.store.set_aside import Warn, disk_words, is_file, set_aside_if_possible, warn_in_journal
 from logger.units import US_PER_S
 
 ENDING = ".dump.gz"
@@ -140,7 +140,7 @@ def repair_recordings(directory: Path, files: FileSystem, warn: Warn = warn_in_j
             else:
                 files.remove(part)
         except OSError as error:
-            if not part.is_file():
+            if not is_file(part):
                 set_aside_if_possible(files, part, disk_words(error), warn)
             else:
                 warn(f"{part.name}: {disk_words(error)}; it stays as it is until the next start")

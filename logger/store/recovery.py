@@ -20,6 +20,7 @@ from logger.store.set_aside import (
     Warn,
     disk_words,
     file_words,
+    is_file,
     is_taken,
     set_aside,
     set_aside_if_possible,
@@ -71,7 +72,7 @@ def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_i
         _clear(files, path, warn)
     sessions: dict[int, list[Path]] = defaultdict(list)
     for path in directory.iterdir():
-        if (name := LogName.of(path)) and path.is_file():
+        if (name := LogName.of(path)) and is_file(path):
             sessions[name.session].append(path)
     done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
     for sidecar in list(directory.glob("*.json")):
@@ -88,7 +89,7 @@ def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
     is_temporary = whole_name != path.name
     if not (_OWN_NAME.fullmatch(whole_name) or (is_temporary and whole_name == COUNTER_NAME)):
         return
-    why = "" if path.is_file() else "not a file"
+    why = "" if is_file(path) else "not a file"
     if is_temporary:
         try:
             files.remove(path)
@@ -147,7 +148,7 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMa
                 warn: Warn = warn_in_journal) -> Repaired:
     """Finish one part, but for its rows of segments from ``limit`` on. A finished file of the same name is merged."""
     finished = finished_path(part)
-    logs = (finished, part) if finished.exists() else (part,)
+    logs = (finished, part) if is_taken(finished) else (part,)
     found = IntactRows(files, logs, limit)
     tally = take_tally(found)
     if len(logs) > 1 and not (found.only_in_last or tally.contradictions or _is_damaged(files, finished)):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import logging
 import re
+import stat
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -47,8 +48,28 @@ def file_words(error: OSError) -> str:
 
 
 def is_taken(path: Path) -> bool:
-    """True when something has this name, a link to nothing too."""
-    return path.is_symlink() or path.exists()
+    """True when something has this name, a link to nothing too, or what cannot even be looked at."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def file_size(path: Path) -> int | None:
+    """Bytes of a regular file; None for anything else, and for what cannot even be looked at."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size if stat.S_ISREG(found.st_mode) else None
+
+
+def is_file(path: Path) -> bool:
+    """True for a regular file that can be looked at."""
+    return file_size(path) is not None
 
 
 def set_aside(files: FileSystem, path: Path, why: str, warn: Warn) -> None:

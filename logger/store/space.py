@@ -24,6 +24,7 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from logger.store.recording import ENDING
+from logger.store.set_aside import file_size, is_file, is_taken
 
 RESERVE_BYTES = 50_000_000
 STEP_BYTES = 5_000_000
@@ -99,7 +100,7 @@ class SpaceKeeper:
     def _measure(self) -> int:
         room = self._files.free_bytes(self._directory) - self._limits.floor_bytes
         if self._limits.quota_bytes is not None:
-            used = sum(path.stat().st_size for path in self._directory.iterdir() if path.is_file())
+            used = sum(file_size(path) or 0 for path in self._directory.iterdir())
             room = min(room, self._limits.quota_bytes - used)
         return room
 
@@ -109,19 +110,19 @@ class SpaceKeeper:
         found = []
         for path in self._directory.iterdir():
             name = _FINISHED.fullmatch(path.name)
-            if name is None or not path.is_file() or (name[3] == ".json" and not self._is_alone(path)):
+            if name is None or not is_file(path) or (name[3] == ".json" and not self._is_alone(path)):
                 continue
             is_dump = name[3] == ENDING
             sidecar = path.with_suffix(".json")
-            paths = (path, sidecar) if name[3] == ".csv" and sidecar.exists() else (path,)
-            size_bytes = sum(each.stat().st_size for each in paths)
+            paths = (path, sidecar) if name[3] == ".csv" and is_taken(sidecar) else (path,)
+            size_bytes = sum(file_size(each) or 0 for each in paths)
             is_exported = all(each.name in exported for each in paths)
             found.append((int(name[1]), int(name[2] or 0), _Kept(paths, size_bytes, is_dump, is_exported)))
         return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]
 
     @staticmethod
     def _is_alone(sidecar: Path) -> bool:
-        return not any(sidecar.with_suffix(ending).exists() for ending in (".csv", ".csv.part"))
+        return not any(is_taken(sidecar.with_suffix(ending)) for ending in (".csv", ".csv.part"))
 
     def _make_room(self, goal_bytes: int, files: list[_Kept]) -> None:
         for kept in files:
