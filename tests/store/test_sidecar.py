@@ -81,6 +81,7 @@ def test_an_open_part_with_an_older_sidecar_gets_its_utc(tmp_path: Path) -> None
     (tmp_path / "00001-001.json").write_text(json.dumps({"clock_map": {"offset_us": OFFSET_US}}))
     repair(tmp_path)
     assert read_log(tmp_path / "00001-001.csv").records[0].utc_us is not None
+    assert verify([tmp_path])[0].notes == ("sidecar: not checked: it was written without a checksum",)
 
 
 def test_a_damaged_sidecar_of_an_open_part_is_kept_beside(tmp_path: Path) -> None:
