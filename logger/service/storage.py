@@ -46,6 +46,7 @@ class Storage:
         self._files = files or FileSystem()
         self._space = SpaceKeeper(directory, limits, exported_names, self._files)
         self._notices: list[str] = []
+        self._warned: set[str] = set()
         self._looked_us = now_us()
         self._look()
         self.log = LastingLog(self._begin, now_us)
@@ -113,8 +114,11 @@ class Storage:
         return SegmentLog(self._directory, session, self._facts, self._max_file_bytes, self._files)
 
     def _warn(self, words: str) -> None:
-        log.warning("%s", words)
+        """For the status, and once for the journal: while no session can begin it is tried over and over."""
         self._notices.append(words)
+        if words not in self._warned:
+            self._warned.add(words)
+            log.warning("%s", words)
 
     def _shown_notices(self) -> tuple[str, ...]:
         more = len(self._notices) - SHOWN_NOTICES

@@ -26,7 +26,16 @@ from logger.store.set_aside import (
     set_aside_if_possible,
     warn_in_journal,
 )
-from logger.store.sidecar import ClockMap, clock_of, read_sidecar, repairs_of, sidecar_or_nothing, store_sidecar
+from logger.store.sidecar import (
+    UNCHECKED,
+    ClockMap,
+    clock_of,
+    load_sidecar,
+    read_sidecar,
+    repairs_of,
+    sidecar_or_nothing,
+    store_sidecar,
+)
 from logger.store.whole_file import name_of_temporary, replace_file, write_temporary
 
 _OWN_NAME = re.compile(r"\d{5,}-\d{3,}\.(csv|csv\.part|json)")
@@ -240,11 +249,15 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tal
 def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
     """The sidecar, to be written anew. One that is damaged or cannot be read is put aside."""
     try:
-        return read_sidecar(log, files) or {}
+        sidecar = load_sidecar(log, files)
     except ValueError as error:
         why = f"damaged: {error}"
     except OSError as error:
         why = disk_words(error)
+    else:
+        if sidecar is None or sidecar.is_checked:
+            return sidecar.content if sidecar else {}
+        return sidecar.content | {UNCHECKED: True}
     set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock", warn)
     return {}
 

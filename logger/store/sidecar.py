@@ -21,6 +21,9 @@ from logger.store.whole_file import replace_file
 SIDECAR_BYTES = 1_000_000
 """Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
 
+UNCHECKED = "taken_over_unchecked"
+"""In a sidecar that a repair has made of one without a checksum."""
+
 _FORMAT = 1
 _SEAL = frozenset({"format", "sha256"})
 LATEST_UTC_US = 4_102_444_800_000_000  # 2100-01-01
@@ -35,7 +38,8 @@ class ClockMap:
 
 @dataclass(frozen=True)
 class Sidecar:
-    """What lies beside a log. ``is_checked``: it fits its checksum; False: an older version wrote it, without one."""
+    """What lies beside a log. ``is_checked``: it fits its checksum, and always did; False: an older version wrote it,
+    without one, and a repair may have taken it over."""
 
     content: dict[str, Any]
     is_checked: bool
@@ -60,10 +64,10 @@ def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     if not isinstance(found, dict):
         raise ValueError("expected a JSON object")
     content = {key: value for key, value in found.items() if key not in _SEAL}
-    is_checked = not _SEAL.isdisjoint(found)
-    if is_checked and not _fits(found, content):
+    is_sealed = not _SEAL.isdisjoint(found)
+    if is_sealed and not _fits(found, content):
         raise ValueError("expected content that fits its checksum")
-    return Sidecar(content, is_checked)
+    return Sidecar(content, is_sealed and content.get(UNCHECKED) is not True)
 
 
 def read_sidecar(log: Path, files: FileSystem | None = None) -> dict[str, Any] | None:
