@@ -287,14 +287,14 @@ class DumpWriter:
             self._files.write(self._descriptor, data)
 
 
-def intact_bytes(path: Path) -> int:
+def intact_bytes(path: Path, files: FileSystem | None = None) -> int:
     """How far a compressed recording that was cut off is intact, from its begin to the end of a gzip member [bytes].
 
     It is looked at from its end, for only what was not yet on the disk can be torn. Raises ``OSError``.
     """
-    size = path.stat().st_size
     looked = _TAIL_BYTES
-    with path.open("rb") as file:
+    with (files or FileSystem()).open(path) as file:
+        size = file.seek(0, os.SEEK_END)
         while True:
             file.seek(max(0, size - looked))
             tail = file.read()

@@ -94,6 +94,10 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
     if storage.dumps_lost:
         steps.append(f"Raw bytes: {storage.dumps_lost} dumps were removed, unexported, to make room for logs. Export "
                      "more often, or set record_dump: false.")
+    if storage.notices:
+        steps += [f"Log folder: {words}." for words in storage.notices]
+        steps.append("Log folder: copy the logs away, look at what ends in .aside and delete it; if more comes, the "
+                     "card is dying: replace it.")
     return steps
 
 

@@ -7,9 +7,11 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from drivers.disk import FileSystem
 from drivers.dump import Event, open_dump
 from drivers.hardware import open_i2c, open_serial
 from drivers.ports import I2cBus
@@ -82,9 +84,14 @@ def _serve(config: Config, stop: Stop) -> None:
 
 
 def _make(directory: Path) -> None:
-    """The folder of the logs. Raises BadInput where no folder can be or may be written to."""
+    """The folder of the logs, on the disk before anything in it is. Raises BadInput where no folder can be or may be
+    written to."""
     try:
+        missing = [folder for folder in (directory, *directory.parents) if not folder.exists()]
         directory.mkdir(parents=True, exist_ok=True)
+        for folder in reversed(missing):
+            with suppress(OSError):  # it is no reason to log nothing
+                FileSystem().sync_directory(folder.parent)
     except (PermissionError, NotADirectoryError, FileExistsError) as error:
         raise BadInput(f"{directory}: expected a folder for the logs ({error.strerror})") from None
     if not (os.access(directory, os.W_OK | os.X_OK) or _is_read_only(directory)):

@@ -66,6 +66,7 @@ class StorageStatus:
     room_bytes          what may still be written: up to the quota, down to the floor of free space
     exported_removed    files removed to make room, of which a stick holds a copy
     dumps_lost          dumps removed to make room for logs though they had not been exported
+    notices             files in the folder of logs that cannot be read, removed or finished, or that were put aside
     """
 
     trouble: str = ""
@@ -77,6 +78,7 @@ class StorageStatus:
     room_bytes: int = 0
     exported_removed: int = 0
     dumps_lost: int = 0
+    notices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,8 @@ def read_status(path: Path) -> ServiceStatus | None:
             fields["last_window"] = WindowRecord(**{**window, "flags": tuple(window["flags"])})
         fields["accelerometer"] = _sensor(fields["accelerometer"])
         fields["gps"] = _sensor(fields["gps"])
-        fields["storage"] = StorageStatus(**fields["storage"])
+        storage = fields["storage"]
+        fields["storage"] = StorageStatus(**{**storage, "notices": tuple(map(str, storage["notices"]))})
         fields["notices"] = tuple(map(str, fields["notices"]))
         status = ServiceStatus(**fields)
     except FileNotFoundError:

@@ -18,10 +18,14 @@ from logger.store.exported import exported_names
 from logger.store.lasting import LastingLog
 from logger.store.recording import Recording, repair_recordings
 from logger.store.rotation import SegmentLog, next_session, repair
+from logger.store.set_aside import names_set_aside
 from logger.store.space import Limits, SpaceKeeper
 from logger.units import US_PER_S
 
 LOOK_US = 10 * US_PER_S
+SHOWN_NOTICES = 5
+"""Most notices about the folder in the status, one screen with the rest; all are in the journal."""
+
 log = logging.getLogger(__name__)
 
 
@@ -41,6 +45,8 @@ class Storage:
         self._now_us = now_us
         self._files = files or FileSystem()
         self._space = SpaceKeeper(directory, limits, exported_names, self._files)
+        self._notices: list[str] = []
+        self._warned: set[str] = set()
         self._looked_us = now_us()
         self._look()
         self.log = LastingLog(self._begin, now_us)
@@ -90,14 +96,34 @@ class Storage:
             room_bytes=self._space.room_bytes,
             exported_removed=self._space.exported_removed,
             dumps_lost=self._space.dumps_lost,
+            notices=self._shown_notices(),
         )
 
     def _begin(self) -> SegmentLog:
-        for repaired in repair(self._directory, self._files):
-            log.info("repaired %s", repaired)
-        repair_recordings(self._directory, self._files)
-        session = next_session(self._directory, self._files)
+        self._notices.clear()
+        put_aside_before = names_set_aside(self._directory)
+        for repaired in repair(self._directory, self._files, self._warn):
+            if repaired.problem:
+                self._warn(f"{repaired.words}; it stays as it is until the next start")
+            else:
+                log.info("%s", repaired.words)
+        repair_recordings(self._directory, self._files, self._warn)
+        session = next_session(self._directory, self._files, self._warn)
+        if put_aside_before:
+            self._notices.append(f"put aside at an earlier start: {', '.join(put_aside_before[:SHOWN_NOTICES])}")
         return SegmentLog(self._directory, session, self._facts, self._max_file_bytes, self._files)
+
+    def _warn(self, words: str) -> None:
+        """For the status, and once for the journal: while no session can begin it is tried over and over."""
+        self._notices.append(words)
+        if words not in self._warned:
+            self._warned.add(words)
+            log.warning("%s", words)
+
+    def _shown_notices(self) -> tuple[str, ...]:
+        more = len(self._notices) - SHOWN_NOTICES
+        rest = (f"and {more} more, see journalctl -u ridelog",) if more > 0 else ()
+        return (*self._notices[:SHOWN_NOTICES], *rest)
 
     def _look(self) -> None:
         try:

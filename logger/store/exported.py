@@ -26,6 +26,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from logger.store.checksum import json_sha256
 from logger.store.open_folder import OpenFolder
 
 MARKS_NAME = "exported.json"
@@ -67,7 +68,7 @@ def read_marks(log_folder: OpenFolder) -> dict[str, Mark]:
     """All marks by name; none where the file of marks is missing or not whole."""
     try:
         content = json.loads(log_folder.read(MARKS_NAME, MAX_BYTES))
-        if content["format"] != _FORMAT or content["sha256"] != _digest(content["files"]):
+        if content["format"] != _FORMAT or content["sha256"] != json_sha256(content["files"]):
             return {}
         return {name: Mark(**mark) for name, mark in content["files"].items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
@@ -80,7 +81,7 @@ def mark_exported(log_folder: OpenFolder, new: Mapping[str, Mark]) -> None:
         marks = read_marks(log_folder) | dict(new)
         present = set(log_folder.names())
         files = {name: asdict(mark) for name, mark in sorted(marks.items()) if name in present}
-        content = {"format": _FORMAT, "sha256": _digest(files), "files": files}
+        content = {"format": _FORMAT, "sha256": json_sha256(files), "files": files}
         log_folder.replace(MARKS_NAME, (json.dumps(content, indent=0) + "\n").encode("ascii"))
 
 
@@ -123,7 +124,3 @@ def _turn(log_folder: OpenFolder) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _digest(files: Mapping[str, object]) -> str:
-    return hashlib.sha256(json.dumps(files, sort_keys=True, separators=(",", ":")).encode("ascii")).hexdigest()

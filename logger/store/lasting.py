@@ -11,13 +11,13 @@ is a log (at the start of the service) is the same case.
 
 from __future__ import annotations
 
-import errno
 import logging
 from collections import deque
 from collections.abc import Callable
 
 from logger.records import WindowRecord
 from logger.store.rotation import ClockMap, SegmentLog
+from logger.store.set_aside import disk_words
 from logger.units import US_PER_S
 
 WAITING_ROWS = 5000
@@ -26,17 +26,6 @@ WAITING_ROWS = 5000
 FIRST_WAIT_US = US_PER_S
 LONGEST_WAIT_US = 30 * US_PER_S
 log = logging.getLogger(__name__)
-
-
-def disk_words(error: OSError) -> str:
-    """What is wrong with the disk, for a person."""
-    words = {
-        errno.ENOSPC: "the disk is full",
-        errno.EDQUOT: "the disk quota is used up",
-        errno.EROFS: "the disk has become read-only",
-        errno.EIO: "the disk fails (input/output error)",
-    }
-    return words.get(error.errno or 0, str(error))
 
 
 class LastingLog:

@@ -14,12 +14,11 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
-from logger.store.lasting import disk_words
+from logger.store.set_aside import Warn, disk_words, is_file, set_aside_if_possible, warn_in_journal
 from logger.units import US_PER_S
 
 ENDING = ".dump.gz"
@@ -127,19 +126,24 @@ class Recording:
         self._retry_us = self._now_us() + RETRY_US
 
 
-def repair_recordings(directory: Path, files: FileSystem) -> None:
+def repair_recordings(directory: Path, files: FileSystem, warn: Warn = warn_in_journal) -> None:
     """End the dumps that were left open, at the last block that is intact; one without any goes.
 
-    A file on which the disk fails is left as it is.
+    A file on which the disk fails is left as it is, and named.
     """
     for part in sorted(path for path in directory.iterdir() if _OPEN_NAME.fullmatch(path.name)):
-        with suppress(OSError):
-            size = intact_bytes(part)
+        try:
+            size = intact_bytes(part, files)
             if size:
                 files.cut(part, size)
                 _finish(files, part)
             else:
                 files.remove(part)
+        except OSError as error:
+            if not is_file(part):
+                set_aside_if_possible(files, part, disk_words(error), warn)
+            else:
+                warn(f"{part.name}: {disk_words(error)}; it stays as it is until the next start")
 
 
 def _finish(files: FileSystem, part: Path) -> None:

@@ -157,6 +157,8 @@ COLUMNS = (
 )
 HEADER = ",".join([*(column.name for column in COLUMNS), "crc32"])
 _HEADER_BYTES = HEADER.encode()
+SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
+"""A row of which nothing is known but what always is."""
 
 
 def format_row(record: WindowRecord) -> str:
@@ -194,6 +196,7 @@ class Row(NamedTuple):
     record     its record; None: the line is damaged
     problem    what was expected, when the line is damaged
     torn       the file ends in this line, without a newline
+    size       bytes of the line, when it is damaged
     """
 
     number: int
@@ -201,6 +204,7 @@ class Row(NamedTuple):
     record: WindowRecord | None
     problem: str
     torn: bool
+    size: int = 0
 
 
 def scan(file: BinaryIO) -> Iterator[Row]:
@@ -214,14 +218,15 @@ def scan(file: BinaryIO) -> Iterator[Row]:
             if text != _HEADER_BYTES:
                 rest = text[len(_HEADER_BYTES) + 1:] if text.startswith(_HEADER_BYTES) else text
                 yield from _salvaged(1, rest, torn)
-                yield Row(1, "", None, "expected the header line of a segment log", torn)
+                yield Row(1, "", None, "expected the header line of a segment log", torn, len(text))
             continue
         try:
             row = text.decode("ascii")
             yield Row(number, row, parse_row(row), "", torn)
         except (BadRow, UnicodeDecodeError) as error:
             yield from _salvaged(number, text, torn)
-            yield Row(number, "", None, str(error) if isinstance(error, BadRow) else "expected ASCII text", torn)
+            problem = str(error) if isinstance(error, BadRow) else "expected ASCII text"
+            yield Row(number, "", None, problem, torn, len(text))
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,13 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from logger.store.recording import ENDING
+from logger.store.set_aside import file_size, is_file, is_taken
 
 RESERVE_BYTES = 50_000_000
 STEP_BYTES = 5_000_000
 """When the reserve is down to this, dumps go; when logs were stopped they go on above it."""
 
-_FINISHED = re.compile(r"(\d{5,})-?(\d*)(\.csv|\.dump\.gz)")
+_FINISHED = re.compile(r"(\d{5,})-?(\d*)(\.csv|\.json|\.dump\.gz)")
 log = logging.getLogger(__name__)
 
 
@@ -45,7 +46,8 @@ class Limits:
 
 @dataclass(frozen=True)
 class _Kept:
-    """A finished log or dump, with its sidecar: names, bytes, whether a stick holds it too."""
+    """A finished log with its sidecar, or a dump: names in the order of their removal, bytes, whether a stick holds it
+    too. The log goes first: a sidecar that a cut leaves alone is exported as well, and goes when room is made again."""
 
     paths: tuple[Path, ...]
     size_bytes: int
@@ -98,7 +100,7 @@ class SpaceKeeper:
     def _measure(self) -> int:
         room = self._files.free_bytes(self._directory) - self._limits.floor_bytes
         if self._limits.quota_bytes is not None:
-            used = sum(path.stat().st_size for path in self._directory.iterdir() if path.is_file())
+            used = sum(file_size(path) or 0 for path in self._directory.iterdir())
             room = min(room, self._limits.quota_bytes - used)
         return room
 
@@ -108,14 +110,19 @@ class SpaceKeeper:
         found = []
         for path in self._directory.iterdir():
             name = _FINISHED.fullmatch(path.name)
-            if name is None or not path.is_file():
+            if name is None or not is_file(path) or (name[3] == ".json" and not self._is_alone(path)):
                 continue
             is_dump = name[3] == ENDING
-            paths = (path,) if is_dump else (path.with_suffix(".json"), path)  # a lone sidecar would stay for ever
-            size_bytes = sum(each.stat().st_size for each in paths if each.exists())
-            is_exported = all(each.name in exported for each in paths if each.exists())
+            sidecar = path.with_suffix(".json")
+            paths = (path, sidecar) if name[3] == ".csv" and is_taken(sidecar) else (path,)
+            size_bytes = sum(file_size(each) or 0 for each in paths)
+            is_exported = all(each.name in exported for each in paths)
             found.append((int(name[1]), int(name[2] or 0), _Kept(paths, size_bytes, is_dump, is_exported)))
         return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]
+
+    @staticmethod
+    def _is_alone(sidecar: Path) -> bool:
+        return not any(is_taken(sidecar.with_suffix(ending)) for ending in (".csv", ".csv.part"))
 
     def _make_room(self, goal_bytes: int, files: list[_Kept]) -> None:
         for kept in files:
@@ -124,13 +131,14 @@ class SpaceKeeper:
             try:
                 for path in kept.paths:
                     self._files.remove(path)
+                    self._files.sync_directory(self._directory)
             except OSError as error:
-                log.warning("%s cannot be removed to make room: %s", kept.paths[-1].name, error)
+                log.warning("%s cannot be removed to make room: %s", kept.paths[0].name, error)
                 continue
             self.room_bytes += kept.size_bytes
             if kept.is_exported:
                 self.exported_removed += 1
-                log.info("removed %s to make room; it was exported", kept.paths[-1].name)
+                log.info("removed %s to make room; it was exported", kept.paths[0].name)
             else:
                 self.dumps_lost += 1
-                log.warning("removed %s to make room for logs; it was NOT exported", kept.paths[-1].name)
+                log.warning("removed %s to make room for logs; it was NOT exported", kept.paths[0].name)

@@ -11,20 +11,23 @@ A stick that logs were exported to is compared with the manifest that lies besid
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from drivers.dump import ACCELEROMETERS, LINE_BYTES, intact_bytes, open_dump
 from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
+from logger.store.intact_rows import Hole, are_in_holes
+from logger.store.log_name import LogName
 from logger.store.manifest import is_of_export, parse_manifest
 from logger.store.open_folder import OpenFolder
-from logger.store.rotation import LogName, read_sidecar
 from logger.store.segment_log import Row, scan
+from logger.store.sidecar import load_sidecar, repairs_of
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
@@ -49,6 +52,7 @@ class FileCheck:
     records_corrupt    lines that are damaged; a dump is read up to the first
     gaps               places where records are missing or time goes back
     problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
+    notes              what is not wrong and should be known, as many at most
     ok                 nothing is wrong
     """
 
@@ -60,6 +64,7 @@ class FileCheck:
     records_corrupt: int
     gaps: int
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -69,24 +74,32 @@ class FileCheck:
 
 @dataclass
 class _Findings:
-    """What is being found in one file, the records at its ends, and the damaged lines beyond them."""
+    """What is being found in one file, the records at its ends, the damaged lines beyond them, and the holes that a
+    repair has left."""
 
     good: int = 0
     torn: int = 0
     corrupt: int = 0
     gaps: int = 0
     problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     first: WindowRecord | None = None
     last: WindowRecord | None = None
     damaged_before_first: int = 0
     damaged_since_last: int = 0
+    holes: tuple[Hole, ...] = ()
 
     def wrong(self, problem: str) -> None:
         if len(self.problems) < SHOWN_PROBLEMS:
             self.problems.append(problem)
 
+    def note(self, words: str) -> None:
+        if len(self.notes) < SHOWN_PROBLEMS:
+            self.notes.append(words)
+
     def check(self, path: Path, kind: str, state: str) -> FileCheck:
-        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems))
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems),
+                         tuple(self.notes))
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
@@ -142,6 +155,8 @@ def _is_dump(path: Path) -> bool:
 def _check_log(path: Path) -> _Findings:
     findings = _Findings()
     lines = 0
+    sidecar = None if _is_part(path) else _load_sidecar(path, findings)
+    findings.holes = repairs_of(sidecar).holes if sidecar else ()
     with path.open("rb") as file:
         for row in scan(file):
             lines += 1
@@ -152,7 +167,8 @@ def _check_log(path: Path) -> _Findings:
     if not _is_part(path):
         if empty:
             findings.wrong("line 1: torn: expected the header line of a segment log")
-        _compare_with_sidecar(path, findings)
+        if sidecar is not None:
+            _compare_with_sidecar(sidecar, findings)
     return findings
 
 
@@ -174,14 +190,22 @@ def _take_row(findings: _Findings, row: Row, is_open: bool) -> None:
         findings.first = row.record
         findings.damaged_before_first = findings.damaged_since_last
     else:
-        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}")
+        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}",
+                 findings.holes)
     findings.last = row.record
     findings.damaged_since_last = 0
 
 
-def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, damaged: int, place: str) -> None:
-    """Note a gap between two records that should follow each other, but for as many damaged lines between them."""
-    if not 1 <= after.segment - before.segment <= damaged + 1:
+def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, damaged: int, place: str,
+             holes: Sequence[Hole]) -> None:
+    """Note a gap between two records that should follow each other, but for as many damaged lines between them and for
+    the holes that repairs have left."""
+    follows = 1 <= after.segment - before.segment <= damaged + 1
+    missing = before.segment + 1, after.segment - 1
+    is_hole = not follows and missing[0] <= missing[1] and are_in_holes(*missing, holes)
+    if is_hole:
+        findings.note(f"{place}: segments {missing[0]} to {missing[1]} were damaged: a repair has left them out")
+    if not (follows or is_hole):
         findings.gaps += 1
         findings.wrong(f"{place}: gap: expected segment {before.segment + 1}, found {after.segment}")
     elif after.t_us < before.t_us:
@@ -190,16 +214,22 @@ def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, dam
                        f"found {after.t_us / US_PER_S:.6f} s")
 
 
-def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
+def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
     try:
-        sidecar = read_sidecar(path)
-    except ValueError as error:
-        findings.wrong(f"sidecar: {error}")
-        return
+        sidecar = load_sidecar(path)
+    except (ValueError, OSError) as error:
+        findings.wrong(f"sidecar: {error.strerror if isinstance(error, OSError) else error}")
+        return None
     if sidecar is None:
         if LogName.of(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
-        return
+        return None
+    if not sidecar.is_checked:
+        findings.note("sidecar: not checked: it was written without a checksum")
+    return sidecar.content
+
+
+def _compare_with_sidecar(sidecar: dict[str, Any], findings: _Findings) -> None:
     said = sidecar.get("log")
     rows = said.get("rows") if isinstance(said, dict) else None
     if not isinstance(rows, int):
@@ -210,16 +240,23 @@ def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
 
 
 def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
-    """Note rows and files that are missing between the parts of a session."""
+    """Note rows and files that are missing between the parts of a session; a part without a row may hold a hole."""
     named = sorted((path.parent, name.session, name.part, not name.finished, path)
                    for path in logs if (name := LogName.of(path)))
-    for (folder, session, part, _, before), (next_folder, next_session, next_part, _, after) in pairwise(named):
-        if (folder, session) != (next_folder, next_session) or part == next_part:
-            continue
-        earlier, later = logs[before], logs[after]
-        if earlier.last is not None and later.first is not None:
-            damaged = earlier.damaged_since_last + later.damaged_before_first
-            _compare(later, earlier.last, later.first, damaged, f"after {before.name}")
+    for _, session in groupby(named, key=lambda entry: entry[:2]):
+        before: tuple[int, Path] | None = None
+        holes: list[Hole] = []
+        for *_, part, _, path in session:
+            findings = logs[path]
+            holes += findings.holes
+            if findings.last is None or findings.first is None:
+                continue
+            if before is not None and before[0] != part:
+                earlier = logs[before[1]]
+                damaged = earlier.damaged_since_last + findings.damaged_before_first
+                assert earlier.last is not None
+                _compare(findings, earlier.last, findings.first, damaged, f"after {before[1].name}", holes)
+            before, holes = (part, path), list(findings.holes)
 
 
 def _check_dump(path: Path) -> FileCheck:

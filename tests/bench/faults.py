@@ -29,7 +29,9 @@ sys.path.append(str(BENCH.parent / "support"))
 import crashes  # noqa: E402
 import disk_faults  # noqa: E402
 import killing  # noqa: E402
+import log_damage  # noqa: E402
 import sensor_faults  # noqa: E402
+import small_files  # noqa: E402
 import stick_faults  # noqa: E402
 from fault_trials import Hazard, Line, run  # noqa: E402
 from fuzz_targets import TARGETS  # noqa: E402
@@ -42,6 +44,7 @@ MEMORY = Path("/dev/shm")
 ON_DISK = (killing.KILLS, killing.WRITES_NO_MORE)
 TRIED = {
     "Power cuts and kills": (*crashes.HAZARDS, killing.KILLS),
+    "Damaged and unreadable files": (*log_damage.HAZARDS, *small_files.HAZARDS),
     "Disks": (*disk_faults.HAZARDS, killing.WRITES_NO_MORE),
     "Sensors": sensor_faults.HAZARDS,
     "USB sticks": stick_faults.HAZARDS,
@@ -64,8 +67,10 @@ when it was tried. It is made by `python tests/bench/faults.py`; the counts are 
   the motion in them: a power cut in or just after such a loss can cost the last `bridge_s` + 13 s (23 s as shipped).
   Beyond that it costs the window that is being filled: 7.62 m of road, and the time that the car has stood in it.
 - **Kill.** A process that is killed loses no row that was written to the log.
-- **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32. After the next start every file is
-  finished, beside its sidecar, and `ridelog verify` has nothing against it. No session number is given twice.
+- **Damage.** No damaged row is ever taken for a good one: each carries a CRC-32, each sidecar a checksum. After the
+  next start every file that can be read is finished, beside its sidecar, and `ridelog verify` has nothing against it:
+  the sidecar names the segments that damage has taken. What cannot be read or removed stops nothing: it is put aside
+  (`.aside`) or passed over, and `ridelog status` names it. No session number is given twice.
 - **Disk.** Full, failing or read-only: the service stays up and says so; what was written stays; rows wait in memory
   and are written as soon as the disk takes them. Raw dumps make room for logs; an unexported log is never removed.
   A card that does not even refuse (an fsync that never returns) stops the main loop: systemd's watchdog ends the

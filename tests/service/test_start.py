@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from drivers.disk import FileSystem
 from logger.service import start
 from logger.service.config import Config, LogConfig
 from logger.service.live import HANG_US, Listener, monotonic_us
@@ -55,6 +56,17 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 def test_quota_and_floor_are_those_of_the_settings(built: dict[str, Any]) -> None:
     assert built["limits"] == Limits(123_456_789, 987_654)
+
+
+def test_a_folder_that_is_made_is_on_the_disk_before_anything_in_it(tmp_path: Path,
+                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(FileSystem, "sync_directory", lambda _, directory: synced.append(directory))
+    start._make(tmp_path / "var" / "lib" / "log")
+    assert synced == [tmp_path, tmp_path / "var", tmp_path / "var" / "lib"]
+    synced.clear()
+    start._make(tmp_path / "var" / "lib" / "log")
+    assert synced == []
 
 
 def test_the_watchdog_is_fed_while_every_device_returns(built: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from logger.records import WindowRecord
-from logger.store import rotation, segment_log
+from logger.store import intact_rows, segment_log
 from logger.store.rotation import (
     COUNTER_NAME,
     SIDECAR_BYTES,
@@ -499,7 +499,7 @@ def test_a_repair_reads_each_of_many_parts_a_few_times(tmp_path: Path, monkeypat
         (tmp_path / f"00001-{part:03d}.csv.part").write_text(f"{HEADER}\n")
     (tmp_path / f"00001-{count + 1:03d}.csv.part").write_text(f"{HEADER}\n{format_row(row(1))}\n")
     read = []
-    monkeypatch.setattr(rotation, "scan", lambda file: read.append(file.name) or segment_log.scan(file))
+    monkeypatch.setattr(intact_rows, "scan", lambda file: read.append(file.name) or segment_log.scan(file))
     repair(tmp_path, CutFiles())
     assert sorted(texts(tmp_path)) == [f"00001-{count + 1:03d}.csv", f"00001-{count + 1:03d}.json"]
     assert len(read) <= 3 * (count + 1)

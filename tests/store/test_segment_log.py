@@ -13,7 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.records import WindowRecord
-from logger.store.segment_log import HEADER, LINE_BYTES, BadRow, format_row, parse_row, read_log, scan
+from logger.store.segment_log import (
+    COLUMNS,
+    HEADER,
+    LINE_BYTES,
+    SHORTEST_ROW_BYTES,
+    BadRow,
+    format_row,
+    parse_row,
+    read_log,
+    scan,
+)
 
 RECORD = WindowRecord(
     segment=123, drive=2, t_us=1_234_567_890, utc_us=1_783_160_100_250_999, duration_s=0.456789,
@@ -187,3 +197,10 @@ def test_read_log(tmp_path: Path) -> None:
     content = read_log(path)
     assert content.records == (parse_row(format_row(RECORD)), UNKNOWN)
     assert content.damaged_lines == 2
+
+
+def test_no_row_is_shorter_than_one_of_which_nothing_is_known() -> None:
+    unknown = {column.attribute: None for column in COLUMNS}
+    counts = {"segment": 1, "t_us": 0, "comfort": "", "iri_class": "", "flags": (), "drive": 1, "duration_s": 0.0,
+              "samples": 0, "clipped_samples": 0}
+    assert len(format_row(WindowRecord(**(unknown | counts)))) + 1 == SHORTEST_ROW_BYTES

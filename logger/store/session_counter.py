@@ -1,0 +1,56 @@
+"""The number of a session: never given twice, whatever is lost."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from pathlib import Path
+
+from drivers.disk import FileSystem
+from logger.store.set_aside import Warn, disk_words, file_words, is_taken, set_aside_if_possible, warn_in_journal
+from logger.store.whole_file import replace_file
+
+COUNTER_NAME = "last-session"
+_COUNTER_BYTES = 64
+_SESSION_NAME = re.compile(r"(\d{5,})[-.]")
+
+
+def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> int:
+    """A session number that no file of the folder has or ever had, stored before it is given out.
+
+    It counts on from the counter file and from the names that are there, whichever is higher, so that neither a
+    lost counter nor logs that were moved away bring a number back. A counter that cannot be read is put aside; where it
+    cannot be replaced either, the names of the session's own files keep its number. Raises ``OSError``.
+    """
+    files = files or FileSystem()
+    counter = directory / COUNTER_NAME
+    last = _read_counter(files, counter, warn)
+    matches = (_SESSION_NAME.match(path.name) for path in directory.iterdir())
+    number = max([last, *(int(match[1]) for match in matches if match)]) + 1
+    text = str(number)
+    is_in_the_way = is_taken(counter)
+    try:
+        replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
+    except OSError as error:
+        if not is_in_the_way:
+            raise
+        warn(f"{counter.name}: {file_words(error)}; it cannot be replaced, and sessions are numbered by the files that "
+             "are there")
+    return number
+
+
+def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
+    """The last number given out; 0 when the file is missing, damaged or cannot be read."""
+    try:
+        with files.open(path) as file:
+            text, _, check = file.read(_COUNTER_BYTES).decode("ascii", "replace").strip().partition(" ")
+    except FileNotFoundError:
+        return 0
+    except OSError as error:
+        set_aside_if_possible(files, path, disk_words(error), warn)
+        return 0
+    return int(text) if check == _check(text) and text.isdecimal() else 0
+
+
+def _check(text: str) -> str:
+    return f"{zlib.crc32(text.encode('ascii', 'replace')):08x}"

@@ -1,0 +1,94 @@
+"""What a disk will not read or remove is put aside under another name, so that it stops nothing and is not lost.
+
+Problem. One file that cannot be read, or a folder under the name of a file, must not keep a service from its work at
+every start. Solution. It is renamed: ``<name>.aside``, which no reader takes for a log, and somebody is warned. The
+session number in the name counts as before.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import re
+import stat
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+from drivers.disk import FileSystem
+
+Warn = Callable[[str], None]
+"""Takes a sentence for the journal and for ``ridelog status``."""
+
+ENDING = ".aside"
+_ASIDE = re.compile(re.escape(ENDING) + r"(-\d+)?\Z")
+log = logging.getLogger(__name__)
+
+
+def warn_in_journal(words: str) -> None:
+    """A warning for the journal only."""
+    log.warning("%s", words)
+
+
+def disk_words(error: OSError) -> str:
+    """What is wrong with the disk, for a person."""
+    words = {
+        errno.ENOSPC: "the disk is full",
+        errno.EDQUOT: "the disk quota is used up",
+        errno.EROFS: "the disk has become read-only",
+        errno.EIO: "the disk fails (input/output error)",
+    }
+    return words.get(error.errno or 0, error.strerror or str(error))
+
+
+def file_words(error: OSError) -> str:
+    """The same, and at which file, where the system says it."""
+    names = [Path(str(name)).name for name in (error.filename, error.filename2) if name is not None]
+    return f"{disk_words(error)}{' at ' if names else ''}{' and '.join(names)}"
+
+
+def is_taken(path: Path) -> bool:
+    """True when something has this name, a link to nothing too, or what cannot even be looked at."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def file_size(path: Path) -> int | None:
+    """Bytes of a regular file; None for anything else, and for what cannot even be looked at."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size if stat.S_ISREG(found.st_mode) else None
+
+
+def is_file(path: Path) -> bool:
+    """True for a regular file that can be looked at."""
+    return file_size(path) is not None
+
+
+def set_aside(files: FileSystem, path: Path, why: str, warn: Warn) -> None:
+    """Rename what has this name, and say so. Raises ``OSError`` when it cannot be renamed."""
+    names = (path.with_name(path.name + ENDING + ("" if number == 1 else f"-{number}")) for number in count(1))
+    aside = next(name for name in names if not is_taken(name))
+    files.rename(path, aside)
+    files.sync_directory(path.parent)
+    warn(f"{path.name}: {why}; it is now called {aside.name}")
+
+
+def set_aside_if_possible(files: FileSystem, path: Path, why: str, warn: Warn) -> None:
+    """The same; what cannot be renamed stays, and that is said."""
+    try:
+        set_aside(files, path, why, warn)
+    except OSError as error:
+        warn(f"{path.name}: {why}; it cannot be renamed either ({disk_words(error)}) and is passed over")
+
+
+def names_set_aside(directory: Path) -> list[str]:
+    """What was put aside in a folder and is still there."""
+    return sorted(path.name for path in directory.iterdir() if _ASIDE.search(path.name))

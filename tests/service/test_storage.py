@@ -1,0 +1,81 @@
+"""What the storage says at its start about the files it finds."""
+
+from __future__ import annotations
+
+import errno
+import logging
+from pathlib import Path
+
+import pytest
+
+from logger.commands.status import advice
+from logger.service import storage as storage_module
+from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, read_status, write_status
+from logger.service.storage import Storage
+from logger.store.rotation import SegmentLog
+
+from crashes import FACTS, WHOLE_DISK, window
+from faulty_disk import RefusingFiles
+
+
+def storage_in(folder: Path, files: RefusingFiles | None = None) -> Storage:
+    return Storage(folder, FACTS, 10**6, None, WHOLE_DISK, lambda: 0, files or RefusingFiles())
+
+
+def killed(folder: Path, session: int = 1) -> None:
+    log = SegmentLog(folder, session, FACTS, 10**6, RefusingFiles())
+    log.append(window(1, utc=True))
+
+
+def test_a_repair_that_failed_is_not_called_one(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    killed(tmp_path)
+    files = RefusingFiles()
+    files.error = errno.EROFS
+    files.refuses = lambda kind: True
+    with caplog.at_level(logging.INFO):
+        status = storage_in(tmp_path, files).status()
+    said = [(record.levelname, record.getMessage()) for record in caplog.records if "00001-001" in record.getMessage()]
+    words = ("00001-001.csv.part could not be repaired: the disk has become read-only; it stays as it is until the "
+             "next start")
+    assert said == [("WARNING", words)]
+    assert status.notices == (words,)
+
+
+def test_a_repair_says_what_it_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    killed(tmp_path)
+    with (tmp_path / "00001-001.csv.part").open("a") as part:
+        part.write("?\n2,torn")
+    with caplog.at_level(logging.INFO):
+        assert storage_in(tmp_path).status().notices == ()
+    assert "finished 00001-001.csv: 1 row; left out 1 damaged line and a torn one" in [
+        record.getMessage() for record in caplog.records]
+
+
+def test_what_was_put_aside_is_named_until_it_is_gone(tmp_path: Path) -> None:
+    killed(tmp_path)
+    (tmp_path / "00001-001.json").write_text("{")
+    first = storage_in(tmp_path)
+    assert [words.partition(":")[0] for words in first.status().notices] == ["00001-001.json"]
+    first.close()
+    second = storage_in(tmp_path)
+    assert second.status().notices == ("put aside at an earlier start: 00001-001.json.aside",)
+    second.close()
+    (tmp_path / "00001-001.json.aside").unlink()
+    assert storage_in(tmp_path).status().notices == ()
+
+
+def test_notices_are_shown_with_what_to_do_and_are_bounded(tmp_path: Path) -> None:
+    for session in range(1, 3 * storage_module.SHOWN_NOTICES):
+        killed(tmp_path, session)
+        (tmp_path / f"{session:05d}-001.json").write_text("{")
+    storage = storage_in(tmp_path).status()
+    assert len(storage.notices) == storage_module.SHOWN_NOTICES + 1
+    sensor = SensorStatus("bma220", "/dev/i2c-1", "ok")
+    write_status(tmp_path / "status.json", ServiceStatus("standing", 1, "0", 1.0, 1, sensor, sensor, storage=storage))
+    status = read_status(tmp_path / "status.json")
+    assert status is not None
+    assert status.storage == storage
+    steps = advice(status)
+    assert steps[0].startswith("Log folder: 00001-001.json: damaged: expected a JSON object")
+    assert "replace it" in steps[storage_module.SHOWN_NOTICES + 1]
+    assert StorageStatus().notices == ()
