@@ -96,6 +96,32 @@ def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path,
     assert main(["export", "--removed", "--note", str(note)]) == 0
 
 
+def test_a_stick_is_named_by_its_device_each_time_it_is_plugged_in(logs: Path, stick: Path, note: Path) -> None:
+    again = note.with_name("sda1.28.json")
+    again.touch()
+    assert told(again) == "stick sda1: plugged in, waits for its turn; leave it in"
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(again)]) == 0
+    assert told(again).startswith("stick sda1: 2 files copied")
+
+
+def test_a_copy_that_never_began_is_not_called_complete(stick: Path, note: Path) -> None:
+    note.touch()
+    main(["export", "--unmounted", str(stick), "--note", str(note)])
+    assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+
+
+def test_the_light_goes_out_after_the_note_was_removed(note: Path, tmp_path: Path) -> None:
+    led = tmp_path / "led"
+    led.mkdir()
+    (led / "trigger").write_text("none [mmc0]\n")
+    note.touch()
+    export_command.show_on_led(led, note.parent)
+    assert (led / "trigger").read_text() == "heartbeat"
+    note.unlink()
+    assert main(["export", "--removed", "--note", str(note), "--led", str(led)]) == 0
+    assert (led / "trigger").read_text() == "mmc0"
+
+
 def test_a_stick_that_could_not_be_mounted_is_not_written_to(logs: Path, stick: Path, note: Path) -> None:
     assert main(["export", "--from", str(logs), "--to", str(stick), "--mounted", "--note", str(note)]) == 1
     assert list(stick.iterdir()) == []

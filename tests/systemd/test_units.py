@@ -115,8 +115,8 @@ def test_every_command_line_is_one_that_the_program_takes() -> None:
 def test_no_unit_and_no_rule_runs_a_shell() -> None:
     programs = {inner(line)[0] for unit in (SERVICE, EXPORT) for line in command_lines(unit)}
     assert programs <= {str(PROGRAM), "/usr/bin/mount", "/usr/bin/umount", "/usr/bin/touch", "/usr/bin/rm"}
-    rules = (shipped("systemd") / "90-ridelog.rules").read_text()
-    assert set(re.findall(r'RUN\+="(\S+)', rules)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
+    text = (shipped("systemd") / "90-ridelog.rules").read_text()
+    assert set(re.findall(r'RUN\+="(\S+)', text)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
 
 
 def test_only_mounting_is_done_as_root() -> None:
@@ -185,19 +185,71 @@ def test_devices_are_those_of_i2c_and_serial_ports() -> None:
     assert settings(SERVICE)["DevicePolicy"] == settings(EXPORT)["DevicePolicy"] == ["closed"]
     assert {value.split()[0] for value in settings(SERVICE)["DeviceAllow"]} == {
         "char-i2c", "char-ttyAMA", "char-ttyS", "char-ttyUSB", "char-ttyACM", "char-rfcomm"}
-    assert settings(EXPORT)["DeviceAllow"] == ["/dev/%i rw"]
+
+
+def rules() -> list[list[tuple[str, str, str]]]:
+    """The rules of udev as lists of (key, operator, value)."""
+    lines = [line for line in (shipped("systemd") / "90-ridelog.rules").read_text().splitlines()
+             if line and not line.startswith("#")]
+    token = r'([A-Z]+(?:\{[A-Za-z_]+\})?)(==|!=|\+=|=)"([^"]*)"'
+    assert all(re.fullmatch(rf"{token}(, {token})*", line) for line in lines)
+    return [re.findall(token, line) for line in lines]
+
+
+def the_rule(key: str, operator: str, value: str) -> dict[tuple[str, str], str]:
+    found, = (rule for rule in rules() if (key, operator, value) in rule)
+    return {(key, operator): value for key, operator, value in found}
 
 
 def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
-    lines = [line for line in (shipped("systemd") / "90-ridelog.rules").read_text().splitlines()
-             if line and not line.startswith("#")]
-    token = r'[A-Z]+(?:\{[A-Z_]+\})?(?:==|!=|\+=|=)"[^"]*"'
-    assert all(re.fullmatch(rf"{token}(, {token})*", line) for line in lines)
-    stick, light = lines
-    assert 'ENV{ID_FS_LABEL}=="RIDELOG|ridelog"' in stick
-    assert 'ENV{ID_BUS}=="usb"' in stick
-    started = re.search(r'ENV\{SYSTEMD_WANTS\}\+="([^"]*)"', stick)
-    assert started is not None
-    assert started[1].replace("%k", "") == EXPORT
-    assert 'KERNEL=="ACT"' in light
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    assert stick["ENV{ID_BUS}", "=="] == "usb"
+    assert re.fullmatch(EXPORT.replace("@", "@.+"), stick["ENV{SYSTEMD_WANTS}", "+="])
+    light = the_rule("KERNEL", "==", "ACT")
+    assert light["SUBSYSTEM", "=="] == "leds"
     assert all("/sys/class/leds/ACT" in line for line in runs_of(str(PROGRAM)))
+
+
+def test_a_stick_with_another_file_system_is_refused_in_words() -> None:
+    """Its label asks for the logs: the export starts, cannot mount it, and says which kinds it takes."""
+    assert not [key for key, _ in the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog") if key == "ENV{ID_FS_TYPE}"]
+    copy = next(line for line in runs_of(str(PROGRAM)) if "--to" in line)
+    assert "--mounted" in copy
+
+
+def test_each_time_that_a_stick_is_plugged_in_is_an_instance_of_its_own() -> None:
+    """A name such as sda1 comes back within a second, and systemd refuses to start an instance that it is still
+    stopping, for good. The sequence number of a disk is given out once (Linux 5.15 and later)."""
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    instance = stick["ENV{SYSTEMD_WANTS}", "+="].removeprefix("ridelog-export@").removesuffix(".service")
+    assert "$env{DISKSEQ}" in instance
+    assert stick["SYMLINK", "+="] == f"ridelog/{instance}"
+    assert stick["TAG", "+="] == "systemd"
+    number_of_the_disk = the_rule("IMPORT{parent}", "=", "DISKSEQ")
+    assert number_of_the_disk["ENV{DEVTYPE}", "=="] == "partition"
+    unit = settings(EXPORT)
+    assert unit["BindsTo"] == ["dev-ridelog-%i.device"]
+    assert "dev-ridelog-%i.device" in unit["After"][0].split()
+    assert unit["DeviceAllow"] == ["/dev/ridelog/%i rw"]
+    mount, = runs_of("/usr/bin/mount")
+    assert mount[-2] == "/dev/ridelog/%i"
+    assert all("%i" in value for value in (*unit["ReadWritePaths"][:1], mount[-1]))
+
+
+def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_time() -> None:
+    lines = [inner(line) for line in command_lines(EXPORT)]
+    note = f"{stick_notes.FOLDER}/%i.json"
+    assert lines[0] == ["/usr/bin/touch", note]
+    stopping = [inner(shlex.split(line.lstrip("-+"))) for line in settings(EXPORT)["ExecStopPost"]]
+    assert stopping[:2] == [["/usr/bin/umount", "--quiet", "--lazy", "/run/ridelog-stick/%i"],
+                            ["/usr/bin/rm", "--force", note]]
+    assert all(note in line for line in runs_of(str(PROGRAM)))
+
+
+def test_one_stick_at_a_time_gets_the_logs() -> None:
+    """A stick may have a hundred partitions of that label. The others wait, in a program that takes no memory."""
+    ours = [line for line in command_lines(EXPORT) if inner(line)[0] == str(PROGRAM)]
+    assert all(line[0] == ONE_AT_A_TIME for line in ours)
+    places = {next(word for word in line if word.startswith("/run/")) for line in ours}
+    assert len(places) == 1
+    assert Path(places.pop()).parent == stick_notes.FOLDER
