@@ -17,7 +17,7 @@ from pathlib import Path
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.service.config import Config, find_config, load_config
 from logger.store.export import ExportResult, Progress, export
-from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, write_note
+from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
 
 _PULL = "it may be pulled"
 
@@ -115,7 +115,7 @@ class _Board:
         if self._note is not None:
             before = read_note(self._note)
             try:
-                write_note(self._note, StickNote(self._note.stem, state, ok, text))
+                write_note(self._note, StickNote(stick_of(self._note), state, ok, text))
             except OSError as error:
                 print(f"{self._note}: no note can be kept ({error.strerror})", file=sys.stderr)
                 self._note = None
@@ -132,7 +132,7 @@ class _Board:
         if place.is_mount():
             self.tell("unmounting", False, f"{place} is still mounted; shut down before pulling it")
             return EXIT_CHECK_FAILED
-        if before is None or before.state == "copying":
+        if before is None or before.state in ("waiting", "copying"):
             self.tell("ready", False, f"copying did not end as it should; {_PULL}")
         else:
             self.tell("ready", before.ok, f"{before.text}; {_PULL}")
