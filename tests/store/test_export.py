@@ -168,9 +168,40 @@ def test_a_wrong_place_is_refused(logs: Path, tmp_path: Path, place: str) -> Non
         run(logs, target)
 
 
+@pytest.mark.parametrize("logs_at", ["ridelog", "ridelog/log", "link"])
+def test_a_place_whose_own_folder_would_be_or_hold_the_logs_is_refused(tmp_path: Path, logs_at: str) -> None:
+    """What is copied goes into ``ridelog`` there: with the logs in /var/lib/ridelog, /var/lib is such a place."""
+    (tmp_path / "ridelog").mkdir()
+    (tmp_path / "link").symlink_to("ridelog")
+    logs = tmp_path / logs_at
+    logs.mkdir(exist_ok=True)
+    (logs / "00001-001.csv").write_text("rows\n")
+    before = contents(logs)
+    with pytest.raises(BadInput, match="expected a place apart from the folder of logs"):
+        run(logs, tmp_path)
+    assert contents(logs) == before
+    assert exported_names(logs) == set()
+
+
+def test_a_place_whose_own_folder_leads_into_the_logs_is_refused(logs: Path, tmp_path: Path) -> None:
+    (logs / "inside").mkdir()
+    (tmp_path / "place").mkdir()
+    (tmp_path / "place" / "ridelog").symlink_to(logs / "inside")
+    with pytest.raises(BadInput, match="expected a place apart from the folder of logs"):
+        run(logs, tmp_path / "place")
+
+
 def checked(folder: Path) -> FileCheck:
     other = Path(OTHER_LOGGER).parent.name
     return next(check for check in verify([folder]) if check.kind == "manifest" and check.path.parent.name != other)
+
+
+def test_an_export_of_nothing_passes_the_check_at_the_desk(tmp_path: Path) -> None:
+    for name in ("log", "stick"):
+        (tmp_path / name).mkdir()
+    assert run(tmp_path / "log", tmp_path / "stick").complete
+    check, = verify([tmp_path / "stick"])
+    assert (check.kind, check.ok, check.records_good) == ("manifest", True, 0)
 
 
 def test_what_was_exported_passes_the_check_at_the_desk(logs: Path, stick: Path) -> None:

@@ -219,6 +219,19 @@ def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_p
     writer.close()
 
 
+def test_a_sensor_that_was_silent_is_told_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The recording is what was written: a cable that came loose in the drive is no damage."""
+    path = a_dump(tmp_path / "a.dump", *SAMPLES, Event(5_000_000, "bma220", b"\x00\x04\x40"))
+    check = found(path)
+    assert (counts(check), check.ok, check.problems) == ((51, 0, 0, 1), True, ())
+    words = "gap: nothing from the accelerometer between 0.490000 s and 5.000000 s"
+    assert check.remarks == (words,)
+    assert main(["verify", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [f"    {words}", "ok: 1 file, 51 good, 0 torn, 0 corrupt, 1 gap"]
+    assert main(["verify", "--json", str(path)]) == 0
+    assert json.loads(capsys.readouterr().out)["files"][0]["remarks"] == [words]
+
+
 def test_folders_are_searched_for_logs_and_dumps_only(tmp_path: Path) -> None:
     (tmp_path / "drive").mkdir()
     log_in(tmp_path / "drive", 1).close()
