@@ -1,7 +1,8 @@
 """Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
 is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
 
-Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong.
+Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong,
+nor is the silence of a sensor in a dump, which counts as a gap.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def _totals(checks: list[FileCheck]) -> dict[str, int]:
 
 def _as_json(checks: list[FileCheck], ok: bool) -> dict[str, object]:
     files = [{"path": str(check.path), "kind": check.kind, "state": check.state, "ok": check.ok,
-              **_totals([check]), "problems": list(check.problems)} for check in checks]
+              **_totals([check]), "remarks": list(check.remarks), "problems": list(check.problems)} for check in checks]
     return {"ok": ok, **_totals(checks), "files": files}
 
 
@@ -48,8 +49,8 @@ def _print_text(checks: list[FileCheck], ok: bool) -> None:
     for check in checks:
         state = ", open" if check.state == "open" else ""
         print(f"{check.path} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
-        for problem in check.problems:
-            print(f"    {problem}")
+        for words in (*check.remarks, *check.problems):
+            print(f"    {words}")
     files = "1 file" if len(checks) == 1 else f"{len(checks)} files"
     print(f"{'ok' if ok else 'WRONG'}: {files}, {_counts_in_words(_totals(checks))}")
 

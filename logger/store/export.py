@@ -94,10 +94,11 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
     """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
 
     ``tell`` is called before the first file and after each. What the stick or the card refuses is in the result.
-    Raises BadInput for folders that are not there, or lie within each other.
+    Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them.
     """
-    if stick.resolve().is_relative_to(logs.resolve()):
-        raise BadInput(f"{stick}: expected a place outside of the folder of logs, {logs}")
+    if _overlap(logs, stick / manifest.FOLDER):
+        raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
+                       f"{stick / manifest.FOLDER}")
     with _folder(logs, "with the logs") as card, _folder(stick, "to copy to, such as a mounted stick") as root:
         names = finished_files(card, dumps)
         try:
@@ -139,7 +140,7 @@ class _Export:
         self._marks = read_marks(card)
         self._listed = self._read_manifest()
         on_stick = {name.lower() for name in stick.names()}
-        self._entries = {name: digest for name, digest in self._listed.items() if name in on_stick}
+        self._entries = {name: digest for name, digest in (self._listed or {}).items() if name in on_stick}
         self._fresh: dict[str, Mark] = {}
         self._copied: list[str] = []
         self._there: list[str] = []
@@ -258,7 +259,8 @@ class _Export:
     def _settle(self) -> str | None:
         """Bring the manifest up to date, then remember what it lists. Gives the reason when the stick refuses."""
         try:
-            if self._entries != self._listed:
+            is_first = self._listed is None and not self._failures  # of nothing, perhaps: an export has a manifest
+            if self._entries != (self._listed or {}) or is_first:
                 self._write_manifest()
         except OSError as error:
             return _reason(error)
@@ -272,18 +274,19 @@ class _Export:
 
     def _give_up_unlisted(self, reason: str) -> None:
         """What no manifest lists cannot be checked at the desk: it counts as not copied."""
-        unlisted = {name for name, digest in self._entries.items() if self._listed.get(name) != digest}
+        listed = self._listed or {}
+        unlisted = {name for name, digest in self._entries.items() if listed.get(name) != digest}
         self._failures += [Failure(name, reason) for name in sorted(unlisted)]
         self._copied = [name for name in self._copied if name not in unlisted]
         self._there = [name for name in self._there if name not in unlisted]
 
-    def _read_manifest(self) -> dict[str, str]:
-        """What the stick's manifest lists; nothing for one that is missing, not whole, or another logger's."""
+    def _read_manifest(self) -> dict[str, str] | None:
+        """What the stick's manifest lists; None for one that is missing, not whole, or another logger's."""
         try:
             found = parse_manifest(self._stick.read(manifest.NAME, manifest.MAX_BYTES))
         except (OSError, ValueError):
-            return {}
-        return dict(found.files) if found.logger == self._identity else {}
+            return None
+        return dict(found.files) if found.logger == self._identity else None
 
     def _write_manifest(self) -> None:
         text = format_manifest(Manifest(self._identity, self._entries))
@@ -294,6 +297,26 @@ class _Export:
         if self._stick.read(manifest.NAME, len(text)) != text:
             raise OSError(errno.EIO, "does not read back what was written")
         self._listed = dict(self._entries)
+
+
+def _overlap(one: Path, other: Path) -> bool:
+    """True when two folders, which need not be there, are the same or one holds the other, by whatever path."""
+    lines = [_lineage(one), _lineage(other)]
+    return any(line[0] in other_line for line, other_line in (lines, lines[::-1]) if line[0] is not None)
+
+
+def _lineage(folder: Path) -> list[tuple[int, int] | None]:
+    """What tells a folder and all that hold it from others, itself first: device and inode; None for what is not."""
+    resolved = folder.resolve()
+    return [_identity(path) for path in (resolved, *resolved.parents)]
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _from_card(file: OpenFile) -> Iterator[bytes]:

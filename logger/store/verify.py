@@ -30,7 +30,7 @@ from logger.units import US_PER_S
 DUMP_ENDINGS = (".dump", ".dump.gz")
 OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
 SILENCE_US = US_PER_S
-"""An accelerometer that says nothing for longer has left a gap in a dump."""
+"""An accelerometer that says nothing for longer has left a gap in a dump: told, and no damage of the file."""
 
 SHOWN_PROBLEMS = 20
 """Most problems that are kept in words for one file; all are counted."""
@@ -47,7 +47,8 @@ class FileCheck:
     records_good       rows or events that are as they were written
     records_torn       1 when the file ends in the middle of one
     records_corrupt    lines that are damaged; a dump is read up to the first
-    gaps               places where records are missing or time goes back
+    gaps               places where records are missing or time goes back; where an accelerometer said nothing
+    remarks            the first ``SHOWN_PROBLEMS`` gaps of an accelerometer, in words: they are nothing wrong
     problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
     ok                 nothing is wrong
     """
@@ -59,6 +60,7 @@ class FileCheck:
     records_torn: int
     records_corrupt: int
     gaps: int
+    remarks: tuple[str, ...]
     problems: tuple[str, ...]
 
     @property
@@ -75,6 +77,7 @@ class _Findings:
     torn: int = 0
     corrupt: int = 0
     gaps: int = 0
+    remarks: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     first: WindowRecord | None = None
     last: WindowRecord | None = None
@@ -85,8 +88,13 @@ class _Findings:
         if len(self.problems) < SHOWN_PROBLEMS:
             self.problems.append(problem)
 
+    def remark(self, words: str) -> None:
+        if len(self.remarks) < SHOWN_PROBLEMS:
+            self.remarks.append(words)
+
     def check(self, path: Path, kind: str, state: str) -> FileCheck:
-        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems))
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.remarks),
+                         tuple(self.problems))
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
@@ -253,8 +261,8 @@ def _take_events(findings: _Findings, path: Path) -> None:
                     continue
                 if heard_us is not None and event.t_us - heard_us > SILENCE_US:
                     findings.gaps += 1
-                    findings.wrong(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
-                                   f"and {event.t_us / US_PER_S:.6f} s")
+                    findings.remark(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
+                                    f"and {event.t_us / US_PER_S:.6f} s")
                 heard_us = event.t_us
             if reader.torn_tail:
                 findings.torn = 1

@@ -273,7 +273,7 @@ def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert json.loads(capsys.readouterr().out) == {
         "ok": False, "records_good": 2, "records_torn": 0, "records_corrupt": 0, "gaps": 1,
         "files": [{"path": str(path), "kind": "log", "state": "finished", "ok": False, "records_good": 2,
-                   "records_torn": 0, "records_corrupt": 0, "gaps": 1,
+                   "records_torn": 0, "records_corrupt": 0, "gaps": 1, "remarks": [],
                    "problems": ["line 3: gap: expected segment 2, found 3"]}],
     }
 
