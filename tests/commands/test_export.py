@@ -79,6 +79,18 @@ def test_what_could_not_be_copied_is_told_with_its_reason(
     assert first.endswith("on the stick: Not a directory. 0 files copied (0.0 MB), 0 were there")
 
 
+def test_a_reason_from_outside_cannot_forge_a_line(
+        logs: Path, stick: Path, note: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    evil = "\x1b[2J\nok: 2 files copied"
+    result = export_of_store.ExportResult("0" * 12, failures=(export_of_store.Failure(evil, evil),), set_aside=(evil,))
+    monkeypatch.setattr(export_command, "export", lambda *_: result)
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
+    lines = capsys.readouterr().out.split("\n")
+    assert len(lines) == 4
+    assert all(line.isprintable() for line in (*lines, told(note)))
+
+
 @pytest.mark.parametrize("arguments", [[], ["--to"], ["--to", "a", "--removed"], ["--to", "a", "--unmounted", "b"]])
 def test_wrong_use_is_status_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as leaving:

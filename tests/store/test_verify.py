@@ -267,6 +267,20 @@ def test_command_tells_a_person(tmp_path: Path, capsys: pytest.CaptureFixture[st
     ]
 
 
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_name_cannot_forge_a_line_of_the_answer(
+        tmp_path: Path, listed: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    evil = "\x1b[2J\r\nok: 9 files, 9 good"
+    (tmp_path / evil).mkdir()
+    store(tmp_path / evil / "00001-001.csv", ["x"])
+    if not listed:
+        (tmp_path / evil / "00001-001.csv").rename(tmp_path / f"{evil}.dump")
+    assert main(["verify", str(tmp_path)]) == 1
+    lines = capsys.readouterr().out.split("\n")
+    assert all(line.isprintable() for line in lines)
+    assert [line for line in lines if line.startswith(("ok", "WRONG"))] == [lines[-2]]
+
+
 def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = store(tmp_path / "a.csv", lines_of(row(1), row(3)))
     assert main(["verify", "--json", str(path)]) == 1
