@@ -15,6 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
+from logger.printable import printable
 from logger.service.config import Config, find_config, load_config
 from logger.store.export import ExportResult, Progress, export
 from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if args.mounted and not args.to.is_mount():
         reason = f"{args.to}: no stick could be mounted there; expected one with FAT or exFAT"
         board.tell("unmounting", False, reason)
-        print(reason)
+        print(printable(reason))
         return EXIT_CHECK_FAILED
     board.tell("copying", True, "copying")
     try:
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
     else:
-        print("\n".join(screen(result)))
+        print("\n".join(map(printable, screen(result))))
     return EXIT_DONE if is_well else EXIT_CHECK_FAILED
 
 
@@ -74,7 +75,7 @@ def _logs_of_the_service(config: Path | None) -> Path:
         usual = Config().log.directory
         if not any(usual.glob("*.csv")):
             raise
-        print(f"{error}; the logs in {usual} are copied", file=sys.stderr)
+        print(printable(f"{error}; the logs in {usual} are copied"), file=sys.stderr)
         return usual
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
+from logger.printable import printable
 from logger.report.page import LoggedFile, page
 from logger.report.summary import summarise, summary_json
 from logger.store.rotation import LogName, read_sidecar
@@ -30,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
                           "summary": summary_json(summarise(records))}))
     else:
-        print(f"Report: {args.out} ({len(records)} windows from {len(files)} file{'s' * (len(files) != 1)})")
+        print(printable(f"Report: {args.out} ({len(records)} windows from {len(files)} file{'s' * (len(files) != 1)})"))
     return EXIT_DONE
 
 

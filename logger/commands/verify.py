@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
+from logger.printable import printable
 from logger.store.verify import FileCheck, verify
 
 _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
@@ -48,9 +49,9 @@ def _as_json(checks: list[FileCheck], ok: bool) -> dict[str, object]:
 def _print_text(checks: list[FileCheck], ok: bool) -> None:
     for check in checks:
         state = ", open" if check.state == "open" else ""
-        print(f"{check.path} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
+        print(f"{printable(str(check.path))} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
         for words in (*check.remarks, *check.problems):
-            print(f"    {words}")
+            print(f"    {printable(words)}")
     files = "1 file" if len(checks) == 1 else f"{len(checks)} files"
     print(f"{'ok' if ok else 'WRONG'}: {files}, {_counts_in_words(_totals(checks))}")
 
