@@ -81,6 +81,6 @@ def read_logged(log: Path) -> LoggedFile:
         raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
     try:
         sidecar = read_sidecar(log)
-    except ValueError:
+    except (OSError, ValueError):
         sidecar = None
     return LoggedFile(log.name, content.records, content.damaged_lines, sidecar)

@@ -38,6 +38,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.disk import FileSystem
+from drivers.regular_file import open_regular
 from logger.records import WindowRecord
 from logger.store.segment_log import HEADER, format_row, scan
 
@@ -317,7 +318,7 @@ def read_sidecar(log: Path) -> dict[str, Any] | None:
     """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is
     damaged, nested too deep or larger than ``SIDECAR_BYTES``."""
     try:
-        with _sidecar_path(log).open("rb") as file:
+        with open_regular(_sidecar_path(log)) as file:
             text = file.read(SIDECAR_BYTES + 1)
     except FileNotFoundError:
         return None

@@ -204,6 +204,9 @@ def _compare_with_sidecar(path: Path, findings: _Findings) -> None:
     except ValueError as error:
         findings.wrong(f"sidecar: {error}")
         return
+    except OSError as error:
+        findings.wrong(f"sidecar: expected a readable file ({error.strerror})")
+        return
     if sidecar is None:
         if LogName.of(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
