@@ -11,6 +11,7 @@ import pytest
 from logger.commands import export as export_command
 from logger.commands.main import main
 from logger.commands.status import stick_lines
+from logger.errors import BadInput, CheckFailed
 from logger.service.config import Config, LogConfig
 from logger.store import export as export_of_store
 from logger.store.exported import exported_names
@@ -193,6 +194,36 @@ def test_a_mistake_in_the_settings_keeps_no_log_in_the_car(
     assert "2 files copied" in said.out
     assert "ridelog.yaml" in said.err
     assert f"the logs in {logs} are copied" in said.err
+
+
+def paired(tmp_path: Path, logs: Path, mode: str, more: str = "") -> Path:
+    config = tmp_path / "ridelog.yaml"
+    config.write_text(f"log: {{directory: {logs}}}\nexport: {{pairing: {mode}}}\n{more}")
+    return config
+
+
+def test_a_stick_that_is_not_paired_is_refused_in_its_note(
+        logs: Path, stick: Path, note: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "is_mount", lambda path: True)
+    config, other = paired(tmp_path, logs, "first_stick"), tmp_path / "other"
+    other.mkdir()
+    asked = ["export", "--mounted", "--config", str(config), "--note", str(note)]
+    assert main([*asked, "--to", str(stick)]) == 0
+    with pytest.raises(CheckFailed, match="not the stick"):
+        main([*asked, "--to", str(other)])
+    assert told(note).startswith("stick sda1: WRONG, this is not the stick")
+    assert list(other.iterdir()) == []
+
+
+@pytest.mark.parametrize("mode", ["first_stick", "key_file"])
+def test_a_mistake_in_settings_with_a_pairing_gives_no_logs_away(
+        logs: Path, stick: Path, tmp_path: Path, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = Config(log=LogConfig(logs))
+    monkeypatch.setattr(export_command, "Config", lambda: usual)
+    for more in ("nonsense: 7\n", "nonsense: [\n"):
+        with pytest.raises(BadInput):
+            main(["export", "--config", str(paired(tmp_path, logs, mode, more)), "--to", str(stick)])
+    assert list(stick.iterdir()) == []
 
 
 def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, tmp_path: Path) -> None:
