@@ -7,9 +7,10 @@ may be full, read-only or worn, may carry other cars' logs, and may hold names t
 Solution. Every logger has a folder of its own on the stick, ``ridelog/<identity>``. A file is written there under a
 temporary name, flushed, read back from the medium against the SHA-256 of what was read from the card, and only then
 given its name. What has the name already, and is not the same, is set aside under another name, never overwritten.
-Every few files the manifest is replaced in the same way; only what a manifest that was read back lists is marked as
-exported. So at every instant the marks are true, and a second export copies what the first one did not. Nothing is
-written when all is there, so that a stick that is write-protected by then is no fault.
+Now and then, the more seldom the longer it is, the manifest is replaced in the same way; only what a manifest that was
+read back lists is marked as exported. So at every instant the marks are true, and a second export copies what the first
+one did not. Nothing is written when all is there, so that a stick that is write-protected by then is no fault. What a
+stick holds is never taken into memory as a whole.
 """
 
 from __future__ import annotations
@@ -19,17 +20,21 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from logger.errors import BadInput
 from logger.store import manifest
 from logger.store.exported import Mark, logger_identity, mark_exported, read_marks
-from logger.store.manifest import Manifest, format_manifest, parse_manifest
+from logger.store.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.open_folder import OpenFile, OpenFolder
 
 FILES_PER_MANIFEST = 32
+GROWTH_PER_MANIFEST = 8
+"""The lists are written anew when an eighth has been added: nine times their last length is written in all, and a stick
+that is pulled has at most a ninth of its files to be read once more, which are there."""
+
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
 
@@ -139,8 +144,8 @@ class _Export:
         self._tell = tell
         self._marks = read_marks(card)
         self._listed = self._read_manifest()
-        on_stick = {name.lower() for name in stick.names()}
-        self._entries = {name: digest for name, digest in (self._listed or {}).items() if name in on_stick}
+        listed = self._listed or {}
+        self._entries = {name: listed[name] for name in map(str.lower, stick.each_name()) if name in listed}
         self._fresh: dict[str, Mark] = {}
         self._copied: list[str] = []
         self._there: list[str] = []
@@ -153,17 +158,21 @@ class _Export:
         """Everything in turn; what does not fit is left out from the end."""
         self._stick.clean()
         missing = self._look(names)
+        most = manifest.MAX_FILES - len(self._entries)
+        missing, too_many = missing[:most], missing[most:]
         fitting, short = self._fitting(missing) if missing else ([], 0)
         for number, name in enumerate(fitting, start=1):
             fault = self._copy_one(name)
-            self._tell(Progress(len(names) - len(missing) + number, len(names)))
+            self._tell(Progress(len(self._there) + number, len(names)))
             if fault is not None:
                 self._failures += [Failure(rest, fault) for rest in fitting[number:]]
                 break
-            if len(self._fresh) >= FILES_PER_MANIFEST:
+            if len(self._fresh) >= max(FILES_PER_MANIFEST, len(self._entries) // GROWTH_PER_MANIFEST):
                 self._settle()
         reason = f"no room on the stick: {-(-short // 1000)} kB more are needed"
         self._failures += [Failure(name, reason) for name in missing[len(fitting):]]
+        reason = f"the stick holds {manifest.MAX_FILES} files of this logger, the most: take some off it"
+        self._failures += [Failure(name, reason) for name in too_many]
         if (fault := self._settle()) is not None:
             self._give_up_unlisted(f"the manifest on the stick: {fault}")
         return ExportResult(self._identity, tuple(self._copied), tuple(self._there), tuple(self._failures),
@@ -234,19 +243,24 @@ class _Export:
         except OSError as error:
             raise _CardFault(f"card: {_reason(error)}") from None
         with file:
-            temporary, digest = self._stick.write(_from_card(file))
-            try:
-                if self._stick.sha256(temporary) != digest:
-                    raise OSError(errno.EIO, "does not read back what was written")
-                self._clear(name)
-                self._stick.rename(temporary, name)
-            except OSError:
-                self._stick.discard(temporary)
-                raise
+            digest = self._put(name, _from_card(file), self._clear)
             self._fresh[name] = _mark(file, digest)
             self._bytes += file.stat.st_size
         self._entries[name] = digest
         self._copied.append(name)
+
+    def _put(self, name: str, blocks: Iterable[bytes], make_way: Callable[[str], None]) -> str:
+        """Write a file that gets its name once it was read back; give its SHA-256."""
+        temporary, digest = self._stick.write(blocks)
+        try:
+            if self._stick.sha256(temporary) != digest:
+                raise OSError(errno.EIO, "does not read back what was written")
+            make_way(name)
+            self._stick.rename(temporary, name)
+        except OSError:
+            self._stick.discard(temporary)
+            raise
+        return digest
 
     def _clear(self, name: str) -> None:
         """Set aside what stands in the way: an older state, a damaged copy, or something that is not ours."""
@@ -283,20 +297,20 @@ class _Export:
     def _read_manifest(self) -> dict[str, str] | None:
         """What the stick's manifest lists; None for one that is missing, not whole, or another logger's."""
         try:
-            found = parse_manifest(self._stick.read(manifest.NAME, manifest.MAX_BYTES))
+            with self._stick.open(manifest.NAME) as file:
+                found = read_manifest(file.blocks())
         except (OSError, ValueError):
             return None
         return dict(found.files) if found.logger == self._identity else None
 
     def _write_manifest(self) -> None:
-        text = format_manifest(Manifest(self._identity, self._entries))
-        found = self._stick.find(manifest.NAME)
-        if found is not None and not stat.S_ISREG(found.st_mode):
-            self._clear(manifest.NAME)
-        self._stick.replace(manifest.NAME, text)
-        if self._stick.read(manifest.NAME, len(text)) != text:
-            raise OSError(errno.EIO, "does not read back what was written")
+        self._put(manifest.NAME, manifest_blocks(Manifest(self._identity, self._entries)), self._clear_if_strange)
         self._listed = dict(self._entries)
+
+    def _clear_if_strange(self, name: str) -> None:
+        found = self._stick.find(name)
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            self._clear(name)
 
 
 def _overlap(one: Path, other: Path) -> bool:

@@ -81,7 +81,7 @@ def mark_exported(log_folder: OpenFolder, new: Mapping[str, Mark]) -> None:
         present = set(log_folder.names())
         files = {name: asdict(mark) for name, mark in sorted(marks.items()) if name in present}
         content = {"format": _FORMAT, "sha256": _digest(files), "files": files}
-        log_folder.replace(MARKS_NAME, (json.dumps(content, indent=0) + "\n").encode("ascii"))
+        log_folder.replace(MARKS_NAME, [(json.dumps(content, indent=0) + "\n").encode("ascii")])
 
 
 def logger_identity(log_folder: OpenFolder) -> str:
@@ -102,7 +102,7 @@ def _make_identity(log_folder: OpenFolder) -> str:
         known = _read_identity(log_folder)
         if known is None:
             known = secrets.token_hex(6)
-            log_folder.replace(IDENTITY_NAME, f"{known}\n".encode("ascii"))
+            log_folder.replace(IDENTITY_NAME, [f"{known}\n".encode("ascii")])
     return known
 
 

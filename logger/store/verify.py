@@ -21,7 +21,7 @@ from drivers.errors import DumpError
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
-from logger.store.manifest import is_of_export, parse_manifest
+from logger.store.manifest import is_of_export, read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.rotation import LogName, read_sidecar
 from logger.store.segment_log import Row, scan
@@ -281,7 +281,8 @@ def _check_manifest(path: Path) -> FileCheck:
     findings = _Findings()
     with OpenFolder.at(path.parent) as folder:
         try:
-            listed = parse_manifest(folder.read(manifest.NAME, manifest.MAX_BYTES)).files
+            with folder.open(manifest.NAME) as file:
+                listed = read_manifest(file.blocks()).files
         except OSError as error:
             findings.gaps = 1
             findings.wrong(f"expected a list of what was exported ({error.strerror}); export again")
@@ -290,14 +291,17 @@ def _check_manifest(path: Path) -> FileCheck:
             findings.corrupt = 1
             findings.wrong(f"corrupt: {error}")
             return findings.check(path, "manifest", "manifest")
-        present = set(folder.names())
+        present = {name for name in folder.each_name() if name in listed or _is_of_ours(name)}
         for name, digest in listed.items():
             _compare_with_manifest(findings, folder, name, digest, name in present)
     for name in sorted(present - set(listed)):
-        if LogName.of(Path(name)) or name.endswith(DUMP_ENDINGS):
-            findings.gaps += 1
-            findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
+        findings.gaps += 1
+        findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
     return findings.check(path, "manifest", "manifest")
+
+
+def _is_of_ours(name: str) -> bool:
+    return LogName.of(Path(name)) is not None or name.endswith(DUMP_ENDINGS)
 
 
 def _compare_with_manifest(findings: _Findings, folder: OpenFolder, name: str, digest: str, present: bool) -> None:

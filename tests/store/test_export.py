@@ -216,9 +216,9 @@ def test_names_without_end_on_a_stick_take_no_memory(
             self._entries.close()
 
     (logs / "00005-001.csv").write_text("new\n")
-    card = os.stat(logs).st_ino
+    card = logs.stat().st_ino
     monkeypatch.setattr(open_folder.os, "scandir",
-                        lambda place: real(place) if os.stat(place).st_ino == card else Crowd(place))
+                        lambda place: real(place) if os.fstat(place).st_ino == card else Crowd(place))
     assert most_memory_bytes(lambda: run(logs, stick)) < 20_000_000
     monkeypatch.undo()
     assert_all_there(logs, stick, (*NAMES, "00005-001.csv"))
