@@ -42,7 +42,7 @@ def _totals(checks: list[FileCheck]) -> dict[str, int]:
 
 def _as_json(checks: list[FileCheck], ok: bool) -> dict[str, object]:
     files = [{"path": str(check.path), "kind": check.kind, "state": check.state, "ok": check.ok,
-              **_totals([check]), "remarks": list(check.remarks), "problems": list(check.problems)} for check in checks]
+              **_totals([check]), "problems": list(check.problems), "notes": list(check.notes)} for check in checks]
     return {"ok": ok, **_totals(checks), "files": files}
 
 
@@ -50,7 +50,7 @@ def _print_text(checks: list[FileCheck], ok: bool) -> None:
     for check in checks:
         state = ", open" if check.state == "open" else ""
         print(f"{printable(str(check.path))} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
-        for words in (*check.remarks, *check.problems):
+        for words in (*check.problems, *check.notes):
             print(f"    {printable(words)}")
     files = "1 file" if len(checks) == 1 else f"{len(checks)} files"
     print(f"{'ok' if ok else 'WRONG'}: {files}, {_counts_in_words(_totals(checks))}")

@@ -48,8 +48,8 @@ class FileCheck:
     records_torn       1 when the file ends in the middle of one
     records_corrupt    lines that are damaged; a dump is read up to the first
     gaps               places where records are missing or time goes back; where an accelerometer said nothing
-    remarks            the first ``SHOWN_PROBLEMS`` gaps of an accelerometer, in words: they are nothing wrong
     problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
+    notes              what is not wrong and should be known, as many at most
     ok                 nothing is wrong
     """
 
@@ -60,8 +60,8 @@ class FileCheck:
     records_torn: int
     records_corrupt: int
     gaps: int
-    remarks: tuple[str, ...]
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -77,8 +77,8 @@ class _Findings:
     torn: int = 0
     corrupt: int = 0
     gaps: int = 0
-    remarks: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     first: WindowRecord | None = None
     last: WindowRecord | None = None
     damaged_before_first: int = 0
@@ -88,13 +88,13 @@ class _Findings:
         if len(self.problems) < SHOWN_PROBLEMS:
             self.problems.append(problem)
 
-    def remark(self, words: str) -> None:
-        if len(self.remarks) < SHOWN_PROBLEMS:
-            self.remarks.append(words)
+    def note(self, words: str) -> None:
+        if len(self.notes) < SHOWN_PROBLEMS:
+            self.notes.append(words)
 
     def check(self, path: Path, kind: str, state: str) -> FileCheck:
-        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.remarks),
-                         tuple(self.problems))
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems),
+                         tuple(self.notes))
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
@@ -264,8 +264,8 @@ def _take_events(findings: _Findings, path: Path) -> None:
                     continue
                 if heard_us is not None and event.t_us - heard_us > SILENCE_US:
                     findings.gaps += 1
-                    findings.remark(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
-                                    f"and {event.t_us / US_PER_S:.6f} s")
+                    findings.note(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
+                                  f"and {event.t_us / US_PER_S:.6f} s")
                 heard_us = event.t_us
             if reader.torn_tail:
                 findings.torn = 1

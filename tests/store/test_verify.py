@@ -225,11 +225,11 @@ def test_a_sensor_that_was_silent_is_told_and_nothing_wrong(tmp_path: Path, caps
     check = found(path)
     assert (counts(check), check.ok, check.problems) == ((51, 0, 0, 1), True, ())
     words = "gap: nothing from the accelerometer between 0.490000 s and 5.000000 s"
-    assert check.remarks == (words,)
+    assert check.notes == (words,)
     assert main(["verify", str(path)]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [f"    {words}", "ok: 1 file, 51 good, 0 torn, 0 corrupt, 1 gap"]
     assert main(["verify", "--json", str(path)]) == 0
-    assert json.loads(capsys.readouterr().out)["files"][0]["remarks"] == [words]
+    assert json.loads(capsys.readouterr().out)["files"][0]["notes"] == [words]
 
 
 def test_folders_are_searched_for_logs_and_dumps_only(tmp_path: Path) -> None:
@@ -287,8 +287,8 @@ def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert json.loads(capsys.readouterr().out) == {
         "ok": False, "records_good": 2, "records_torn": 0, "records_corrupt": 0, "gaps": 1,
         "files": [{"path": str(path), "kind": "log", "state": "finished", "ok": False, "records_good": 2,
-                   "records_torn": 0, "records_corrupt": 0, "gaps": 1, "remarks": [],
-                   "problems": ["line 3: gap: expected segment 2, found 3"]}],
+                   "records_torn": 0, "records_corrupt": 0, "gaps": 1,
+                   "problems": ["line 3: gap: expected segment 2, found 3"], "notes": []}],
     }
 
 
