@@ -3,7 +3,7 @@
 Problem. Room on the card may be made by removing what has been exported, and nothing else: so the memory must never
 say yes too early, nor of a file that has changed since, as a log does that learns its UTC after it was exported.
 Solution. A mark carries size, time of change and SHA-256 of what was exported; it counts while the file still has that
-size and time. The marks are one file with a checksum over itself, replaced in one step; one that is damaged is as good
+size and time. The marks are one list with a checksum over itself, replaced in one step; one that is damaged is as good
 as none, and the files are marked again by the next export that finds them on its stick. Exports to two sticks at once
 take turns.
 
@@ -17,29 +17,30 @@ from __future__ import annotations
 import errno
 import fcntl
 import hashlib
-import json
 import os
 import re
 import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
+from logger.store.checked_list import list_blocks, list_lines
 from logger.store.open_folder import OpenFolder
 
-MARKS_NAME = "exported.json"
+MARKS_NAME = "exported-marks"
 LOCK_NAME = "exported.lock"
 IDENTITY_NAME = "logger-id"
 MACHINE_ID = Path("/etc/machine-id")
-MAX_BYTES = 64_000_000
 
 _IDENTITY = re.compile(rb"([0-9a-f]{12})\n")
-_FORMAT = 1
+_FIRST = "# ridelog-exported 1"
+_ENTRY = re.compile(r"([0-9a-f]{64}) (\d{1,15}) (-?\d{1,19}) ([0-9][0-9A-Za-z._-]{0,63})")
 _CARD_FAULTS = {errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mark:
     """What was exported under a name."""
 
@@ -58,30 +59,50 @@ def exported_names(log_folder: Path) -> set[str]:
     Anything in doubt is left out. Raises ``OSError`` for a folder that cannot be read.
     """
     with OpenFolder.at(log_folder) as folder:
-        marks = read_marks(folder)
-        return {name for name, mark in marks.items()
+        return {name for name, mark in read_marks(folder).items()
                 if (found := folder.find(name)) is not None and mark.is_of(found)}
 
 
 def read_marks(log_folder: OpenFolder) -> dict[str, Mark]:
     """All marks by name; none where the file of marks is missing or not whole."""
     try:
-        content = json.loads(log_folder.read(MARKS_NAME, MAX_BYTES))
-        if content["format"] != _FORMAT or content["sha256"] != _digest(content["files"]):
-            return {}
-        return {name: Mark(**mark) for name, mark in content["files"].items()}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return dict(_stored(log_folder))
+    except ValueError:
         return {}
 
 
 def mark_exported(log_folder: OpenFolder, new: Mapping[str, Mark]) -> None:
     """Remember files that lie on a stick; forget those that the folder no longer has. Raises ``OSError``."""
     with _turn(log_folder):
-        marks = read_marks(log_folder) | dict(new)
         present = set(log_folder.names())
-        files = {name: asdict(mark) for name, mark in sorted(marks.items()) if name in present}
-        content = {"format": _FORMAT, "sha256": _digest(files), "files": files}
-        log_folder.replace(MARKS_NAME, [(json.dumps(content, indent=0) + "\n").encode("ascii")])
+        fresh = [(name, mark) for name, mark in new.items() if name in present]
+        kept = ((name, mark) for name, mark in _stored(log_folder) if name in present and name not in new)
+        try:
+            log_folder.replace(MARKS_NAME, list_blocks(_FIRST, map(_line, chain(kept, fresh))))
+        except ValueError:
+            log_folder.replace(MARKS_NAME, list_blocks(_FIRST, map(_line, fresh)))
+
+
+def _line(named: tuple[str, Mark]) -> str:
+    name, mark = named
+    return f"{mark.sha256} {mark.size_bytes} {mark.mtime_ns} {name}"
+
+
+def _stored(log_folder: OpenFolder) -> Iterator[tuple[str, Mark]]:
+    """The marks, one at a time; they are true once all have come. Raises ValueError where their file is not there,
+    cannot be read, or is not whole."""
+    try:
+        with log_folder.open(MARKS_NAME) as file:
+            lines = list_lines(file.blocks())
+            if next(lines, "") != _FIRST:
+                raise ValueError(f"line 1: expected '{_FIRST}'")
+            for line in lines:
+                entry = _ENTRY.fullmatch(line)
+                if entry is None:
+                    raise ValueError("expected 'SHA-256 SIZE TIME NAME'")
+                yield entry[4], Mark(int(entry[2]), int(entry[3]), entry[1])
+    except OSError as error:
+        raise ValueError(f"expected a readable file ({error.strerror})") from None
 
 
 def logger_identity(log_folder: OpenFolder) -> str:
@@ -123,7 +144,3 @@ def _turn(log_folder: OpenFolder) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _digest(files: Mapping[str, object]) -> str:
-    return hashlib.sha256(json.dumps(files, sort_keys=True, separators=(",", ":")).encode("ascii")).hexdigest()
