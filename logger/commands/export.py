@@ -1,13 +1,15 @@
 """Copy finished logs to a USB stick: checked, atomic, repeatable.
 
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-already is read and left alone. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
+already is read and left alone. Where the settings pair the logger with its sticks, only a copy on one of those counts
+as an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections import Counter
 from contextlib import suppress
@@ -17,8 +19,10 @@ from pathlib import Path
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.printable import printable
 from logger.service.config import Config, find_config, load_config
+from logger.store.bounded import read_bounded
 from logger.store.export import ExportResult, Progress, export
 from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
+from logger.store.yaml_lines import MAX_BYTES
 
 _PULL = "it may be pulled"
 
@@ -52,8 +56,9 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_CHECK_FAILED
     board.tell("copying", True, "copying")
     try:
-        logs = args.logs if args.logs is not None else _logs_of_the_service(args.config)
-        result = export(logs, args.to, args.dumps, board.progress)
+        config = _settings(args.config, args.logs)
+        logs = args.logs if args.logs is not None else config.log.directory
+        result = export(logs, args.to, args.dumps, board.progress, config.pairing, by_hand=not args.mounted)
     except RidelogError as error:
         board.tell("unmounting", False, str(error))
         raise
@@ -66,17 +71,29 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE if is_well else EXIT_CHECK_FAILED
 
 
-def _logs_of_the_service(config: Path | None) -> Path:
-    """Where its settings say. A mistake in them must not keep logs in the car: then those that lie where logs lie
-    without any setting are taken, with a warning. Raises BadInput where there are none."""
+def _settings(place: Path | None, logs: Path | None) -> Config:
+    """Those of the service. A mistake in them must not keep logs in the car: then those that lie where logs lie without
+    any setting, or in ``logs``, are taken, with a warning. Raises BadInput where there are none, and where the settings
+    ask for a pairing, without which nothing may be given away."""
+    found = find_config(place)
     try:
-        return load_config(find_config(config)).log.directory
+        return load_config(found)
     except BadInput as error:
-        usual = Config().log.directory
-        if not any(usual.glob("*.csv")):
+        usual = Config()
+        where = logs if logs is not None else usual.log.directory
+        if _names_a_pairing(found) or not any(where.glob("*.csv")):
             raise
-        print(printable(f"{error}; the logs in {usual} are copied"), file=sys.stderr)
+        print(printable(f"{error}; the logs in {where} are copied"), file=sys.stderr)
         return usual
+
+
+def _names_a_pairing(settings: Path) -> bool:
+    """True for settings, whatever else is in them, where a mode other than off stands outside of comments."""
+    try:
+        text = read_bounded(settings, MAX_BYTES)
+    except BadInput:
+        return False
+    return any(re.search(rb"\bmode\W+(first_stick|key_file)\b", line.partition(b"#")[0]) for line in text.split(b"\n"))
 
 
 def summary(result: ExportResult) -> str:

@@ -21,7 +21,7 @@ import re
 import secrets
 import stat
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from logger.errors import BadInput
@@ -29,6 +29,14 @@ from logger.store import manifest
 from logger.store.exported import Mark, logger_identity, mark_exported, read_marks
 from logger.store.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.open_folder import OpenFile, OpenFolder
+from logger.store.pairing import (
+    NOT_PAIRED,
+    Pairing,
+    pair_first,
+    refuse_stranger,
+    stick_name,
+    trusted_sticks,
+)
 
 FILES_PER_MANIFEST = 32
 GROWTH_PER_MANIFEST = 8
@@ -95,11 +103,14 @@ class _CardFault(Exception):
     """The card did not give a file."""
 
 
-def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None]) -> ExportResult:
+def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
+           by_hand: bool = False) -> ExportResult:
     """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
 
     ``tell`` is called before the first file and after each. What the stick or the card refuses is in the result.
-    Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them.
+    Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them, and
+    CheckFailed for a stick that ``pairing`` refuses. Who copies ``by_hand`` gets a copy anywhere, which counts as an
+    export where the stick is paired.
     """
     if _overlap(logs, stick / manifest.FOLDER):
         raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
@@ -111,11 +122,17 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
         except OSError as error:
             raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
                            "service's user or with sudo") from None
+        name = stick_name(pairing, root, identity)
+        if not by_hand:
+            refuse_stranger(pairing, card, logs, name)
         try:
             with root.inside(manifest.FOLDER) as common, common.inside(identity) as own:
                 if not own.lock():
                     raise OSError(errno.EBUSY, "another export is writing to this stick")
-                return _Export(card, own, identity, tell).run(names)
+                if not by_hand:
+                    name = pair_first(pairing, card, own, name)
+                trusted = trusted_sticks(pairing, card)
+                return _Export(card, own, identity, tell, name, trusted is None or name in trusted).run(names)
         except OSError as error:
             reason = f"{manifest.FOLDER}/{identity} on the stick: {_reason(error)}"
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
@@ -135,13 +152,17 @@ def finished_files(card: OpenFolder, dumps: bool) -> list[str]:
 
 
 class _Export:
-    """One run: from the card's folder to the logger's own on the stick."""
+    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. What is copied is
+    only marked where it ``counts``."""
 
-    def __init__(self, card: OpenFolder, stick: OpenFolder, identity: str, tell: Callable[[Progress], None]) -> None:
+    def __init__(self, card: OpenFolder, stick: OpenFolder, identity: str, tell: Callable[[Progress], None], name: str,
+                 counts: bool) -> None:
         self._card = card
         self._stick = stick
         self._identity = identity
         self._tell = tell
+        self._name = name
+        self._counts = counts
         self._marks = read_marks(card)
         self._listed = self._read_manifest()
         listed = self._listed or {}
@@ -152,7 +173,7 @@ class _Export:
         self._failures: list[Failure] = []
         self._set_aside: list[str] = []
         self._bytes = 0
-        self._unmarked: str | None = None
+        self._unmarked: str | None = None if counts else "this place is not paired with it"
 
     def run(self, names: list[str]) -> ExportResult:
         """Everything in turn; what does not fit is left out from the end."""
@@ -197,15 +218,15 @@ class _Export:
                     return False
                 known = self._marks.get(name)
                 is_known = known is not None and known.is_of(file.stat)
-                mark = known if known and is_known else _mark(file, self._card.sha256(name))
+                mark = known if known and is_known else self._mark(file, self._card.sha256(name))
             if self._stick.sha256(name) != mark.sha256:
                 return False
         except OSError:
             return False  # the copy will meet the same fault, and tell of it
         self._there.append(name)
         self._entries[name] = mark.sha256
-        if not is_known:
-            self._fresh[name] = mark
+        if not is_known or mark.stick != self._name:
+            self._fresh[name] = replace(mark, stick=self._name)
         return True
 
     def _fitting(self, names: list[str]) -> tuple[list[str], int]:
@@ -244,7 +265,7 @@ class _Export:
             raise _CardFault(f"card: {_reason(error)}") from None
         with file:
             digest = self._put(name, _from_card(file), self._clear)
-            self._fresh[name] = _mark(file, digest)
+            self._fresh[name] = self._mark(file, digest)
             self._bytes += file.stat.st_size
         self._entries[name] = digest
         self._copied.append(name)
@@ -261,6 +282,9 @@ class _Export:
             self._stick.discard(temporary)
             raise
         return digest
+
+    def _mark(self, file: OpenFile, digest: str) -> Mark:
+        return Mark(file.stat.st_size, file.stat.st_mtime_ns, digest, self._name)
 
     def _clear(self, name: str) -> None:
         """Set aside what stands in the way: an older state, a damaged copy, or something that is not ours."""
@@ -279,7 +303,7 @@ class _Export:
         except OSError as error:
             return _reason(error)
         try:
-            if self._fresh:
+            if self._fresh and self._counts:
                 mark_exported(self._card, self._fresh)
         except OSError as error:
             self._unmarked = _reason(error)
@@ -346,10 +370,6 @@ def _from_card(file: OpenFile) -> Iterator[bytes]:
         raise _CardFault(f"card: {_reason(error)}") from None
     if rest:
         raise _CardFault("card: the file changes while it is copied")
-
-
-def _mark(file: OpenFile, digest: str) -> Mark:
-    return Mark(file.stat.st_size, file.stat.st_mtime_ns, digest)
 
 
 def _folder(path: Path, meaning: str) -> OpenFolder:

@@ -20,6 +20,7 @@ import hashlib
 import os
 import re
 import secrets
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from pathlib import Path
 
 from logger.store.checked_list import list_blocks, list_lines
 from logger.store.open_folder import OpenFolder
+from logger.store.pairing import NOT_PAIRED, Pairing, trusted_sticks
 
 MARKS_NAME = "exported-marks"
 LOCK_NAME = "exported.lock"
@@ -36,30 +38,34 @@ MACHINE_ID = Path("/etc/machine-id")
 
 _IDENTITY = re.compile(rb"([0-9a-f]{12})\n")
 _FIRST = "# ridelog-exported 1"
-_ENTRY = re.compile(r"([0-9a-f]{64}) (\d{1,15}) (-?\d{1,19}) ([0-9][0-9A-Za-z._-]{0,63})")
+_NO_STICK = "-"
+_ENTRY = re.compile(r"([0-9a-f]{64}) (\d{1,15}) (-?\d{1,19}) ([0-9a-f]{32}|-) ([0-9][0-9A-Za-z._-]{0,63})")
 _CARD_FAULTS = {errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO}
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What was exported under a name."""
+    """What was exported under a name, and to which stick (``pairing.stick_name``; empty: unknown)."""
 
     size_bytes: int
     mtime_ns: int
     sha256: str
+    stick: str = ""
 
     def is_of(self, found: os.stat_result) -> bool:
         """True when the file has not changed since."""
         return found.st_size == self.size_bytes and found.st_mtime_ns == self.mtime_ns
 
 
-def exported_names(log_folder: Path) -> set[str]:
-    """Names of the files in this folder that lie, as they are now, on a stick: copied, read back, in its manifest.
+def exported_names(log_folder: Path, pairing: Pairing = NOT_PAIRED) -> set[str]:
+    """Names of the files in this folder that lie, as they are now, on a stick whose copies count: copied, read back, in
+    its manifest.
 
     Anything in doubt is left out. Raises ``OSError`` for a folder that cannot be read.
     """
     with OpenFolder.at(log_folder) as folder:
-        return {name for name, mark in read_marks(folder).items()
+        sticks = trusted_sticks(pairing, folder)
+        return {name for name, mark in read_marks(folder).items() if sticks is None or mark.stick in sticks
                 if (found := folder.find(name)) is not None and mark.is_of(found)}
 
 
@@ -85,7 +91,7 @@ def mark_exported(log_folder: OpenFolder, new: Mapping[str, Mark]) -> None:
 
 def _line(named: tuple[str, Mark]) -> str:
     name, mark = named
-    return f"{mark.sha256} {mark.size_bytes} {mark.mtime_ns} {name}"
+    return f"{mark.sha256} {mark.size_bytes} {mark.mtime_ns} {mark.stick or _NO_STICK} {name}"
 
 
 def _stored(log_folder: OpenFolder) -> Iterator[tuple[str, Mark]]:
@@ -99,8 +105,9 @@ def _stored(log_folder: OpenFolder) -> Iterator[tuple[str, Mark]]:
             for line in lines:
                 entry = _ENTRY.fullmatch(line)
                 if entry is None:
-                    raise ValueError("expected 'SHA-256 SIZE TIME NAME'")
-                yield entry[4], Mark(int(entry[2]), int(entry[3]), entry[1])
+                    raise ValueError("expected 'SHA-256 SIZE TIME STICK NAME'")
+                stick = "" if entry[4] == _NO_STICK else sys.intern(entry[4])
+                yield entry[5], Mark(int(entry[2]), int(entry[3]), entry[1], stick)
     except OSError as error:
         raise ValueError(f"expected a readable file ({error.strerror})") from None
 

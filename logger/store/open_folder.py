@@ -72,11 +72,14 @@ class OpenFolder:
     def at(cls, path: Path) -> OpenFolder:
         return cls(os.open(path, _DIRECTORY))
 
-    def inside(self, name: str) -> OpenFolder:
-        """The folder of that name in this one, made when it is not there. Raises ``OSError`` for a link or a file."""
+    def inside(self, name: str, make: bool = True) -> OpenFolder:
+        """The folder of that name in this one, made when it is not there and ``make``. Raises ``OSError`` for a link or
+        a file."""
         try:
             return OpenFolder(os.open(name, _DIRECTORY | os.O_NOFOLLOW, dir_fd=self._descriptor))
         except FileNotFoundError:
+            if not make:
+                raise
             os.mkdir(name, 0o755, dir_fd=self._descriptor)
             self.sync()
             return OpenFolder(os.open(name, _DIRECTORY | os.O_NOFOLLOW, dir_fd=self._descriptor))

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.disk import FileSystem
+from logger.store.pairing import NOT_PAIRED, Pairing
 from logger.store.recording import ENDING
 
 RESERVE_BYTES = 50_000_000
@@ -37,10 +38,12 @@ log = logging.getLogger(__name__)
 class Limits:
     """quota_bytes    most bytes in the folder of the logs; None: no limit
     floor_bytes      free space on its disk that is left to others
+    pairing          on whose sticks a copy lets a file be removed
     """
 
     quota_bytes: int | None = None
     floor_bytes: int = 200_000_000
+    pairing: Pairing = NOT_PAIRED
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ def test_a_reason_from_outside_cannot_forge_a_line(
         capsys: pytest.CaptureFixture[str]) -> None:
     evil = "\x1b[2J\nok: 2 files copied"
     result = export_of_store.ExportResult("0" * 12, failures=(export_of_store.Failure(evil, evil),), set_aside=(evil,))
-    monkeypatch.setattr(export_command, "export", lambda *_: result)
+    monkeypatch.setattr(export_command, "export", lambda *_, **__: result)
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
     lines = capsys.readouterr().out.split("\n")
     assert len(lines) == 4
@@ -198,7 +198,7 @@ def test_a_mistake_in_the_settings_keeps_no_log_in_the_car(
 
 def paired(tmp_path: Path, logs: Path, mode: str, more: str = "") -> Path:
     config = tmp_path / "ridelog.yaml"
-    config.write_text(f"log: {{directory: {logs}}}\nexport: {{pairing: {mode}}}\n{more}")
+    config.write_text(f"log: {{directory: {logs}}}\npairing: {{mode: {mode}}}\n{more}")
     return config
 
 

@@ -57,11 +57,11 @@ def test_what_is_left_out_takes_its_default(tmp_path: Path) -> None:
 
 
 def test_pairing_is_read(tmp_path: Path) -> None:
-    assert load(tmp_path, "").export == Pairing("off", Path("/etc/ridelog/stick.key"))
-    config = load(tmp_path, "export:\n  pairing: key_file\n  key_file: my.key\n")
-    assert config.export == Pairing("key_file", tmp_path / "my.key")
+    assert load(tmp_path, "vehicle_error: 0.05\n").pairing == Pairing("off", Path("/etc/ridelog/stick.key"))
+    config = load(tmp_path, "pairing:\n  mode: key_file\n  key_file: my.key\n")
+    assert config.pairing == Pairing("key_file", tmp_path / "my.key")
     with pytest.raises(BadInput, match=r"yaml:2: expected one of off, first_stick, key_file"):
-        load(tmp_path, "export:\n  pairing: maybe\n")
+        load(tmp_path, "pairing:\n  mode: maybe\n")
 
 
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from logger.service.config import Config, LogConfig
 from logger.service.live import HANG_US, Listener, monotonic_us
 from logger.service.stop import Stop
 from logger.service.storage import Storage
+from logger.store.pairing import Pairing
 from logger.store.space import Limits
 
 
@@ -48,13 +49,14 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr(start, "Notifier", lambda: parts["told"])
     monkeypatch.setattr(start, "go_first", lambda: None)
     log = replace(LogConfig(tmp_path / "log"), quota_bytes=123_456_789, keep_free_bytes=987_654)
-    start.serve(Config(log=log, status_file=tmp_path / "status.json"), Stop())
+    pairing = Pairing("first_stick")
+    start.serve(Config(log=log, pairing=pairing, status_file=tmp_path / "status.json"), Stop())
     parts["told"].words.clear()
     return parts
 
 
-def test_quota_and_floor_are_those_of_the_settings(built: dict[str, Any]) -> None:
-    assert built["limits"] == Limits(123_456_789, 987_654)
+def test_quota_and_floor_and_whose_copies_count_are_those_of_the_settings(built: dict[str, Any]) -> None:
+    assert built["limits"] == Limits(123_456_789, 987_654, Pairing("first_stick"))
 
 
 def test_the_watchdog_is_fed_while_every_device_returns(built: dict[str, Any]) -> None:

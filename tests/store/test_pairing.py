@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from logger.errors import CheckFailed
 from logger.store.export import ExportResult, export
-from logger.store.exported import MARKS_NAME, exported_names
+from logger.store.exported import exported_names, read_marks
+from logger.store.open_folder import OpenFolder
 from logger.store.pairing import FIRST_STICK, KEY_FILE, KEY_NAME, OFF, PAIRED_NAME, STICK_NAME, Pairing
 
 from stick_faults import NAMES, a_card, a_stick, contents, own, quiet
@@ -158,6 +158,7 @@ def test_who_copies_by_hand_gets_a_copy_that_lets_nothing_be_removed(
 
 def test_marks_name_their_stick(logs: Path, sticks: list[Path]) -> None:
     plug_in(logs, sticks[0], FIRST)
-    marks = json.loads((logs / MARKS_NAME).read_text())["files"]
+    with OpenFolder.at(logs) as folder:
+        marks = read_marks(folder)
     number = (own(logs, sticks[0]) / STICK_NAME).read_text().strip()
-    assert {mark["stick"] for mark in marks.values()} == {number} == {(logs / PAIRED_NAME).read_text().strip()}
+    assert {mark.stick for mark in marks.values()} == {number} == {(logs / PAIRED_NAME).read_text().strip()}
