@@ -201,6 +201,10 @@ def the_rule(key: str, operator: str, value: str) -> dict[tuple[str, str], str]:
     return {(key, operator): value for key, operator, value in found}
 
 
+def list_of(rule: dict[tuple[str, str], str]) -> list[tuple[str, str, str]]:
+    return [(key, operator, value) for (key, operator), value in rule.items()]
+
+
 def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
     stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
     assert stick["ENV{ID_BUS}", "=="] == "usb"
@@ -215,6 +219,16 @@ def test_a_stick_with_another_file_system_is_refused_in_words() -> None:
     assert not [key for key, _ in the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog") if key == "ENV{ID_FS_TYPE}"]
     copy = next(line for line in runs_of(str(PROGRAM)) if "--to" in line)
     assert "--mounted" in copy
+
+
+def test_a_stick_without_partitions_that_shows_as_a_disk_and_a_partition_is_one() -> None:
+    """mkfs.fat 4.2 gives a whole disk a table with one partition that begins where the disk does: both have the label,
+    and the second cannot be mounted. The disk goes first, and what it says of itself is there for its partitions."""
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    assert stick["ENV{RIDELOG_STICK}", "!="] == stick["ENV{RIDELOG_STICK}", "="] == "1"
+    phantom = the_rule("IMPORT{parent}", "=", "RIDELOG_STICK")
+    assert (phantom["ENV{DEVTYPE}", "=="], phantom["ATTR{start}", "=="]) == ("partition", "0")
+    assert rules().index(list_of(phantom)) < rules().index(list_of(stick))
 
 
 def test_each_time_that_a_stick_is_plugged_in_is_an_instance_of_its_own() -> None:
@@ -241,8 +255,8 @@ def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_tim
     note = f"{stick_notes.FOLDER}/%i.json"
     assert lines[0] == ["/usr/bin/touch", note]
     stopping = [inner(shlex.split(line.lstrip("-+"))) for line in settings(EXPORT)["ExecStopPost"]]
-    assert stopping[:2] == [["/usr/bin/umount", "--quiet", "--lazy", "/run/ridelog-stick/%i"],
-                            ["/usr/bin/rm", "--force", note]]
+    assert stopping[:2] == [["/usr/bin/rm", "--force", note],
+                            ["/usr/bin/umount", "--quiet", "--lazy", "/run/ridelog-stick/%i"]]
     assert all(note in line for line in runs_of(str(PROGRAM)))
 
 
