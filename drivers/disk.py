@@ -7,13 +7,11 @@ hands in one that fails. Every method raises ``OSError`` for what the system ref
 
 from __future__ import annotations
 
-import errno
 import os
-import stat
 from pathlib import Path
 from typing import BinaryIO
 
-_NO_WAIT = os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+from drivers.regular_file import NO_WAIT, check_regular, open_regular
 
 
 class FileSystem:
@@ -21,13 +19,13 @@ class FileSystem:
 
     def open(self, path: Path) -> BinaryIO:
         """A regular file, for reading. Raises ``OSError`` for anything else; a pipe is never waited for."""
-        return os.fdopen(_regular(path, os.open(path, os.O_RDONLY | _NO_WAIT)), "rb")
+        return open_regular(path)
 
     def create(self, path: Path, new: bool = False) -> int:
         """Open an empty file for writing; give its descriptor. ``new``: raise ``FileExistsError`` where one is. A link
         is not followed, a pipe not waited for."""
-        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | _NO_WAIT | (os.O_EXCL if new else os.O_TRUNC)
-        return _regular(path, os.open(path, flags, 0o644))
+        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | NO_WAIT | (os.O_EXCL if new else os.O_TRUNC)
+        return check_regular(path, os.open(path, flags, 0o644))
 
     def write(self, descriptor: int, data: bytes) -> None:
         """Hand all bytes to the system."""
@@ -71,11 +69,3 @@ class FileSystem:
         """Room for files of this user on the disk that holds a folder."""
         there = os.statvfs(directory)
         return there.f_bavail * there.f_frsize
-
-
-def _regular(path: Path, descriptor: int) -> int:
-    """The descriptor of a regular file. Raises ``OSError`` for another, which is closed."""
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise OSError(errno.EINVAL, "not a regular file", str(path))
-    return descriptor

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 from drivers.disk import FileSystem
 from drivers.errors import DumpError, shortened
+from drivers.regular_file import open_regular
 
 VERSION = "1"
 SOURCES = ("bma220", "pasco", "nmea")
@@ -104,7 +105,7 @@ class DumpReader:
         self._path = path
         self._lines_read = 0
         try:
-            self._file = path.open("rb")
+            self._file = open_regular(path)
         except OSError as error:
             raise DumpError(f"{path}: expected a recorded dump, but: {error.strerror}") from error
         try:

@@ -29,6 +29,7 @@ from drivers.errors import SettingsError, shortened
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
 from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
 from drivers.readings import AccelerationBlock
+from drivers.regular_file import open_regular
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
@@ -138,7 +139,7 @@ def load_profile(name_or_path: str | Path) -> Profile:
     place = str(name_or_path)
     if place.endswith((".yaml", ".yml")):
         try:
-            with Path(place).open("rb") as file:
+            with open_regular(place) as file:
                 text = file.read(PROFILE_BYTES_MAX + 1)
         except OSError as error:
             raise SettingsError(f"{place}: expected a readable profile file ({error.strerror})") from error

@@ -1,13 +1,15 @@
 """Copy finished logs to a USB stick: checked, atomic, repeatable.
 
 Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-already is read and left alone. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
+already is read and left alone. Where the settings pair the logger with its sticks, only a copy on one of those counts
+as an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections import Counter
 from contextlib import suppress
@@ -15,9 +17,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
+from logger.printable import printable
 from logger.service.config import Config, find_config, load_config
+from logger.store.bounded import read_bounded
 from logger.store.export import ExportResult, Progress, export
-from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, write_note
+from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
+from logger.store.yaml_lines import MAX_BYTES
 
 _PULL = "it may be pulled"
 
@@ -47,12 +52,13 @@ def run(args: argparse.Namespace) -> int:
     if args.mounted and not args.to.is_mount():
         reason = f"{args.to}: no stick could be mounted there; expected one with FAT or exFAT"
         board.tell("unmounting", False, reason)
-        print(reason)
+        print(printable(reason))
         return EXIT_CHECK_FAILED
     board.tell("copying", True, "copying")
     try:
-        logs = args.logs if args.logs is not None else _logs_of_the_service(args.config)
-        result = export(logs, args.to, args.dumps, board.progress)
+        config = _settings(args.config, args.logs)
+        logs = args.logs if args.logs is not None else config.log.directory
+        result = export(logs, args.to, args.dumps, board.progress, config.pairing, by_hand=not args.mounted)
     except RidelogError as error:
         board.tell("unmounting", False, str(error))
         raise
@@ -61,21 +67,33 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
     else:
-        print("\n".join(screen(result)))
+        print("\n".join(map(printable, screen(result))))
     return EXIT_DONE if is_well else EXIT_CHECK_FAILED
 
 
-def _logs_of_the_service(config: Path | None) -> Path:
-    """Where its settings say. A mistake in them must not keep logs in the car: then those that lie where logs lie
-    without any setting are taken, with a warning. Raises BadInput where there are none."""
+def _settings(place: Path | None, logs: Path | None) -> Config:
+    """Those of the service. A mistake in them must not keep logs in the car: then those that lie where logs lie without
+    any setting, or in ``logs``, are taken, with a warning. Raises BadInput where there are none, and where the settings
+    ask for a pairing, without which nothing may be given away."""
+    found = find_config(place)
     try:
-        return load_config(find_config(config)).log.directory
+        return load_config(found)
     except BadInput as error:
-        usual = Config().log.directory
-        if not any(usual.glob("*.csv")):
+        usual = Config()
+        where = logs if logs is not None else usual.log.directory
+        if _names_a_pairing(found) or not any(where.glob("*.csv")):
             raise
-        print(f"{error}; the logs in {usual} are copied", file=sys.stderr)
+        print(printable(f"{error}; the logs in {where} are copied"), file=sys.stderr)
         return usual
+
+
+def _names_a_pairing(settings: Path) -> bool:
+    """True for settings, whatever else is in them, where a mode other than off stands outside of comments."""
+    try:
+        text = read_bounded(settings, MAX_BYTES)
+    except BadInput:
+        return False
+    return any(re.search(rb"\bmode\W+(first_stick|key_file)\b", line.partition(b"#")[0]) for line in text.split(b"\n"))
 
 
 def summary(result: ExportResult) -> str:
@@ -115,7 +133,7 @@ class _Board:
         if self._note is not None:
             before = read_note(self._note)
             try:
-                write_note(self._note, StickNote(self._note.stem, state, ok, text))
+                write_note(self._note, StickNote(stick_of(self._note), state, ok, text))
             except OSError as error:
                 print(f"{self._note}: no note can be kept ({error.strerror})", file=sys.stderr)
                 self._note = None
@@ -132,7 +150,7 @@ class _Board:
         if place.is_mount():
             self.tell("unmounting", False, f"{place} is still mounted; shut down before pulling it")
             return EXIT_CHECK_FAILED
-        if before is None or before.state == "copying":
+        if before is None or before.state in ("waiting", "copying"):
             self.tell("ready", False, f"copying did not end as it should; {_PULL}")
         else:
             self.tell("ready", before.ok, f"{before.text}; {_PULL}")

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from drivers.errors import DriverError
 from logger.errors import EXIT_BAD_INPUT, RidelogError
+from logger.printable import printable
 
 VERBS = {
     "demo": "run a recorded drive through the service and show the result; needs no hardware",
@@ -50,7 +51,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message} (try '{self.prog} --help')\n")
+        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {printable(message)} (try '{self.prog} --help')\n")
 
 
 # All matrices here are small: more threads in the algebra library would only wait for each other.
@@ -96,7 +97,7 @@ def run() -> NoReturn:
 
 
 def _complain(message: str, status: int) -> int:
-    print("ridelog: " + " ".join(message.split()), file=sys.stderr)
+    print("ridelog: " + printable(" ".join(message.split())), file=sys.stderr)
     return status
 
 

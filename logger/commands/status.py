@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
+from logger.printable import printable
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
 from logger.store.stick_notes import FOLDER, StickNote, read_notes
@@ -38,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
 def stick_lines(notes: list[StickNote]) -> list[str]:
     """What each stick that is plugged in is doing, and whether it may be pulled."""
-    return [f"stick {note.stick}: {'' if note.ok else 'WRONG, '}{note.text}"
-            f"{'' if note.state == 'ready' else '; leave it in'}" for note in notes]
+    return [printable(f"stick {note.stick}: {'' if note.ok else 'WRONG, '}{note.text}"
+                      f"{'' if note.state == 'ready' else '; leave it in'}") for note in notes]
 
 
 def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:

@@ -1,7 +1,8 @@
 """Check segment logs and recorded dumps: records good, torn or corrupt, and gaps. A stick that 'ridelog export' filled
 is also compared with its manifest, where a record is a file, and a gap one that is missing or not listed.
 
-Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong.
+Exit status 0: nothing is wrong; 1: something is, and it is listed. The torn end of an open part is not wrong,
+nor is the silence of a sensor in a dump, which counts as a gap.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
+from logger.printable import printable
 from logger.store.verify import FileCheck, verify
 
 _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
@@ -40,17 +42,16 @@ def _totals(checks: list[FileCheck]) -> dict[str, int]:
 
 def _as_json(checks: list[FileCheck], ok: bool) -> dict[str, object]:
     files = [{"path": str(check.path), "kind": check.kind, "state": check.state, "ok": check.ok,
-              **_totals([check]), "problems": list(check.problems),
-              **({"notes": list(check.notes)} if check.notes else {})} for check in checks]
+              **_totals([check]), "problems": list(check.problems), "notes": list(check.notes)} for check in checks]
     return {"ok": ok, **_totals(checks), "files": files}
 
 
 def _print_text(checks: list[FileCheck], ok: bool) -> None:
     for check in checks:
         state = ", open" if check.state == "open" else ""
-        print(f"{check.path} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
+        print(f"{printable(str(check.path))} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
         for words in (*check.problems, *check.notes):
-            print(f"    {words}")
+            print(f"    {printable(words)}")
     files = "1 file" if len(checks) == 1 else f"{len(checks)} files"
     print(f"{'ok' if ok else 'WRONG'}: {files}, {_counts_in_words(_totals(checks))}")
 

@@ -18,6 +18,7 @@ from drivers.bma220 import Bma220Settings
 from drivers.errors import SettingsError
 from logger.errors import BadInput
 from logger.shipped import is_path, shipped, vehicle_file, vehicle_path
+from logger.store.pairing import MODES, NOT_PAIRED, Pairing
 from logger.store.yaml_lines import Node, load_mapping
 from logger.units import WINDOW_M
 
@@ -115,6 +116,7 @@ class Config:
     vehicle_error: float = 0.05
     pipeline: PipelineConfig = PipelineConfig()
     log: LogConfig = LogConfig()
+    pairing: Pairing = NOT_PAIRED
     status_file: Path = Path("/run/ridelog/status.json")
 
 
@@ -134,6 +136,7 @@ def load_config(path: Path) -> Config:
         "vehicle_error": _number(0, 1),
         "pipeline": _pipeline,
         "log": _log,
+        "pairing": _pairing,
         "status_file": _file_to_write,
     })(load_mapping(path))
 
@@ -299,6 +302,12 @@ _log = _section(LogConfig, {
     "sync_s": _number(0.1, 60),
     "quota_bytes": _or_none("null", _whole(200_000_000, 10**15)),
     "keep_free_bytes": _whole(0, 10**15),
+})
+
+
+_pairing = _section(Pairing, {
+    "mode": lambda node: node.choice(*MODES),
+    "key_file": _path,
 })
 
 

@@ -91,12 +91,16 @@ class Core:
     def advance(self, now_us: int) -> None:
         """Make the steps that lie at or before ``now_us``; every event before that has been fed.
 
-        After two minutes without any event everything has settled, and the steps up to ``now_us`` are left out.
+        Once nothing is under way any more, the time without an event passes in one step: a recording may hold one
+        event each two minutes. After two minutes without any it is left out.
         """
         while self._next_step_us is not None and self._next_step_us <= now_us:
-            if self._next_step_us > self._last_event_us + IDLE_US:
-                self._next_step_us += (now_us - self._next_step_us) // STEP_US * STEP_US
+            idle_us = self._last_event_us + IDLE_US
+            if self._next_step_us > idle_us:
+                self._next_step_us = self._last_step_us(now_us)
                 self._pipeline.skip_to(self._next_step_us)
+            elif self._pipeline.is_settled(self._next_step_us - STEP_US, self._last_event_us):
+                self._next_step_us = self._last_step_us(min(now_us, idle_us))
             step_us = self._next_step_us
             self._next_step_us += STEP_US
             self._step_bytes = 0
@@ -105,6 +109,11 @@ class Core:
             if self._pipeline.drive != self._drive:
                 self._drive = self._pipeline.drive
                 self._sink.rotate()
+
+    def _last_step_us(self, until_us: int) -> int:
+        """The last point of the lattice up to then, from the next one on."""
+        assert self._next_step_us is not None
+        return self._next_step_us + (until_us - self._next_step_us) // STEP_US * STEP_US
 
     def finish(self) -> None:
         """End of the events: what is inside comes out, the log is closed."""

@@ -106,6 +106,13 @@ class Pipeline:
         self._forget()
         return records
 
+    def is_settled(self, stepped_us: int, heard_us: int) -> bool:
+        """Tell whether nothing is under way after the step at ``stepped_us``, before which the last thing was heard at
+        ``heard_us``. For as long as nothing is, the steps that follow come to the same as one at the end of them: the
+        sensor is missing, the motion unknown, and no row waits for either."""
+        return (stepped_us - heard_us > FIX_DELAY_US and self._is_lost(stepped_us) and self._leg == _BLIND
+                and self._roughness.is_empty and not any(part.present.any() for part in self._pending))
+
     def skip_to(self, t_us: int) -> None:
         """Nothing was heard since the last step and until ``t_us``; the next step comes then."""
         self._pending += self._chain.skip_to(t_us)
@@ -135,11 +142,16 @@ class Pipeline:
 
     def _settled_until_us(self, now_us: int) -> int:
         """Samples before this instant will not learn more about their motion."""
-        last_us = self.odometer.last_t_us
-        begun_us = self._start_us if self._start_us is not None else now_us
-        if now_us - (last_us if last_us is not None else begun_us) > self._bridge_us + FIX_DELAY_US:
-            return now_us - FIX_DELAY_US
-        return last_us if last_us is not None else begun_us
+        return now_us - FIX_DELAY_US if self._is_lost(now_us) else self._last_known_us(now_us)
+
+    def _is_lost(self, now_us: int) -> bool:
+        """No fix has come for longer than is bridged."""
+        return now_us - self._last_known_us(now_us) > self._bridge_us + FIX_DELAY_US
+
+    def _last_known_us(self, now_us: int) -> int:
+        if self.odometer.last_t_us is not None:
+            return self.odometer.last_t_us
+        return self._start_us if self._start_us is not None else now_us
 
     def _release(self, until_us: int | None) -> None:
         if not self._pending:

@@ -52,6 +52,11 @@ class RoughnessQueue:
         self._take(self._estimator.finish())
         self._leg = None  # what waits from here on has no estimate to wait for
 
+    @property
+    def is_empty(self) -> bool:
+        """No window waits."""
+        return not self._queue
+
     def add(self, waiting: list[Waiting]) -> None:
         """Windows that have ended, in order."""
         self._queue.extend(waiting)

@@ -51,7 +51,7 @@ def _serve(config: Config, stop: Stop) -> None:
     vehicle = read_vehicle(config.vehicle)
     facts = assemble.sidecar(config, sensor, vehicle)
     header = assemble.dump_header(config) if config.log.record_dump else None
-    limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
+    limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes, config.pairing)
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us)
     decoder = assemble.gps_decoder(config)
     pipeline = assemble.pipeline(config, sensor, vehicle)

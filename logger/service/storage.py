@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ class Storage:
         self._max_file_bytes = max_file_bytes
         self._now_us = now_us
         self._files = files or FileSystem()
-        self._space = SpaceKeeper(directory, limits, exported_names, self._files)
+        self._space = SpaceKeeper(directory, limits, partial(exported_names, pairing=limits.pairing), self._files)
         self._notices: list[str] = []
         self._warned: set[str] = set()
         self._looked_us = now_us()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from drivers.regular_file import open_regular
 from logger.errors import BadInput
 
 
 def read_bounded(path: Path | str, max_bytes: int) -> bytes:
     """All bytes of a file. Raises BadInput for one that cannot be read or is longer than ``max_bytes``."""
     try:
-        with Path(path).open("rb") as file:
+        with open_regular(path) as file:
             too_long = os.fstat(file.fileno()).st_size > max_bytes
             data = b"" if too_long else file.read(max_bytes + 1)
     except OSError as error:

@@ -7,9 +7,10 @@ may be full, read-only or worn, may carry other cars' logs, and may hold names t
 Solution. Every logger has a folder of its own on the stick, ``ridelog/<identity>``. A file is written there under a
 temporary name, flushed, read back from the medium against the SHA-256 of what was read from the card, and only then
 given its name. What has the name already, and is not the same, is set aside under another name, never overwritten.
-Every few files the manifest is replaced in the same way; only what a manifest that was read back lists is marked as
-exported. So at every instant the marks are true, and a second export copies what the first one did not. Nothing is
-written when all is there, so that a stick that is write-protected by then is no fault.
+Now and then, the more seldom the longer it is, the manifest is replaced in the same way; only what a manifest that was
+read back lists is marked as exported. So at every instant the marks are true, and a second export copies what the first
+one did not. Nothing is written when all is there, so that a stick that is write-protected by then is no fault. What a
+stick holds is never taken into memory as a whole.
 """
 
 from __future__ import annotations
@@ -19,17 +20,29 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from logger.errors import BadInput
 from logger.store import manifest
 from logger.store.exported import Mark, logger_identity, mark_exported, read_marks
-from logger.store.manifest import Manifest, format_manifest, parse_manifest
+from logger.store.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.open_folder import OpenFile, OpenFolder
+from logger.store.pairing import (
+    NOT_PAIRED,
+    Pairing,
+    pair_first,
+    refuse_stranger,
+    stick_name,
+    trusted_sticks,
+)
 
 FILES_PER_MANIFEST = 32
+GROWTH_PER_MANIFEST = 8
+"""The lists are written anew when an eighth has been added: nine times their last length is written in all, and a stick
+that is pulled has at most a ninth of its files to be read once more, which are there."""
+
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
 
@@ -90,14 +103,18 @@ class _CardFault(Exception):
     """The card did not give a file."""
 
 
-def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None]) -> ExportResult:
+def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
+           by_hand: bool = False) -> ExportResult:
     """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
 
     ``tell`` is called before the first file and after each. What the stick or the card refuses is in the result.
-    Raises BadInput for folders that are not there, or lie within each other.
+    Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them, and
+    CheckFailed for a stick that ``pairing`` refuses. Who copies ``by_hand`` gets a copy anywhere, which counts as an
+    export where the stick is paired.
     """
-    if stick.resolve().is_relative_to(logs.resolve()):
-        raise BadInput(f"{stick}: expected a place outside of the folder of logs, {logs}")
+    if _overlap(logs, stick / manifest.FOLDER):
+        raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
+                       f"{stick / manifest.FOLDER}")
     with _folder(logs, "with the logs") as card, _folder(stick, "to copy to, such as a mounted stick") as root:
         names = finished_files(card, dumps)
         try:
@@ -105,11 +122,17 @@ def export(logs: Path, stick: Path, dumps: bool, tell: Callable[[Progress], None
         except OSError as error:
             raise BadInput(f"{logs}: expected a folder that can be written to ({_reason(error)}); run this as the "
                            "service's user or with sudo") from None
+        name = stick_name(pairing, root, identity)
+        if not by_hand:
+            refuse_stranger(pairing, card, logs, name)
         try:
             with root.inside(manifest.FOLDER) as common, common.inside(identity) as own:
                 if not own.lock():
                     raise OSError(errno.EBUSY, "another export is writing to this stick")
-                return _Export(card, own, identity, tell).run(names)
+                if not by_hand:
+                    name = pair_first(pairing, card, own, name)
+                trusted = trusted_sticks(pairing, card)
+                return _Export(card, own, identity, tell, name, trusted is None or name in trusted).run(names)
         except OSError as error:
             reason = f"{manifest.FOLDER}/{identity} on the stick: {_reason(error)}"
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
@@ -129,40 +152,48 @@ def finished_files(card: OpenFolder, dumps: bool) -> list[str]:
 
 
 class _Export:
-    """One run: from the card's folder to the logger's own on the stick."""
+    """One run: from the card's folder to the logger's own on the stick, which marks call ``name``. What is copied is
+    only marked where it ``counts``."""
 
-    def __init__(self, card: OpenFolder, stick: OpenFolder, identity: str, tell: Callable[[Progress], None]) -> None:
+    def __init__(self, card: OpenFolder, stick: OpenFolder, identity: str, tell: Callable[[Progress], None], name: str,
+                 counts: bool) -> None:
         self._card = card
         self._stick = stick
         self._identity = identity
         self._tell = tell
+        self._name = name
+        self._counts = counts
         self._marks = read_marks(card)
         self._listed = self._read_manifest()
-        on_stick = {name.lower() for name in stick.names()}
-        self._entries = {name: digest for name, digest in self._listed.items() if name in on_stick}
+        listed = self._listed or {}
+        self._entries = {name: listed[name] for name in map(str.lower, stick.each_name()) if name in listed}
         self._fresh: dict[str, Mark] = {}
         self._copied: list[str] = []
         self._there: list[str] = []
         self._failures: list[Failure] = []
         self._set_aside: list[str] = []
         self._bytes = 0
-        self._unmarked: str | None = None
+        self._unmarked: str | None = None if counts else "this place is not paired with it"
 
     def run(self, names: list[str]) -> ExportResult:
         """Everything in turn; what does not fit is left out from the end."""
         self._stick.clean()
         missing = self._look(names)
+        most = manifest.MAX_FILES - len(self._entries)
+        missing, too_many = missing[:most], missing[most:]
         fitting, short = self._fitting(missing) if missing else ([], 0)
         for number, name in enumerate(fitting, start=1):
             fault = self._copy_one(name)
-            self._tell(Progress(len(names) - len(missing) + number, len(names)))
+            self._tell(Progress(len(self._there) + number, len(names)))
             if fault is not None:
                 self._failures += [Failure(rest, fault) for rest in fitting[number:]]
                 break
-            if len(self._fresh) >= FILES_PER_MANIFEST:
+            if len(self._fresh) >= max(FILES_PER_MANIFEST, len(self._entries) // GROWTH_PER_MANIFEST):
                 self._settle()
         reason = f"no room on the stick: {-(-short // 1000)} kB more are needed"
         self._failures += [Failure(name, reason) for name in missing[len(fitting):]]
+        reason = f"the stick holds {manifest.MAX_FILES} files of this logger, the most: take some off it"
+        self._failures += [Failure(name, reason) for name in too_many]
         if (fault := self._settle()) is not None:
             self._give_up_unlisted(f"the manifest on the stick: {fault}")
         return ExportResult(self._identity, tuple(self._copied), tuple(self._there), tuple(self._failures),
@@ -187,15 +218,15 @@ class _Export:
                     return False
                 known = self._marks.get(name)
                 is_known = known is not None and known.is_of(file.stat)
-                mark = known if known and is_known else _mark(file, self._card.sha256(name))
+                mark = known if known and is_known else self._mark(file, self._card.sha256(name))
             if self._stick.sha256(name) != mark.sha256:
                 return False
         except OSError:
             return False  # the copy will meet the same fault, and tell of it
         self._there.append(name)
         self._entries[name] = mark.sha256
-        if not is_known:
-            self._fresh[name] = mark
+        if not is_known or mark.stick != self._name:
+            self._fresh[name] = replace(mark, stick=self._name)
         return True
 
     def _fitting(self, names: list[str]) -> tuple[list[str], int]:
@@ -233,19 +264,27 @@ class _Export:
         except OSError as error:
             raise _CardFault(f"card: {_reason(error)}") from None
         with file:
-            temporary, digest = self._stick.write(_from_card(file))
-            try:
-                if self._stick.sha256(temporary) != digest:
-                    raise OSError(errno.EIO, "does not read back what was written")
-                self._clear(name)
-                self._stick.rename(temporary, name)
-            except OSError:
-                self._stick.discard(temporary)
-                raise
-            self._fresh[name] = _mark(file, digest)
+            digest = self._put(name, _from_card(file), self._clear)
+            self._fresh[name] = self._mark(file, digest)
             self._bytes += file.stat.st_size
         self._entries[name] = digest
         self._copied.append(name)
+
+    def _put(self, name: str, blocks: Iterable[bytes], make_way: Callable[[str], None]) -> str:
+        """Write a file that gets its name once it was read back; give its SHA-256."""
+        temporary, digest = self._stick.write(blocks)
+        try:
+            if self._stick.sha256(temporary) != digest:
+                raise OSError(errno.EIO, "does not read back what was written")
+            make_way(name)
+            self._stick.rename(temporary, name)
+        except OSError:
+            self._stick.discard(temporary)
+            raise
+        return digest
+
+    def _mark(self, file: OpenFile, digest: str) -> Mark:
+        return Mark(file.stat.st_size, file.stat.st_mtime_ns, digest, self._name)
 
     def _clear(self, name: str) -> None:
         """Set aside what stands in the way: an older state, a damaged copy, or something that is not ours."""
@@ -258,12 +297,13 @@ class _Export:
     def _settle(self) -> str | None:
         """Bring the manifest up to date, then remember what it lists. Gives the reason when the stick refuses."""
         try:
-            if self._entries != self._listed:
+            is_first = self._listed is None and not self._failures  # of nothing, perhaps: an export has a manifest
+            if self._entries != (self._listed or {}) or is_first:
                 self._write_manifest()
         except OSError as error:
             return _reason(error)
         try:
-            if self._fresh:
+            if self._fresh and self._counts:
                 mark_exported(self._card, self._fresh)
         except OSError as error:
             self._unmarked = _reason(error)
@@ -272,28 +312,49 @@ class _Export:
 
     def _give_up_unlisted(self, reason: str) -> None:
         """What no manifest lists cannot be checked at the desk: it counts as not copied."""
-        unlisted = {name for name, digest in self._entries.items() if self._listed.get(name) != digest}
+        listed = self._listed or {}
+        unlisted = {name for name, digest in self._entries.items() if listed.get(name) != digest}
         self._failures += [Failure(name, reason) for name in sorted(unlisted)]
         self._copied = [name for name in self._copied if name not in unlisted]
         self._there = [name for name in self._there if name not in unlisted]
 
-    def _read_manifest(self) -> dict[str, str]:
-        """What the stick's manifest lists; nothing for one that is missing, not whole, or another logger's."""
+    def _read_manifest(self) -> dict[str, str] | None:
+        """What the stick's manifest lists; None for one that is missing, not whole, or another logger's."""
         try:
-            found = parse_manifest(self._stick.read(manifest.NAME, manifest.MAX_BYTES))
+            with self._stick.open(manifest.NAME) as file:
+                found = read_manifest(file.blocks())
         except (OSError, ValueError):
-            return {}
-        return dict(found.files) if found.logger == self._identity else {}
+            return None
+        return dict(found.files) if found.logger == self._identity else None
 
     def _write_manifest(self) -> None:
-        text = format_manifest(Manifest(self._identity, self._entries))
-        found = self._stick.find(manifest.NAME)
-        if found is not None and not stat.S_ISREG(found.st_mode):
-            self._clear(manifest.NAME)
-        self._stick.replace(manifest.NAME, text)
-        if self._stick.read(manifest.NAME, len(text)) != text:
-            raise OSError(errno.EIO, "does not read back what was written")
+        self._put(manifest.NAME, manifest_blocks(Manifest(self._identity, self._entries)), self._clear_if_strange)
         self._listed = dict(self._entries)
+
+    def _clear_if_strange(self, name: str) -> None:
+        found = self._stick.find(name)
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            self._clear(name)
+
+
+def _overlap(one: Path, other: Path) -> bool:
+    """True when two folders, which need not be there, are the same or one holds the other, by whatever path."""
+    lines = [_lineage(one), _lineage(other)]
+    return any(line[0] in other_line for line, other_line in (lines, lines[::-1]) if line[0] is not None)
+
+
+def _lineage(folder: Path) -> list[tuple[int, int] | None]:
+    """What tells a folder and all that hold it from others, itself first: device and inode; None for what is not."""
+    resolved = folder.resolve()
+    return [_identity(path) for path in (resolved, *resolved.parents)]
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _from_card(file: OpenFile) -> Iterator[bytes]:
@@ -309,10 +370,6 @@ def _from_card(file: OpenFile) -> Iterator[bytes]:
         raise _CardFault(f"card: {_reason(error)}") from None
     if rest:
         raise _CardFault("card: the file changes while it is copied")
-
-
-def _mark(file: OpenFile, digest: str) -> Mark:
-    return Mark(file.stat.st_size, file.stat.st_mtime_ns, digest)
 
 
 def _folder(path: Path, meaning: str) -> OpenFolder:

@@ -3,28 +3,31 @@
 Problem. A stick travels, is pulled early, and is written to by others; at the desk somebody has to know that what
 arrived is what left. Solution: one text file with a SHA-256 per file, in the form that ``sha256sum -c`` reads too, with
 the logger's name in the first line and a checksum of the list in the last, so that a list that was cut or changed
-shows. Names are those of our own files: a list cannot point anywhere else.
+shows. Names are those of our own files: a list cannot point anywhere else. It is read line by line, and not beyond what
+a logger could ever have written, for a small machine reads it too.
 """
 
 from __future__ import annotations
 
-import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+from logger.store.checked_list import list_blocks, list_lines
 
 FOLDER = "ridelog"
 """On a stick: a logger's files are in ``FOLDER/<identity>``."""
 
 NAME = "manifest.sha256"
-MAX_BYTES = 64_000_000
+MAX_FILES = 100_000
+"""Most files of one logger on one stick: ten drives a day, each a log and its sidecar, for 13 years. A list of so many
+takes some 30 MB of memory, a fifth of what the export's unit may use."""
 
 _FIRST = "# ridelog-manifest 1 logger "
 _IDENTITY = re.compile(r"[0-9a-f]{12}")
 _HEAD = re.compile(re.escape(_FIRST) + f"({_IDENTITY.pattern})")
 _ENTRY = re.compile(r"([0-9a-f]{64})  ([0-9][0-9A-Za-z._-]{0,63})")
-_LAST = re.compile(r"# (\d+) files, list ([0-9a-f]{64})")
 
 
 @dataclass(frozen=True)
@@ -42,34 +45,32 @@ def is_of_export(folder: Path) -> bool:
 
 def format_manifest(manifest: Manifest) -> bytes:
     """The text of the file."""
-    entries = "".join(f"{digest}  {name}\n" for name, digest in sorted(manifest.files.items()))
-    text = f"{_FIRST}{manifest.logger}\n{entries}"
-    return f"{text}# {len(manifest.files)} files, list {_digest(text)}\n".encode("ascii")
+    return b"".join(manifest_blocks(manifest))
+
+
+def manifest_blocks(manifest: Manifest) -> Iterator[bytes]:
+    """The text of the file, in blocks."""
+    entries = (f"{manifest.files[name]}  {name}" for name in sorted(manifest.files))
+    return list_blocks(f"{_FIRST}{manifest.logger}", entries)
 
 
 def parse_manifest(data: bytes) -> Manifest:
     """Read the text back. Raises ValueError, which says what was expected, for one that is not whole."""
-    try:
-        text = data.decode("ascii")
-    except UnicodeDecodeError:
-        raise ValueError("expected ASCII text") from None
-    first, *lines = text.split("\n")
-    head = _HEAD.fullmatch(first)
+    return read_manifest([data])
+
+
+def read_manifest(blocks: Iterable[bytes]) -> Manifest:
+    """The same for a text that comes in blocks. Raises ValueError for more than ``MAX_FILES`` files too."""
+    lines = list_lines(blocks)
+    head = _HEAD.fullmatch(next(lines, ""))
     if head is None:
         raise ValueError(f"line 1: expected '{_FIRST}' and a logger's 12 hex digits")
-    last = _LAST.fullmatch(lines[-2]) if len(lines) >= 2 and not lines[-1] else None
-    if last is None:
-        raise ValueError("cut short: expected a last line '# N files, list SHA-256'")
-    if last[2] != _digest(text[: -len(lines[-2]) - 1]):
-        raise ValueError("changed: the list does not fit the checksum in its last line")
-    files = {}
-    for number, line in enumerate(lines[:-2], start=2):
+    files: dict[str, str] = {}
+    for number, line in enumerate(lines, start=2):
         entry = _ENTRY.fullmatch(line)
         if entry is None:
             raise ValueError(f"line {number}: expected 'SHA-256  NAME', the name that of a log or a dump")
+        if len(files) == MAX_FILES:
+            raise ValueError(f"line {number}: expected at most {MAX_FILES} files")
         files[entry[2]] = entry[1]
     return Manifest(head[1], files)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode("ascii")).hexdigest()

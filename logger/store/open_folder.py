@@ -72,11 +72,14 @@ class OpenFolder:
     def at(cls, path: Path) -> OpenFolder:
         return cls(os.open(path, _DIRECTORY))
 
-    def inside(self, name: str) -> OpenFolder:
-        """The folder of that name in this one, made when it is not there. Raises ``OSError`` for a link or a file."""
+    def inside(self, name: str, make: bool = True) -> OpenFolder:
+        """The folder of that name in this one, made when it is not there and ``make``. Raises ``OSError`` for a link or
+        a file."""
         try:
             return OpenFolder(os.open(name, _DIRECTORY | os.O_NOFOLLOW, dir_fd=self._descriptor))
         except FileNotFoundError:
+            if not make:
+                raise
             os.mkdir(name, 0o755, dir_fd=self._descriptor)
             self.sync()
             return OpenFolder(os.open(name, _DIRECTORY | os.O_NOFOLLOW, dir_fd=self._descriptor))
@@ -101,9 +104,15 @@ class OpenFolder:
         """Descriptor of a file to lock, made when it is not there; readable is enough, whoever owns it."""
         return os.open(name, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644, dir_fd=self._descriptor)
 
-    def names(self) -> list[str]:
+    def each_name(self) -> Iterator[str]:
+        """The names in it, one at a time: a stick may hold more of them than fit the memory. One such walk at once."""
         with os.scandir(self._descriptor) as entries:
-            return [entry.name for entry in entries]
+            for entry in entries:
+                yield entry.name
+
+    def names(self) -> list[str]:
+        """The names in it, of a folder that is our own."""
+        return list(self.each_name())
 
     def find(self, name: str) -> os.stat_result | None:
         """What stands under a name, link or not; None: nothing."""
@@ -166,7 +175,7 @@ class OpenFolder:
 
     def clean(self) -> None:
         """Remove what a ``write`` that was cut short has left."""
-        for name in self.names():
+        for name in self.each_name():
             if _TEMPORARY.fullmatch(name):
                 self.discard(name)
 
@@ -175,9 +184,9 @@ class OpenFolder:
         os.rename(name, new_name, src_dir_fd=self._descriptor, dst_dir_fd=self._descriptor)
         self.sync()
 
-    def replace(self, name: str, data: bytes) -> None:
+    def replace(self, name: str, blocks: Iterable[bytes]) -> None:
         """Write a file that is there whole, in place of the old one, or not at all."""
-        temporary, _ = self.write([data])
+        temporary, _ = self.write(blocks)
         try:
             self.rename(temporary, name)
         except OSError:

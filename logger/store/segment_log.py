@@ -20,6 +20,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
+from drivers.regular_file import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.units import US_PER_S
@@ -240,7 +241,7 @@ class LogContent:
 def read_log(path: Path) -> LogContent:
     """Read a whole log, open or finished. Raises ``OSError``; damage is counted, not raised."""
     records, damaged_lines = [], 0
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         for row in scan(file):
             if row.record is None:
                 damaged_lines += 1

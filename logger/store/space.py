@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.disk import FileSystem
+from logger.store.pairing import NOT_PAIRED, Pairing
 from logger.store.recording import ENDING
 from logger.store.set_aside import file_size, is_file, is_taken
 
@@ -38,10 +39,12 @@ log = logging.getLogger(__name__)
 class Limits:
     """quota_bytes    most bytes in the folder of the logs; None: no limit
     floor_bytes      free space on its disk that is left to others
+    pairing          on whose sticks a copy lets a file be removed
     """
 
     quota_bytes: int | None = None
     floor_bytes: int = 200_000_000
+    pairing: Pairing = NOT_PAIRED
 
 
 @dataclass(frozen=True)

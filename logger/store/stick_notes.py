@@ -1,10 +1,10 @@
 """What a person at the car is told about the sticks that are plugged in: a note per stick, and a light for all.
 
-Problem. Somebody stands beside the car with a hand on the stick. They have no screen, or look once at ``ridelog
-status``; and there may be two sticks. Solution: a small file in memory per stick, written by its export and removed
-when the stick is; and one LED of the board that shows what matters most of all notes: it beats while any stick must
-stay, blinks evenly when one of them did not get everything, and is steady when all may be pulled. When the last stick
-has gone the LED does again what it did before.
+Problem. Somebody stands at the car with a hand on the stick. They have no screen, or look once at ``ridelog
+status``; and there may be two sticks. Solution: a small file in memory each time a stick is plugged in, empty until its
+export begins, written by the export and removed when the stick is; and one LED of the board that shows what matters
+most of all notes: it beats while any stick must stay, blinks evenly when one of them did not get everything, and is
+steady when all may be pulled. When the last stick has gone the LED does again what it did before.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ LED_MEMORY = "led-trigger"
 LARGEST_BYTES = 10_000
 """Most that is read of a note; what is cut there is none."""
 
-StickState = Literal["copying", "unmounting", "ready"]
+WAITING = "plugged in, waits for its turn"
+
+StickState = Literal["waiting", "copying", "unmounting", "ready"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class StickNote:
     """One stick.
 
     stick    its device, such as sda1
-    state    copying; unmounting; ready: it may be pulled
+    state    waiting; copying; unmounting; ready: it may be pulled
     ok       everything is on it, as far as is known
     text     one line for the person
     """
@@ -41,18 +43,24 @@ class StickNote:
     text: str
 
 
+def stick_of(path: Path) -> str:
+    """The device whose note this is: the name without the number of its plugging in (``sda1.27.json``: sda1)."""
+    return path.name.partition(".")[0]
+
+
 def write_note(path: Path, note: StickNote) -> None:
-    """Put a note, ``FOLDER/<stick>.json``, into place in one step. Raises ``OSError``."""
+    """Put a note, ``FOLDER/<stick>.<number>.json``, into place in one step. Raises ``OSError``."""
     new = path.with_suffix(".new")
     new.write_text(json.dumps(asdict(note)) + "\n", encoding="utf-8")
     new.replace(path)
 
 
 def read_note(path: Path) -> StickNote | None:
-    """A note; None where there is none that can be read."""
+    """A note; None where there is none that can be read. An empty one is that of a stick whose export waits."""
     try:
         with path.open("rb") as file:
-            note = StickNote(**json.loads(file.read(LARGEST_BYTES)))
+            text = file.read(LARGEST_BYTES)
+        note = StickNote(**json.loads(text)) if text else StickNote(stick_of(path), "waiting", True, WAITING)
     except (OSError, ValueError, TypeError, RecursionError):
         return None
     return note if note.state in get_args(StickState) else None

@@ -24,7 +24,7 @@ from logger.records import WindowRecord
 from logger.store import manifest
 from logger.store.intact_rows import Hole, are_in_holes
 from logger.store.log_name import LogName
-from logger.store.manifest import is_of_export, parse_manifest
+from logger.store.manifest import is_of_export, read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.segment_log import Row, scan
 from logger.store.sidecar import load_sidecar, repairs_of
@@ -33,7 +33,7 @@ from logger.units import US_PER_S
 DUMP_ENDINGS = (".dump", ".dump.gz")
 OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
 SILENCE_US = US_PER_S
-"""An accelerometer that says nothing for longer has left a gap in a dump."""
+"""An accelerometer that says nothing for longer has left a gap in a dump: told, and no damage of the file."""
 
 SHOWN_PROBLEMS = 20
 """Most problems that are kept in words for one file; all are counted."""
@@ -50,7 +50,7 @@ class FileCheck:
     records_good       rows or events that are as they were written
     records_torn       1 when the file ends in the middle of one
     records_corrupt    lines that are damaged; a dump is read up to the first
-    gaps               places where records are missing or time goes back
+    gaps               places where records are missing or time goes back; where an accelerometer said nothing
     problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
     notes              what is not wrong and should be known, as many at most
     ok                 nothing is wrong
@@ -217,8 +217,11 @@ def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, dam
 def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
     try:
         sidecar = load_sidecar(path)
-    except (ValueError, OSError) as error:
-        findings.wrong(f"sidecar: {error.strerror if isinstance(error, OSError) else error}")
+    except ValueError as error:
+        findings.wrong(f"sidecar: {error}")
+        return None
+    except OSError as error:
+        findings.wrong(f"sidecar: expected a readable file ({error.strerror})")
         return None
     if sidecar is None:
         if LogName.of(path):
@@ -290,8 +293,8 @@ def _take_events(findings: _Findings, path: Path) -> None:
                     continue
                 if heard_us is not None and event.t_us - heard_us > SILENCE_US:
                     findings.gaps += 1
-                    findings.wrong(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
-                                   f"and {event.t_us / US_PER_S:.6f} s")
+                    findings.note(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
+                                  f"and {event.t_us / US_PER_S:.6f} s")
                 heard_us = event.t_us
             if reader.torn_tail:
                 findings.torn = 1
@@ -307,7 +310,8 @@ def _check_manifest(path: Path) -> FileCheck:
     findings = _Findings()
     with OpenFolder.at(path.parent) as folder:
         try:
-            listed = parse_manifest(folder.read(manifest.NAME, manifest.MAX_BYTES)).files
+            with folder.open(manifest.NAME) as file:
+                listed = read_manifest(file.blocks()).files
         except OSError as error:
             findings.gaps = 1
             findings.wrong(f"expected a list of what was exported ({error.strerror}); export again")
@@ -316,14 +320,17 @@ def _check_manifest(path: Path) -> FileCheck:
             findings.corrupt = 1
             findings.wrong(f"corrupt: {error}")
             return findings.check(path, "manifest", "manifest")
-        present = set(folder.names())
+        present = {name for name in folder.each_name() if name in listed or _is_of_ours(name)}
         for name, digest in listed.items():
             _compare_with_manifest(findings, folder, name, digest, name in present)
     for name in sorted(present - set(listed)):
-        if LogName.of(Path(name)) or name.endswith(DUMP_ENDINGS):
-            findings.gaps += 1
-            findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
+        findings.gaps += 1
+        findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
     return findings.check(path, "manifest", "manifest")
+
+
+def _is_of_ours(name: str) -> bool:
+    return LogName.of(Path(name)) is not None or name.endswith(DUMP_ENDINGS)
 
 
 def _compare_with_manifest(findings: _Findings, folder: OpenFolder, name: str, digest: str, present: bool) -> None:

@@ -11,6 +11,7 @@ import pytest
 from logger.commands import export as export_command
 from logger.commands.main import main
 from logger.commands.status import stick_lines
+from logger.errors import BadInput, CheckFailed
 from logger.service.config import Config, LogConfig
 from logger.store import export as export_of_store
 from logger.store.exported import exported_names
@@ -79,6 +80,18 @@ def test_what_could_not_be_copied_is_told_with_its_reason(
     assert first.endswith("on the stick: Not a directory. 0 files copied (0.0 MB), 0 were there")
 
 
+def test_a_reason_from_outside_cannot_forge_a_line(
+        logs: Path, stick: Path, note: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    evil = "\x1b[2J\nok: 2 files copied"
+    result = export_of_store.ExportResult("0" * 12, failures=(export_of_store.Failure(evil, evil),), set_aside=(evil,))
+    monkeypatch.setattr(export_command, "export", lambda *_, **__: result)
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 1
+    lines = capsys.readouterr().out.split("\n")
+    assert len(lines) == 4
+    assert all(line.isprintable() for line in (*lines, told(note)))
+
+
 @pytest.mark.parametrize("arguments", [[], ["--to"], ["--to", "a", "--removed"], ["--to", "a", "--unmounted", "b"]])
 def test_wrong_use_is_status_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as leaving:
@@ -94,6 +107,32 @@ def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path,
     assert main(["export", "--removed", "--note", str(note)]) == 0
     assert not note.exists()
     assert main(["export", "--removed", "--note", str(note)]) == 0
+
+
+def test_a_stick_is_named_by_its_device_each_time_it_is_plugged_in(logs: Path, stick: Path, note: Path) -> None:
+    again = note.with_name("sda1.28.json")
+    again.touch()
+    assert told(again) == "stick sda1: plugged in, waits for its turn; leave it in"
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(again)]) == 0
+    assert told(again).startswith("stick sda1: 2 files copied")
+
+
+def test_a_copy_that_never_began_is_not_called_complete(stick: Path, note: Path) -> None:
+    note.touch()
+    main(["export", "--unmounted", str(stick), "--note", str(note)])
+    assert told(note) == "stick sda1: WRONG, copying did not end as it should; it may be pulled"
+
+
+def test_the_light_goes_out_after_the_note_was_removed(note: Path, tmp_path: Path) -> None:
+    led = tmp_path / "led"
+    led.mkdir()
+    (led / "trigger").write_text("none [mmc0]\n")
+    note.touch()
+    export_command.show_on_led(led, note.parent)
+    assert (led / "trigger").read_text() == "heartbeat"
+    note.unlink()
+    assert main(["export", "--removed", "--note", str(note), "--led", str(led)]) == 0
+    assert (led / "trigger").read_text() == "mmc0"
 
 
 def test_a_stick_that_could_not_be_mounted_is_not_written_to(logs: Path, stick: Path, note: Path) -> None:
@@ -155,6 +194,36 @@ def test_a_mistake_in_the_settings_keeps_no_log_in_the_car(
     assert "2 files copied" in said.out
     assert "ridelog.yaml" in said.err
     assert f"the logs in {logs} are copied" in said.err
+
+
+def paired(tmp_path: Path, logs: Path, mode: str, more: str = "") -> Path:
+    config = tmp_path / "ridelog.yaml"
+    config.write_text(f"log: {{directory: {logs}}}\npairing: {{mode: {mode}}}\n{more}")
+    return config
+
+
+def test_a_stick_that_is_not_paired_is_refused_in_its_note(
+        logs: Path, stick: Path, note: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "is_mount", lambda path: True)
+    config, other = paired(tmp_path, logs, "first_stick"), tmp_path / "other"
+    other.mkdir()
+    asked = ["export", "--mounted", "--config", str(config), "--note", str(note)]
+    assert main([*asked, "--to", str(stick)]) == 0
+    with pytest.raises(CheckFailed, match="not the stick"):
+        main([*asked, "--to", str(other)])
+    assert told(note).startswith("stick sda1: WRONG, this is not the stick")
+    assert list(other.iterdir()) == []
+
+
+@pytest.mark.parametrize("mode", ["first_stick", "key_file"])
+def test_a_mistake_in_settings_with_a_pairing_gives_no_logs_away(
+        logs: Path, stick: Path, tmp_path: Path, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = Config(log=LogConfig(logs))
+    monkeypatch.setattr(export_command, "Config", lambda: usual)
+    for more in ("nonsense: 7\n", "nonsense: [\n"):
+        with pytest.raises(BadInput):
+            main(["export", "--config", str(paired(tmp_path, logs, mode, more)), "--to", str(stick)])
+    assert list(stick.iterdir()) == []
 
 
 def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, tmp_path: Path) -> None:

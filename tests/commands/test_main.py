@@ -42,7 +42,8 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.startswith("ridelog ")
 
 
-@pytest.mark.parametrize("arguments", [[], ["dance"], ["--dance"], ["status", "--dance"], ["replay"]])
+@pytest.mark.parametrize("arguments", [[], ["dance"], ["--dance"], ["status", "--dance"], ["replay"],
+                                       ["verify", "x", "--\x1b[2J"], ["\x1b[2J\n"]])
 def test_wrong_use_is_one_line_and_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as leaving:
         main.main(arguments)
@@ -51,6 +52,7 @@ def test_wrong_use_is_one_line_and_status_2(arguments: list[str], capsys: pytest
     assert told.out == ""
     assert told.err.count("\n") == 1
     assert "--help')" in told.err
+    assert "\x1b" not in told.err
 
 
 def fault(error: BaseException) -> Callable[[object], int]:
@@ -68,6 +70,8 @@ def fault(error: BaseException) -> Callable[[object], int]:
     (PermissionError(13, "Permission denied", "/x"), 2, "ridelog: /x: Permission denied\n"),
     (MemoryError(), 2, "ridelog: not enough memory for so much data; cut it into shorter files\n"),
     (KeyboardInterrupt(), 130, ""),
+    (BadInput("\x1b[2Jok.csv: expected\x9b a log"), 2, "ridelog: \\x1b[2Jok.csv: expected\\x9b a log\n"),
+    (PermissionError(13, "Permission denied", "/\u202e\udcffx"), 2, "ridelog: /\\u202e\\udcffx: Permission denied\n"),
 ])
 def test_an_expected_fault_is_one_line_and_its_status(
         error: BaseException, status: int, told: str, monkeypatch: pytest.MonkeyPatch,

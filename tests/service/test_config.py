@@ -10,6 +10,7 @@ import yaml
 from logger.errors import BadInput
 from logger.service.config import Config, find_config, load_config
 from logger.shipped import shipped, vehicle_file, vehicle_names
+from logger.store.pairing import Pairing
 
 SHIPPED = shipped("config") / "ridelog.yaml"
 
@@ -53,6 +54,14 @@ def test_what_is_left_out_takes_its_default(tmp_path: Path) -> None:
     assert config.pipeline.low_pass_hz == 15
     assert config.pipeline.window_m == 7.62
     assert config.gps == Config().gps
+
+
+def test_pairing_is_read(tmp_path: Path) -> None:
+    assert load(tmp_path, "vehicle_error: 0.05\n").pairing == Pairing("off", Path("/etc/ridelog/stick.key"))
+    config = load(tmp_path, "pairing:\n  mode: key_file\n  key_file: my.key\n")
+    assert config.pairing == Pairing("key_file", tmp_path / "my.key")
+    with pytest.raises(BadInput, match=r"yaml:2: expected one of off, first_stick, key_file"):
+        load(tmp_path, "pairing:\n  mode: maybe\n")
 
 
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 from drivers.dump import Event
 from logger.demo.simulated_drive import Drive, simulate_drive
 from logger.errors import BadInput
+from logger.service.config import Config, GpsConfig, PipelineConfig
+from logger.service.core import STEP_US
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 
@@ -161,6 +164,59 @@ def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Dr
     assert len(rows.records) <= len(once.records) + 4
     assert "rotate" in rows.rows
     assert any(record.t_us > 300 * day_us and record.distance_start_m is not None for record in rows.records)
+
+
+def with_outages(events: list[Event], seed: int) -> list[Event]:
+    """The same drive with some outages of everything, of 1 to 119 s, some of which reach into others."""
+    rng = random.Random(seed)
+    kept, shift_us = [], 0
+    outages_us = sorted(rng.randint(events[0].t_us, events[-1].t_us) for _ in range(rng.randint(1, 4)))
+    for event in events:
+        while outages_us and event.t_us >= outages_us[0]:
+            outages_us.pop(0)
+            shift_us += rng.choice((1_000_000, 4_000_000, 12_000_000, 14_000_000, 30_000_000, 119_000_000))
+        kept.append(event._replace(t_us=event.t_us + shift_us))
+    return kept
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
+def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
+    short_drive: Drive, seed: int, only: str, bridge_s: int
+) -> None:
+    events = [event for event in with_outages(short_drive.events, seed) if only in ("all", event.source)]
+    config = replace(Config(), gps=replace(GpsConfig(), bridge_s=bridge_s), pipeline=PipelineConfig(drive_end_s=20))
+    core, rows = core_for(short_drive.header, config)
+    t_us = events[0].t_us
+    for event in events:
+        while t_us < event.t_us:
+            core.advance(t_us)
+            t_us += STEP_US // 2
+        core.feed(event)
+    core.finish()
+    assert rows_of(short_drive.header, events, config).rows == rows.rows
+
+
+@pytest.mark.parametrize("source", ["bma220", "nmea"])
+def test_an_event_now_and_then_costs_little_time(
+    source: str, short_drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One each 119 s kept the pipeline stepping through all the time between, 238 times for each."""
+    said = next(event.data for event in short_drive.events if event.source == source)
+    core, _ = core_for(short_drive.header)
+    steps = 0
+    step = core._pipeline.step
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal steps
+        steps += 1
+        return step(*arguments)
+
+    monkeypatch.setattr(core._pipeline, "step", counted)
+    for number in range(60):
+        core.feed(Event(number * 119_000_000, source, said))
+    core.finish()
+    assert steps <= 40 * 60
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from logger.service.config import Config, LogConfig
 from logger.service.live import HANG_US, Listener, monotonic_us
 from logger.service.stop import Stop
 from logger.service.storage import Storage
+from logger.store.pairing import Pairing
 from logger.store.space import Limits
 
 
@@ -49,13 +50,14 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr(start, "Notifier", lambda: parts["told"])
     monkeypatch.setattr(start, "go_first", lambda: None)
     log = replace(LogConfig(tmp_path / "log"), quota_bytes=123_456_789, keep_free_bytes=987_654)
-    start.serve(Config(log=log, status_file=tmp_path / "status.json"), Stop())
+    pairing = Pairing("first_stick")
+    start.serve(Config(log=log, pairing=pairing, status_file=tmp_path / "status.json"), Stop())
     parts["told"].words.clear()
     return parts
 
 
-def test_quota_and_floor_are_those_of_the_settings(built: dict[str, Any]) -> None:
-    assert built["limits"] == Limits(123_456_789, 987_654)
+def test_quota_and_floor_and_whose_copies_count_are_those_of_the_settings(built: dict[str, Any]) -> None:
+    assert built["limits"] == Limits(123_456_789, 987_654, Pairing("first_stick"))
 
 
 def test_a_folder_that_is_made_is_on_the_disk_before_anything_in_it(tmp_path: Path,

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
-from collections.abc import Callable
+import tracemalloc
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from logger.errors import BadInput
-from logger.store import manifest
+from logger.store import manifest, open_folder
 from logger.store.export import Progress, export, finished_files
-from logger.store.exported import exported_names
-from logger.store.manifest import parse_manifest
+from logger.store.exported import MARKS_NAME, exported_names
+from logger.store.manifest import Manifest, format_manifest, parse_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.verify import FileCheck, verify
 
@@ -159,6 +162,102 @@ def test_progress_goes_from_nothing_to_all(logs: Path, stick: Path) -> None:
     assert [progress.done for progress in told] == sorted(progress.done for progress in told)
 
 
+MOST_MEMORY_BYTES = 60_000_000
+"""Of the 150 MB that the unit may use Python and its modules take some 40."""
+
+
+def most_memory_bytes(act: Callable[[], object]) -> int:
+    tracemalloc.start()
+    try:
+        act()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def a_manifest(logs: Path, stick: Path, files: int) -> bytes:
+    run(logs, stick)
+    listed = {f"{number:05d}-{'0' * 40}.csv": "0" * 64 for number in range(files)}
+    return format_manifest(Manifest(own(logs, stick).name, listed))
+
+
+def test_a_manifest_longer_than_any_of_ours_takes_no_memory(logs: Path, stick: Path) -> None:
+    text = a_manifest(logs, stick, 400_000)
+    (own(logs, stick) / manifest.NAME).write_bytes(text)
+    del text
+    assert most_memory_bytes(lambda: run(logs, stick)) < MOST_MEMORY_BYTES
+    assert_all_there(logs, stick)
+
+
+def test_the_longest_manifest_that_is_read_fits_the_memory(logs: Path, stick: Path) -> None:
+    text = a_manifest(logs, stick, manifest.MAX_FILES)
+    (own(logs, stick) / manifest.NAME).write_bytes(text)
+    del text
+    assert most_memory_bytes(lambda: run(logs, stick)) < MOST_MEMORY_BYTES
+    assert_all_there(logs, stick)
+
+
+def test_names_without_end_on_a_stick_take_no_memory(
+        logs: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run(logs, stick)
+    real = os.scandir
+
+    class Crowd:
+        """A folder that also holds 300,000 long names."""
+
+        def __init__(self, place: int) -> None:
+            self._entries = real(place)
+
+        def __enter__(self) -> Iterator[SimpleNamespace]:
+            crowd = (SimpleNamespace(name=f"{number:06d}-{'x' * 240}") for number in range(300_000))
+            return itertools.chain(self._entries, crowd)
+
+        def __exit__(self, *_: object) -> None:
+            self._entries.close()
+
+    (logs / "00005-001.csv").write_text("new\n")
+    card = logs.stat().st_ino
+    monkeypatch.setattr(open_folder.os, "scandir",
+                        lambda place: real(place) if os.fstat(place).st_ino == card else Crowd(place))
+    assert most_memory_bytes(lambda: run(logs, stick)) < 20_000_000
+    monkeypatch.undo()
+    assert_all_there(logs, stick, (*NAMES, "00005-001.csv"))
+
+
+def test_a_stick_holds_no_more_files_of_a_logger_than_its_manifest(
+        logs: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(manifest, "MAX_FILES", 3)
+    result = run(logs, stick)
+    assert result.copied == NAMES[:3]
+    assert [failure.name for failure in result.failures] == [NAMES[3]]
+    assert "3 files" in result.failures[0].reason
+    assert_all_there(logs, stick, NAMES[:3])
+
+
+def test_lists_are_written_no_more_often_than_their_length_bears(
+        tmp_path: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is written beside the files grows as their number, not as its square: else 65,000 take hours."""
+    (tmp_path / "log").mkdir()
+    for number in range(1500):
+        (tmp_path / "log" / f"{number:05d}-001.csv").touch()
+    written = 0
+    real = OpenFolder.write
+
+    def write(folder: OpenFolder, blocks: Iterable[bytes]) -> tuple[str, str]:
+        def counted() -> Iterator[bytes]:
+            nonlocal written
+            for block in blocks:
+                written += len(block)
+                yield block
+        return real(folder, counted())
+
+    monkeypatch.setattr(OpenFolder, "write", write)
+    assert run(tmp_path / "log", stick).complete
+    ends = sum(path.stat().st_size for path in
+               (own(tmp_path / "log", stick) / manifest.NAME, tmp_path / "log" / MARKS_NAME))
+    assert written < 10 * ends
+
+
 @pytest.mark.parametrize("place", ["", "inside", "missing", "file"])
 def test_a_wrong_place_is_refused(logs: Path, tmp_path: Path, place: str) -> None:
     (logs / "inside").mkdir()
@@ -168,9 +267,40 @@ def test_a_wrong_place_is_refused(logs: Path, tmp_path: Path, place: str) -> Non
         run(logs, target)
 
 
+@pytest.mark.parametrize("logs_at", ["ridelog", "ridelog/log", "link"])
+def test_a_place_whose_own_folder_would_be_or_hold_the_logs_is_refused(tmp_path: Path, logs_at: str) -> None:
+    """What is copied goes into ``ridelog`` there: with the logs in /var/lib/ridelog, /var/lib is such a place."""
+    (tmp_path / "ridelog").mkdir()
+    (tmp_path / "link").symlink_to("ridelog")
+    logs = tmp_path / logs_at
+    logs.mkdir(exist_ok=True)
+    (logs / "00001-001.csv").write_text("rows\n")
+    before = contents(logs)
+    with pytest.raises(BadInput, match="expected a place apart from the folder of logs"):
+        run(logs, tmp_path)
+    assert contents(logs) == before
+    assert exported_names(logs) == set()
+
+
+def test_a_place_whose_own_folder_leads_into_the_logs_is_refused(logs: Path, tmp_path: Path) -> None:
+    (logs / "inside").mkdir()
+    (tmp_path / "place").mkdir()
+    (tmp_path / "place" / "ridelog").symlink_to(logs / "inside")
+    with pytest.raises(BadInput, match="expected a place apart from the folder of logs"):
+        run(logs, tmp_path / "place")
+
+
 def checked(folder: Path) -> FileCheck:
     other = Path(OTHER_LOGGER).parent.name
     return next(check for check in verify([folder]) if check.kind == "manifest" and check.path.parent.name != other)
+
+
+def test_an_export_of_nothing_passes_the_check_at_the_desk(tmp_path: Path) -> None:
+    for name in ("log", "stick"):
+        (tmp_path / name).mkdir()
+    assert run(tmp_path / "log", tmp_path / "stick").complete
+    check, = verify([tmp_path / "stick"])
+    assert (check.kind, check.ok, check.records_good) == ("manifest", True, 0)
 
 
 def test_what_was_exported_passes_the_check_at_the_desk(logs: Path, stick: Path) -> None:

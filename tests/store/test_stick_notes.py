@@ -37,7 +37,7 @@ def put(notes: Path, *all_notes: StickNote) -> None:
         write_note(notes / f"{note.stick}.json", note)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{", "[" * 9_000, "[" * 10**6, '{"stick": 1}'])
+@pytest.mark.parametrize("content", ["[]", "{", "[" * 9_000, "[" * 10**6, '{"stick": 1}'])
 def test_what_is_no_note_is_passed_over(notes: Path, content: str) -> None:
     put(notes, DONE)
     (notes / "sdb1.json").write_text(content)
@@ -49,7 +49,17 @@ def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
     assert read_notes(notes) == [COPYING, FAILED]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"stick": 1}', '{"stick":"a","state":"x","ok":true,"text":""}'])
+def test_a_stick_whose_note_is_still_empty_waits(led: Path, notes: Path) -> None:
+    """The unit makes it before anything else, so that a stick is never without a note, nor with that of another."""
+    (notes / "sda1.27.json").touch()
+    waiting, = read_notes(notes)
+    assert (waiting.stick, waiting.state, waiting.ok) == ("sda1", "waiting", True)
+    assert read_note(notes / "sda1.27.json") == waiting
+    show_on_led(led, notes)
+    assert (led / "trigger").read_text() == "heartbeat"
+
+
+@pytest.mark.parametrize("text", ["[]", "{}", '{"stick": 1}', '{"stick":"a","state":"x","ok":true,"text":""}'])
 def test_what_is_no_note_is_none(notes: Path, text: str) -> None:
     (notes / "sda1.json").write_text(text)
     assert read_note(notes / "sda1.json") is None

@@ -219,6 +219,19 @@ def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_p
     writer.close()
 
 
+def test_a_sensor_that_was_silent_is_told_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The recording is what was written: a cable that came loose in the drive is no damage."""
+    path = a_dump(tmp_path / "a.dump", *SAMPLES, Event(5_000_000, "bma220", b"\x00\x04\x40"))
+    check = found(path)
+    assert (counts(check), check.ok, check.problems) == ((51, 0, 0, 1), True, ())
+    words = "gap: nothing from the accelerometer between 0.490000 s and 5.000000 s"
+    assert check.notes == (words,)
+    assert main(["verify", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [f"    {words}", "ok: 1 file, 51 good, 0 torn, 0 corrupt, 1 gap"]
+    assert main(["verify", "--json", str(path)]) == 0
+    assert json.loads(capsys.readouterr().out)["files"][0]["notes"] == [words]
+
+
 def test_folders_are_searched_for_logs_and_dumps_only(tmp_path: Path) -> None:
     (tmp_path / "drive").mkdir()
     log_in(tmp_path / "drive", 1).close()
@@ -254,6 +267,20 @@ def test_command_tells_a_person(tmp_path: Path, capsys: pytest.CaptureFixture[st
     ]
 
 
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_name_cannot_forge_a_line_of_the_answer(
+        tmp_path: Path, listed: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    evil = "\x1b[2J\r\nok: 9 files, 9 good"
+    (tmp_path / evil).mkdir()
+    store(tmp_path / evil / "00001-001.csv", ["x"])
+    if not listed:
+        (tmp_path / evil / "00001-001.csv").rename(tmp_path / f"{evil}.dump")
+    assert main(["verify", str(tmp_path)]) == 1
+    lines = capsys.readouterr().out.split("\n")
+    assert all(line.isprintable() for line in lines)
+    assert [line for line in lines if line.startswith(("ok", "WRONG"))] == [lines[-2]]
+
+
 def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = store(tmp_path / "a.csv", lines_of(row(1), row(3)))
     assert main(["verify", "--json", str(path)]) == 1
@@ -261,7 +288,7 @@ def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[s
         "ok": False, "records_good": 2, "records_torn": 0, "records_corrupt": 0, "gaps": 1,
         "files": [{"path": str(path), "kind": "log", "state": "finished", "ok": False, "records_good": 2,
                    "records_torn": 0, "records_corrupt": 0, "gaps": 1,
-                   "problems": ["line 3: gap: expected segment 2, found 3"]}],
+                   "problems": ["line 3: gap: expected segment 2, found 3"], "notes": []}],
     }
 
 

@@ -74,14 +74,37 @@ def test_exposure_is_low(units: list[Path]) -> None:
         assert float(level[1]) <= MOST_EXPOSURE
 
 
+RUNS = ("ExecStartPre", "ExecStart", "ExecStop", "ExecStopPost")
+"""What a unit runs, in this order."""
+
+IN_THE_NAMESPACE_OF_PID_1 = ["/usr/bin/nsenter", "--mount=/proc/1/ns/mnt"]
+ONE_AT_A_TIME = "/usr/bin/flock"
+
+
+def written_lines(unit: str) -> list[str]:
+    return [value for key in RUNS for value in settings(unit).get(key, [])]
+
+
 def command_lines(unit: str) -> list[list[str]]:
-    lines = [value for key in ("ExecStart", "ExecStopPost") for value in settings(unit).get(key, [])]
-    return [shlex.split(line.lstrip("-+")) for line in lines]
+    return [shlex.split(line.lstrip("-+")) for line in written_lines(unit)]
+
+
+def inner(line: list[str]) -> list[str]:
+    """What a line runs in the end: without the program that puts it into a namespace, or has it wait its turn."""
+    if line[: len(IN_THE_NAMESPACE_OF_PID_1)] == IN_THE_NAMESPACE_OF_PID_1:
+        return line[len(IN_THE_NAMESPACE_OF_PID_1):]
+    if line[0] == ONE_AT_A_TIME:
+        return next(line[place:] for place, word in enumerate(line) if place and word.startswith(("/usr/", "/opt/")))
+    return line
+
+
+def runs_of(program: str) -> list[list[str]]:
+    return [line for line in map(inner, command_lines(EXPORT)) if line[0] == program]
 
 
 def test_every_command_line_is_one_that_the_program_takes() -> None:
     modules = {"run": run_command, "export": export_command}
-    ours = [line for unit in (SERVICE, EXPORT) for line in command_lines(unit) if line[0] == str(PROGRAM)]
+    ours = [line for unit in (SERVICE, EXPORT) for line in map(inner, command_lines(unit)) if line[0] == str(PROGRAM)]
     assert len(ours) == 4
     for line in ours:
         parser = argparse.ArgumentParser(exit_on_error=False)
@@ -90,26 +113,30 @@ def test_every_command_line_is_one_that_the_program_takes() -> None:
 
 
 def test_no_unit_and_no_rule_runs_a_shell() -> None:
-    programs = {line[0] for unit in (SERVICE, EXPORT) for line in command_lines(unit)}
-    assert programs == {str(PROGRAM), "/usr/bin/mount", "/usr/bin/umount"}
-    rules = (shipped("systemd") / "90-ridelog.rules").read_text()
-    assert set(re.findall(r'RUN\+="(\S+)', rules)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
+    programs = {inner(line)[0] for unit in (SERVICE, EXPORT) for line in command_lines(unit)}
+    assert programs <= {str(PROGRAM), "/usr/bin/mount", "/usr/bin/umount", "/usr/bin/touch", "/usr/bin/rm"}
+    text = (shipped("systemd") / "90-ridelog.rules").read_text()
+    assert set(re.findall(r'RUN\+="(\S+)', text)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
 
 
 def test_only_mounting_is_done_as_root() -> None:
-    privileged = [value.lstrip("-") for key in ("ExecStart", "ExecStopPost") for value in settings(EXPORT)[key]
-                  if "+" in value.split("/")[0]]
-    assert [value.split()[0] for value in privileged] == ["+/usr/bin/mount", "+/usr/bin/umount", "+/usr/bin/umount"]
-    assert not [value for value in settings(SERVICE)["ExecStart"] if "+" in value.split("/")[0]]
+    """And it is done where it lasts: systemd gives each command of a unit mounts of its own, that of a command with
+    ``+`` too, and a mount that is made among those ends with the command (systemd issue 14977)."""
+    privileged = [shlex.split(value.lstrip("-+")) for value in written_lines(EXPORT) if "+" in value.split("/")[0]]
+    assert [line[:2] for line in privileged] == [IN_THE_NAMESPACE_OF_PID_1] * 3
+    assert [inner(line)[0] for line in privileged] == ["/usr/bin/mount", "/usr/bin/umount", "/usr/bin/umount"]
+    assert len(runs_of("/usr/bin/mount") + runs_of("/usr/bin/umount")) == len(privileged)
+    assert not [value for value in written_lines(SERVICE) if "+" in value.split("/")[0]]
     assert settings(SERVICE)["User"] == settings(EXPORT)["User"] == ["ridelog"]
 
 
 def test_the_stick_is_mounted_so_that_nothing_on_it_can_act() -> None:
-    mount = command_lines(EXPORT)[0]
+    mount, = runs_of("/usr/bin/mount")
     options = set(mount[mount.index("-o") + 1].split(","))
     assert {"nosuid", "nodev", "noexec", "uid=ridelog", "gid=ridelog"} <= options
     assert mount[mount.index("-t") + 1] == "vfat,exfat"
-    assert mount[-1] == command_lines(EXPORT)[1][3] == command_lines(EXPORT)[2][-1]
+    copy = next(line for line in runs_of(str(PROGRAM)) if "--to" in line)
+    assert {mount[-1]} == {umount[-1] for umount in runs_of("/usr/bin/umount")} == {copy[copy.index("--to") + 1]}
 
 
 def test_folders_are_those_of_the_settings() -> None:
@@ -158,19 +185,85 @@ def test_devices_are_those_of_i2c_and_serial_ports() -> None:
     assert settings(SERVICE)["DevicePolicy"] == settings(EXPORT)["DevicePolicy"] == ["closed"]
     assert {value.split()[0] for value in settings(SERVICE)["DeviceAllow"]} == {
         "char-i2c", "char-ttyAMA", "char-ttyS", "char-ttyUSB", "char-ttyACM", "char-rfcomm"}
-    assert settings(EXPORT)["DeviceAllow"] == ["/dev/%i rw"]
+
+
+def rules() -> list[list[tuple[str, str, str]]]:
+    """The rules of udev as lists of (key, operator, value)."""
+    lines = [line for line in (shipped("systemd") / "90-ridelog.rules").read_text().splitlines()
+             if line and not line.startswith("#")]
+    token = r'([A-Z]+(?:\{[A-Za-z_]+\})?)(==|!=|\+=|=)"([^"]*)"'
+    assert all(re.fullmatch(rf"{token}(, {token})*", line) for line in lines)
+    return [re.findall(token, line) for line in lines]
+
+
+def the_rule(key: str, operator: str, value: str) -> dict[tuple[str, str], str]:
+    found, = (rule for rule in rules() if (key, operator, value) in rule)
+    return {(key, operator): value for key, operator, value in found}
+
+
+def list_of(rule: dict[tuple[str, str], str]) -> list[tuple[str, str, str]]:
+    return [(key, operator, value) for (key, operator), value in rule.items()]
 
 
 def test_the_rule_asks_for_the_label_and_starts_the_template() -> None:
-    lines = [line for line in (shipped("systemd") / "90-ridelog.rules").read_text().splitlines()
-             if line and not line.startswith("#")]
-    token = r'[A-Z]+(?:\{[A-Z_]+\})?(?:==|!=|\+=|=)"[^"]*"'
-    assert all(re.fullmatch(rf"{token}(, {token})*", line) for line in lines)
-    stick, light = lines
-    assert 'ENV{ID_FS_LABEL}=="RIDELOG|ridelog"' in stick
-    assert 'ENV{ID_BUS}=="usb"' in stick
-    started = re.search(r'ENV\{SYSTEMD_WANTS\}\+="([^"]*)"', stick)
-    assert started is not None
-    assert started[1].replace("%k", "") == EXPORT
-    assert 'KERNEL=="ACT"' in light
-    assert "--led /sys/class/leds/ACT" in settings(EXPORT)["ExecStart"][1]
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    assert stick["ENV{ID_BUS}", "=="] == "usb"
+    assert re.fullmatch(EXPORT.replace("@", "@.+"), stick["ENV{SYSTEMD_WANTS}", "+="])
+    light = the_rule("KERNEL", "==", "ACT")
+    assert light["SUBSYSTEM", "=="] == "leds"
+    assert all("/sys/class/leds/ACT" in line for line in runs_of(str(PROGRAM)))
+
+
+def test_a_stick_with_another_file_system_is_refused_in_words() -> None:
+    """Its label asks for the logs: the export starts, cannot mount it, and says which kinds it takes."""
+    assert not [key for key, _ in the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog") if key == "ENV{ID_FS_TYPE}"]
+    copy = next(line for line in runs_of(str(PROGRAM)) if "--to" in line)
+    assert "--mounted" in copy
+
+
+def test_a_stick_without_partitions_that_shows_as_a_disk_and_a_partition_is_one() -> None:
+    """mkfs.fat 4.2 gives a whole disk a table with one partition that begins where the disk does: both have the label,
+    and the second cannot be mounted. The disk goes first, and what it says of itself is there for its partitions."""
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    assert stick["ENV{RIDELOG_STICK}", "!="] == stick["ENV{RIDELOG_STICK}", "="] == "1"
+    phantom = the_rule("IMPORT{parent}", "=", "RIDELOG_STICK")
+    assert (phantom["ENV{DEVTYPE}", "=="], phantom["ATTR{start}", "=="]) == ("partition", "0")
+    assert rules().index(list_of(phantom)) < rules().index(list_of(stick))
+
+
+def test_each_time_that_a_stick_is_plugged_in_is_an_instance_of_its_own() -> None:
+    """A name such as sda1 comes back within a second, and systemd refuses to start an instance that it is still
+    stopping, for good. The sequence number of a disk is given out once (Linux 5.15 and later)."""
+    stick = the_rule("ENV{ID_FS_LABEL}", "==", "RIDELOG|ridelog")
+    instance = stick["ENV{SYSTEMD_WANTS}", "+="].removeprefix("ridelog-export@").removesuffix(".service")
+    assert "$env{DISKSEQ}" in instance
+    assert stick["SYMLINK", "+="] == f"ridelog/{instance}"
+    assert stick["TAG", "+="] == "systemd"
+    number_of_the_disk = the_rule("IMPORT{parent}", "=", "DISKSEQ")
+    assert number_of_the_disk["ENV{DEVTYPE}", "=="] == "partition"
+    unit = settings(EXPORT)
+    assert unit["BindsTo"] == ["dev-ridelog-%i.device"]
+    assert "dev-ridelog-%i.device" in unit["After"][0].split()
+    assert unit["DeviceAllow"] == ["/dev/ridelog/%i rw"]
+    mount, = runs_of("/usr/bin/mount")
+    assert mount[-2] == "/dev/ridelog/%i"
+    assert all("%i" in value for value in (*unit["ReadWritePaths"][:1], mount[-1]))
+
+
+def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_time() -> None:
+    lines = [inner(line) for line in command_lines(EXPORT)]
+    note = f"{stick_notes.FOLDER}/%i.json"
+    assert lines[0] == ["/usr/bin/touch", note]
+    stopping = [inner(shlex.split(line.lstrip("-+"))) for line in settings(EXPORT)["ExecStopPost"]]
+    assert stopping[:2] == [["/usr/bin/rm", "--force", note],
+                            ["/usr/bin/umount", "--quiet", "--lazy", "/run/ridelog-stick/%i"]]
+    assert all(note in line for line in runs_of(str(PROGRAM)))
+
+
+def test_one_stick_at_a_time_gets_the_logs() -> None:
+    """A stick may have a hundred partitions of that label. The others wait, in a program that takes no memory."""
+    ours = [line for line in command_lines(EXPORT) if inner(line)[0] == str(PROGRAM)]
+    assert all(line[0] == ONE_AT_A_TIME for line in ours)
+    places = {next(word for word in line if word.startswith("/run/")) for line in ours}
+    assert len(places) == 1
+    assert Path(places.pop()).parent == stick_notes.FOLDER
