@@ -15,7 +15,7 @@ from logger.records import WindowRecord
 from logger.store.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
 from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
 from logger.store.segment_log import HEADER, format_row
-from logger.store.session_counter import COUNTER_NAME
+from logger.store.session_counter import COUNTER
 from logger.store.set_aside import (
     Warn,
     disk_words,
@@ -96,7 +96,7 @@ def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
     put aside."""
     whole_name = name_of_temporary(path) or path.name
     is_temporary = whole_name != path.name
-    if not (_OWN_NAME.fullmatch(whole_name) or (is_temporary and whole_name == COUNTER_NAME)):
+    if not (_OWN_NAME.fullmatch(whole_name) or (is_temporary and COUNTER.fullmatch(whole_name))):
         return
     why = "" if is_file(path) else "not a file"
     if is_temporary:

@@ -7,11 +7,20 @@ import zlib
 from pathlib import Path
 
 from drivers.disk import FileSystem
-from logger.store.set_aside import Warn, disk_words, file_words, is_taken, set_aside_if_possible, warn_in_journal
+from logger.store.set_aside import (
+    Warn,
+    disk_words,
+    file_words,
+    is_taken,
+    numbered,
+    set_aside_if_possible,
+    warn_in_journal,
+)
 from logger.store.whole_file import replace_file
 
 COUNTER_NAME = "last-session"
 _COUNTER_BYTES = 64
+COUNTER = re.compile(COUNTER_NAME + r"(-\d+)?")
 _SESSION_NAME = re.compile(r"(\d{5,})[-.]")
 
 
@@ -20,23 +29,29 @@ def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = 
 
     It counts on from the counter file and from the names that are there, whichever is higher, so that neither a
     lost counter nor logs that were moved away bring a number back. A counter that cannot be read is put aside; where it
-    cannot be replaced either, the names of the session's own files keep its number. Raises ``OSError``.
+    cannot be replaced, another is kept. Raises ``OSError``.
     """
     files = files or FileSystem()
-    counter = directory / COUNTER_NAME
-    last = _read_counter(files, counter, warn)
-    matches = (_SESSION_NAME.match(path.name) for path in directory.iterdir())
-    number = max([last, *(int(match[1]) for match in matches if match)]) + 1
-    text = str(number)
-    is_in_the_way = is_taken(counter)
-    try:
-        replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
-    except OSError as error:
-        if not is_in_the_way:
-            raise
-        warn(f"{counter.name}: {file_words(error)}; it cannot be replaced, and sessions are numbered by the files that "
-             "are there")
+    names = [path.name for path in directory.iterdir()]
+    counted = [_read_counter(files, directory / name, warn) for name in names if COUNTER.fullmatch(name)]
+    number = max([0, *counted, *(int(match[1]) for name in names if (match := _SESSION_NAME.match(name)))]) + 1
+    _store_counter(files, directory / COUNTER_NAME, number, warn)
     return number
+
+
+def _store_counter(files: FileSystem, path: Path, number: int, warn: Warn) -> None:
+    """Store it under the first name that takes it."""
+    text = str(number)
+    for counter in numbered(path):
+        is_in_the_way = is_taken(counter)
+        try:
+            replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
+        except OSError as error:
+            if not is_in_the_way:
+                raise
+            warn(f"{counter.name}: {file_words(error)}; it cannot be replaced, and another is kept")
+        else:
+            return
 
 
 def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:

@@ -11,7 +11,7 @@ import errno
 import logging
 import re
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
 
@@ -72,10 +72,16 @@ def is_file(path: Path) -> bool:
     return file_size(path) is not None
 
 
+def numbered(path: Path) -> Iterator[Path]:
+    """A name and, without end, others for where it is taken: ``x``, ``x-2``, ``x-3``."""
+    yield path
+    for number in count(2):
+        yield path.with_name(f"{path.name}-{number}")
+
+
 def set_aside(files: FileSystem, path: Path, why: str, warn: Warn) -> None:
     """Rename what has this name, and say so. Raises ``OSError`` when it cannot be renamed."""
-    names = (path.with_name(path.name + ENDING + ("" if number == 1 else f"-{number}")) for number in count(1))
-    aside = next(name for name in names if not is_taken(name))
+    aside = next(name for name in numbered(path.with_name(path.name + ENDING)) if not is_taken(name))
     files.rename(path, aside)
     files.sync_directory(path.parent)
     warn(f"{path.name}: {why}; it is now called {aside.name}")

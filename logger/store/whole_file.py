@@ -6,13 +6,12 @@ A new content is written to a temporary file, waited for, and renamed into place
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
-from itertools import count
 from pathlib import Path
 
 from drivers.disk import FileSystem
-from logger.store.set_aside import is_taken
+from logger.store.set_aside import is_taken, numbered
 
 _TEMPORARY = re.compile(r"(.+)\.tmp(-\d+)?")
 
@@ -50,7 +49,7 @@ def name_of_temporary(path: Path) -> str | None:
 def _created(files: FileSystem, path: Path) -> tuple[Path, int]:
     """An empty temporary file and its descriptor. Names of which something there is not to be written to are passed
     over."""
-    for temporary in _temporary_names(path):
+    for temporary in numbered(path.with_name(f"{path.name}.tmp")):
         is_in_the_way = is_taken(temporary)
         try:
             return temporary, files.create(temporary)
@@ -58,7 +57,3 @@ def _created(files: FileSystem, path: Path) -> tuple[Path, int]:
             if not is_in_the_way:
                 raise
     raise AssertionError("names never end")
-
-
-def _temporary_names(path: Path) -> Iterator[Path]:
-    return (path.with_name(f"{path.name}.tmp{'' if number == 1 else f'-{number}'}") for number in count(1))

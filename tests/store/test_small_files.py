@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,12 @@ import pytest
 from logger.service import start
 from logger.service.config import Config, LogConfig
 from logger.service.stop import Stop
+from logger.store.rotation import SegmentLog, next_session
 
+from crashes import window
 from fault_trials import Hazard, cases_for_tests, label
-from small_files import HAZARDS, NAMES, THINGS, at_most_s, left_by_a_kill, replace_by
+from faulty_disk import RefusingFiles
+from small_files import HAZARDS, NAMES, THINGS, DeadFile, at_most_s, left_by_a_kill, replace_by
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
@@ -48,3 +52,20 @@ def test_the_service_starts_among_things_that_are_no_files(tmp_path: Path, monke
     assert seen["session"] == 3
     for name in ("last-session", "00002-002.json") if thing != "link to nothing" else ():
         assert any(name in record.getMessage() for record in caplog.records)
+
+
+def test_a_counter_that_cannot_be_replaced_gives_no_number_twice(tmp_path: Path) -> None:
+    """Not even when all logs were copied away and removed in between."""
+    files = DeadFile("last-session", ("open", "create", "rename", "remove"), errno.EIO)
+    (tmp_path / "last-session").write_text("half")
+    numbers = []
+    warnings: list[str] = []
+    for _ in range(3):
+        numbers.append(next_session(tmp_path, files, warnings.append))
+        log = SegmentLog(tmp_path, numbers[-1], {}, 10**6, RefusingFiles())
+        log.append(window(1, utc=True))
+        log.close()
+        for path in tmp_path.glob("0*"):
+            path.unlink()
+    assert numbers == [1, 2, 3]
+    assert any("last-session" in words for words in warnings)
