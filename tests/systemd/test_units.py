@@ -141,7 +141,7 @@ def test_the_stick_is_mounted_so_that_nothing_on_it_can_act() -> None:
 
 def test_what_a_stick_that_was_pulled_has_on_it_stops_no_later_export() -> None:
     """FAT keeps no journal: a name may have reached the stick before the list of its blocks. Removing such a file is an
-    error after which Linux lets nothing more be written, unless it is asked to go on; every file is read back anyway."""
+    error after which Linux lets nothing more be written, unless it is asked to go on. Every file is read back."""
     mount, = runs_of("/usr/bin/mount")
     assert "errors=continue" in mount[mount.index("-o") + 1].split(",")
 
