@@ -11,20 +11,24 @@ from pathlib import Path
 from logger.errors import EXIT_DONE, BadInput
 from logger.report.page import LoggedFile, page
 from logger.report.summary import summarise, summary_json
-from logger.store.rotation import LogName, read_sidecar
+from logger.store.log_folder import inside_of
+from logger.store.log_name import LogName, finished_path
 from logger.store.segment_log import read_log
+from logger.store.sidecar import read_sidecar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog report``."""
-    parser.add_argument("logs", metavar="LOGDIR", type=Path, help="folder of segment logs, or one log file")
+    parser.add_argument("logs", metavar="LOGDIR", type=Path,
+                        help="folder of segment logs, exported stick, or one log file")
     parser.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="page to write")
     parser.add_argument("--json", action="store_true", help="also print the summary, as one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog report``."""
-    files = write_report(find_logs(args.logs), args.out)
+    logs = find_logs(args.logs)
+    files = write_report(logs, args.out, args.logs)
     records = [record for file in files for record in file.records]
     if args.json:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
@@ -34,14 +38,15 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def write_report(logs: Sequence[Path], out: Path) -> list[LoggedFile]:
-    """Write the page of some log files, whole or not at all; give what was read.
+def write_report(logs: Sequence[Path], out: Path, place: Path | None = None) -> list[LoggedFile]:
+    """Write the page of some log files, whole or not at all; give what was read, each named from ``place`` on.
 
+    What a service has finished since is read as what it has become, what it has removed to make room is left out.
     Raises BadInput when no log has an intact row, or the page cannot be written.
     """
     if out.exists() and not out.is_file():
         raise BadInput(f"{out}: expected the name of a file to write")
-    files = [read_logged(log) for log in logs]
+    files = [logged for log in logs if (logged := read_logged(log, place)) is not None]
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(map(str, logs))}: expected a log with at least one intact row")
     new = out.with_name(out.name + ".new")
@@ -57,29 +62,36 @@ def write_report(logs: Sequence[Path], out: Path) -> list[LoggedFile]:
 
 
 def find_logs(place: Path) -> list[Path]:
-    """The logs in a folder, open ones too, in order of their writing; or the one file. Raises BadInput for none."""
-    if place.is_file():
+    """The logs in a folder at any depth, open ones too, folder by folder in order of their writing; or the one file.
+    Raises BadInput for none."""
+    if place.is_file() or finished_path(place).is_file():
         return [place]
     if not place.is_dir():
         raise BadInput(f"{place}: expected a folder of segment logs, or one log file")
-    found: dict[tuple[int, int], Path] = {}
-    for path in sorted(place.iterdir()):
+    found: dict[tuple[Path, int, int], Path] = {}
+    for path in sorted(inside_of(place)):
         name = LogName.of(path)
-        if name is not None and (name.finished or (name.session, name.part) not in found):
-            found[name.session, name.part] = path
+        if name is not None and (name.finished or (path.parent, name.session, name.part) not in found):
+            found[path.parent, name.session, name.part] = path
     if not found:
         raise BadInput(f"{place}: expected segment logs (such as 00001-001.csv), found none")
     return [found[key] for key in sorted(found)]
 
 
-def read_logged(log: Path) -> LoggedFile:
-    """Read a log, damaged or not, and what lies beside it. Raises BadInput for a file that cannot be opened."""
+def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:
+    """Read a log, damaged or not, and what lies beside it; None for one that is there no more. Raises BadInput for a
+    file that cannot be opened."""
+    if not log.exists():
+        log = finished_path(log)
     try:
         content = read_log(log)
+    except FileNotFoundError:
+        return None if finished_path(log) == log else read_logged(log, place)
     except OSError as error:
         raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
     try:
         sidecar = read_sidecar(log)
     except (ValueError, OSError):
         sidecar = None
-    return LoggedFile(log.name, content.records, content.damaged_lines, sidecar)
+    name = str(log.relative_to(place)) if place is not None and place in log.parents else log.name
+    return LoggedFile(name, content.records, content.damaged_lines, sidecar)

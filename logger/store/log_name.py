@@ -1,4 +1,7 @@
-"""The names of log files: ``<session>-<part>.csv.part`` while open, ``.csv`` when finished; the sidecar ``.json``."""
+"""The names of log files: ``<session>-<part>.csv.part`` while open, ``.csv`` when finished; the sidecar ``.json``.
+
+Recordings end in ``.part`` while they are open, too.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+PART = ".part"
 _LOG_NAME = re.compile(r"(\d{5,})-(\d{3,})\.csv(\.part)?")
 
 
@@ -25,12 +29,15 @@ class LogName:
 
 
 def open_path(finished: Path) -> Path:
-    return finished.with_name(finished.name + ".part")
+    """What a finished log or recording was called while it was open."""
+    return finished.with_name(finished.name + PART)
 
 
 def finished_path(part: Path) -> Path:
-    return part.with_name(part.name.removesuffix(".part"))
+    """What a log or a recording is called once it is finished; that of a finished one is its own."""
+    return part.with_name(part.name.removesuffix(PART))
 
 
 def sidecar_path(log: Path) -> Path:
+    """The name of a log's sidecar, open or finished."""
     return log.with_name(log.name.partition(".")[0] + ".json")

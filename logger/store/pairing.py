@@ -12,6 +12,7 @@ Number and key can be read by whoever has such a stick in hand: it is to be kept
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import re
 import secrets
@@ -94,6 +95,8 @@ def pair_first(pairing: Pairing, logs: OpenFolder, own: OpenFolder, stick: str) 
     name = stick or secrets.token_hex(_ID_BYTES)
     if not stick:
         own.replace(STICK_NAME, [f"{name}\n".encode("ascii")])
+        if _read_id(own, STICK_NAME) != name:
+            raise OSError(errno.EIO, "does not read back what was written")
     logs.replace(PAIRED_NAME, [f"{name}\n".encode("ascii")])
     return name
 

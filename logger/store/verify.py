@@ -23,7 +23,8 @@ from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
 from logger.store.intact_rows import Hole, are_in_holes
-from logger.store.log_name import LogName
+from logger.store.log_folder import inside_of
+from logger.store.log_name import LogName, finished_path, open_path
 from logger.store.manifest import is_of_export, read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.segment_log import Row, scan
@@ -105,32 +106,57 @@ class _Findings:
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
     """Check files, and the logs, dumps and manifests inside folders (at any depth), in order of their names.
 
-    Raises ``BadInput`` for a path that is not there, a file that is none of these, or a folder without any.
+    A service may write to a folder meanwhile: what it finishes is checked as what it has become, what it removes to
+    make room is left out, and what it begins is too new. Raises ``BadInput`` for a path that is not there, a file that
+    is none of these, or a folder without any.
     """
+    paths = list(paths)
     found = dict.fromkeys(file for path in paths for file in _files_of(path))
     logs: dict[Path, _Findings] = {}
     checks: dict[Path, FileCheck] = {}
     for path in found:
-        try:
-            if path.name == manifest.NAME:
-                checks[path] = _check_manifest(path)
-            elif _is_dump(path):
-                checks[path] = _check_dump(path)
-            else:
-                logs[path] = _check_log(path)
-        except OSError as error:
-            raise BadInput(f"{path}: expected a readable file, but: {error.strerror}") from error
+        _check(path, logs, checks)
+    newest = max((place for path in found if (place := _place(path))), default=(0, 0))
+    now = dict.fromkeys(file for path in paths for file in _files_of(path))
+    for path in now:
+        if path not in found and (open_path(path) in found or ((place := _place(path)) and place <= newest)):
+            _check(path, logs, checks)
+    for path in logs.keys() - now.keys():
+        del logs[path]
     _compare_neighbours(logs)
     checks |= {path: logs[path].check(path, "log", "open" if _is_part(path) else "finished") for path in logs}
-    return [checks[path] for path in found]
+    return [checks[path] for path in now if path in checks]
+
+
+def _check(path: Path, logs: dict[Path, _Findings], checks: dict[Path, FileCheck]) -> None:
+    """Check one file; nothing for one that is not there any more."""
+    try:
+        if path.name == manifest.NAME:
+            checks[path] = _check_manifest(path)
+        elif _is_dump(path):
+            checks[path] = _check_dump(path)
+        else:
+            logs[path] = _check_log(path)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise BadInput(f"{path}: expected a readable file, but: {error.strerror}") from error
+
+
+def _place(path: Path) -> tuple[int, int] | None:
+    """Where a log stands among those of its folder."""
+    name = LogName.of(path)
+    return (name.session, name.part) if name else None
 
 
 def _files_of(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
+    if (finished := finished_path(path)).is_file():
+        return [finished]
     if not path.is_dir():
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
-    inside = [file for file in (path, *path.rglob("*")) if not file.is_symlink()]
+    inside = [path, *inside_of(path)]
     files = {file for file in inside if file.is_file()
              and (LogName.of(file) or file.name == manifest.NAME
                   or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}

@@ -80,7 +80,8 @@ when it was tried. It is made by `python tests/bench/faults.py`; the counts are 
   and no figure is made up. What a frozen sensor says looks like a smooth road until it has lasted for half a minute:
   rows that were written before that keep their figures.
 - **Sticks.** Only what was read back from the stick counts as exported. Pulled at any instant nothing is lost, and the
-  next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there.
+  next try puts it right. Nothing outside our own folder on the stick is touched, whatever lies there, and nothing on it
+  takes memory without bound. Where the logger is paired with its sticks, no other gets a file.
 - **Input.** Every file and every byte from a wire is read as it stands or refused in one line that names it: no crash,
   no hang, no memory without bound.
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from logger.commands import main
+from logger.commands import report as report_command
 from logger.errors import BadInput
 from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, LoggedFile, page
 from logger.store.segment_log import HEADER, format_row
@@ -133,6 +134,40 @@ def test_the_command_reads_a_folder_in_order(drive, tmp_path: Path, capsys: pyte
     assert "Road roughness of 2 drives" in text
     assert "1 damaged line was left out" in text
     assert sorted(path.name for path in tmp_path.iterdir() if "page" in path.name) == ["page.html"]
+
+
+def test_the_command_finds_the_logs_on_a_stick(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "page.html"
+    cars = [tmp_path / "stick" / "ridelog" / name for name in ("0123456789ab", "123456789abc")]
+    for car in cars:
+        car.mkdir(parents=True)
+        write_log(car / "00001-001.csv", drive(5))
+    write_log(cars[1] / "00002-001.csv", drive(4))
+    (tmp_path / "stick" / "ridelog" / "link").symlink_to(cars[0])
+    names = ["0123456789ab/00001-001.csv", "123456789abc/00001-001.csv", "123456789abc/00002-001.csv"]
+    for place, expected in ((tmp_path / "stick", [f"ridelog/{name}" for name in names]),
+                            (tmp_path / "stick" / "ridelog", names), (cars[0], ["00001-001.csv"])):
+        assert main.main(["report", str(place), "--out", str(out), "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert told["files"] == expected
+        assert told["summary"]["drives"] == len(expected)
+
+
+def test_a_part_that_is_finished_before_it_is_read_is_read_as_what_it_has_become(
+        drive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("00001-001.csv", "00001-002.csv.part", "00001-003.csv"):
+        write_log(tmp_path / name, drive(5))
+    found = report_command.find_logs
+
+    def meanwhile(place: Path) -> list[Path]:
+        logs = found(place)
+        (tmp_path / "00001-002.csv.part").rename(tmp_path / "00001-002.csv")
+        (tmp_path / "00001-001.csv").unlink()
+        return logs
+
+    monkeypatch.setattr(report_command, "find_logs", meanwhile)
+    assert main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == ["00001-002.csv", "00001-003.csv"]
 
 
 def test_the_command_takes_one_file_and_tells_where_the_page_is(drive, tmp_path: Path,

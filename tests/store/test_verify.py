@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.records import WindowRecord
+from logger.store import verify as verify_of_store
 from logger.store.export import export
 from logger.store.rotation import SegmentLog, repair
 from logger.store.segment_log import HEADER, format_row
@@ -290,6 +292,71 @@ def test_command_tells_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[s
                    "records_torn": 0, "records_corrupt": 0, "gaps": 1,
                    "problems": ["line 3: gap: expected segment 2, found 3"], "notes": []}],
     }
+
+
+class Meanwhile:
+    """Lets the service do something just before the check opens a file of that name, or as soon as it has."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, name: str, act: Callable[[], object], after: bool) -> None:
+        self.acts = [act]
+        check = verify_of_store._check_log
+
+        def checked(path: Path) -> object:
+            if path.name == name and not after:
+                self.run()
+            found = check(path)
+            if path.name == name:
+                self.run()
+            return found
+
+        monkeypatch.setattr(verify_of_store, "_check_log", checked)
+
+    def run(self) -> None:
+        for act in self.acts:
+            act()
+        self.acts.clear()
+
+
+@pytest.mark.parametrize("after", [False, True])
+@pytest.mark.parametrize("named", [False, True])
+def test_a_part_that_is_finished_meanwhile_is_checked_as_what_it_has_become(
+        tmp_path: Path, after: bool, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = SegmentLog(tmp_path, 1, {}, 1)
+    for segment in (1, 2, 3):
+        log.append(row(segment))
+    place = log.path if named else tmp_path
+    Meanwhile(monkeypatch, log.path.name, lambda: (log.append(row(4)), log.append(row(5))), after)
+    checks = verify([place])
+    expected = ["00001-003.csv"] if named else ["00001-001.csv", "00001-002.csv", "00001-003.csv"]
+    assert [(check.path.name, check.state, check.problems) for check in checks] == [
+        (name, "finished", ()) for name in expected]
+
+
+@pytest.mark.parametrize("after", [False, True])
+def test_a_log_that_is_removed_meanwhile_to_make_room_is_not_missed(
+        tmp_path: Path, after: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = SegmentLog(tmp_path, 1, {}, 1)
+    for segment in (1, 2, 3):
+        log.append(row(segment))
+    log.close()
+
+    def make_room() -> None:
+        for name in ("00001-001.csv", "00001-001.json"):
+            (tmp_path / name).unlink()
+
+    Meanwhile(monkeypatch, "00001-001.csv", make_room, after)
+    assert [(check.path.name, check.ok) for check in verify([tmp_path])] == [
+        ("00001-002.csv", True), ("00001-003.csv", True)]
+
+
+def test_a_recording_that_is_finished_meanwhile_is_checked_as_what_it_has_become(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    a_dump(tmp_path / "00001.dump.gz", *SAMPLES).rename(tmp_path / "00001.dump.gz.part")
+    log_in(tmp_path, 1).close()
+    Meanwhile(monkeypatch, "00001-001.csv",
+              lambda: (tmp_path / "00001.dump.gz.part").rename(tmp_path / "00001.dump.gz"), after=True)
+    assert [(check.path.name, check.state) for check in verify([tmp_path])] == [
+        ("00001-001.csv", "finished"), ("00001.dump.gz", "dump")]
 
 
 def test_command_refuses_with_status_2(tmp_path: Path) -> None:

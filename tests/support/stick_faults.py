@@ -16,12 +16,15 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from logger.errors import BadInput
+import pytest
+
+from logger.errors import BadInput, CheckFailed
 from logger.store import manifest, open_folder
 from logger.store.export import ExportResult, Progress, export
 from logger.store.exported import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
 from logger.store.manifest import parse_manifest
 from logger.store.open_folder import OpenFolder
+from logger.store.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
 
 from fault_trials import Found, Hazard, found
 
@@ -124,8 +127,8 @@ def quiet(progress: Progress) -> None:
     pass
 
 
-def run(logs: Path, stick: Path, dumps: bool = False) -> ExportResult:
-    return export(logs, stick, dumps, quiet)
+def run(logs: Path, stick: Path, dumps: bool = False, pairing: Pairing = NOT_PAIRED) -> ExportResult:
+    return export(logs, stick, dumps, quiet, pairing)
 
 
 def own(logs: Path, stick: Path) -> Path:
@@ -503,6 +506,44 @@ def recording_that_grows(folder: Path, grows_by: int) -> Found:
     return found()
 
 
+# --- paired sticks
+
+
+def pull_while_pairing(folder: Path, case: tuple[int, bool]) -> Found:
+    """The first stick, failing at every call of its export, gets all the next time; no other ever does."""
+    error, lost = case
+    logs, stranger, first = a_card(folder), a_stick(folder / "stranger"), Pairing(FIRST_STICK)
+    at, calls = 0, 10**9
+    while at < calls:
+        at += 1
+        (logs / PAIRED_NAME).unlink(missing_ok=True)
+        stick = a_stick(folder / f"stick-{at}")
+        system = Stick(stick, at, error, lost)
+        with put_in(system):
+            try:
+                run(logs, stick, pairing=first)
+            except BadInput:
+                assert at == 1
+        calls = calls if system.calls >= at else at
+        assert run(logs, stick, pairing=first).complete
+        assert_all_there(logs, stick)
+        with pytest.raises(CheckFailed):
+            run(logs, stranger, pairing=first)
+        assert {path.name for path in (stranger / "ridelog").iterdir()} == {Path(OTHER_LOGGER).parent.name}
+    assert at > 80
+    return found(trials=at)
+
+
+def lying_stick_is_not_paired(folder: Path, case: None) -> Found:
+    logs, stick = a_card(folder), a_stick(folder / "stick")
+    system = Stick(stick)
+    system.flips = True
+    with put_in(system):
+        assert not run(logs, stick, pairing=Pairing(FIRST_STICK)).complete
+    assert not (logs / PAIRED_NAME).exists()
+    return found()
+
+
 _AGAIN = ("at every instant: nothing on the card changes, nothing of others is touched, only what is whole on the "
           "stick counts as exported; the next try puts it right")
 _LINKS = (hostile_link, hostile_link_to_nothing, hostile_link_to_folder, hostile_pipe, hostile_folder,
@@ -545,6 +586,11 @@ HAZARDS = (
     Hazard("two exports to one stick", "its folder is locked by another", "they take turns", "as promised",
            two_exports_at_once),
     Hazard("two sticks", "one after the other", "each gets everything", "as promised", two_sticks),
+    Hazard("stick pulled while it is paired", "at every call of the first export with `mode: first_stick`",
+           "it gets everything the next time, a stranger never anything", "as promised", pull_while_pairing,
+           ((errno.ENODEV, True), (errno.EIO, False))),
+    Hazard("first stick does not keep its number", "a bit of each write changes", "it is not paired", "as promised",
+           lying_stick_is_not_paired),
     Hazard("card that cannot be written to", "read-only, full", "emptied to the stick all the same; `unmarked` is told",
            "as promised", card_that_cannot_be_written_to, (errno.EROFS, errno.ENOSPC)),
     Hazard("card with a bad file", "reading one of four fails", "all others are copied, that one is named",

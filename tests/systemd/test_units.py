@@ -139,6 +139,13 @@ def test_the_stick_is_mounted_so_that_nothing_on_it_can_act() -> None:
     assert {mount[-1]} == {umount[-1] for umount in runs_of("/usr/bin/umount")} == {copy[copy.index("--to") + 1]}
 
 
+def test_what_a_stick_that_was_pulled_has_on_it_stops_no_later_export() -> None:
+    """FAT keeps no journal: a name may have reached the stick before the list of its blocks. Removing such a file is an
+    error after which Linux lets nothing more be written, unless it is asked to go on. Every file is read back."""
+    mount, = runs_of("/usr/bin/mount")
+    assert "errors=continue" in mount[mount.index("-o") + 1].split(",")
+
+
 def test_folders_are_those_of_the_settings() -> None:
     service, export, config = settings(SERVICE), settings(EXPORT), Config()
     assert Path("/var/lib", *service["StateDirectory"]) == Path("/var/lib", *export["StateDirectory"])
