@@ -69,6 +69,7 @@ def advice(status: ServiceStatus) -> list[str]:
         *_storage_advice(status.storage),
         *_sensor_advice("accelerometer", status.accelerometer),
         *_sensor_advice("GPS", status.gps),
+        *_settings_advice(status.accelerometer),
     ]
     if status.gps.state == "ok" and not status.fix_valid:
         steps.append("GPS: no fix. Give the antenna a free view of the sky; the first fix can take some minutes.")
@@ -110,6 +111,15 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     else:
         check = "check the cable, and the port in the settings (ls /dev/serial/by-id)"
     return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{error}"]
+
+
+def _settings_advice(sensor: SensorStatus) -> list[str]:
+    lost = sensor.counters.get("settings_lost", 0)
+    if not lost:
+        return []
+    times = "once" if lost == 1 else f"{lost} times"
+    return [f"accelerometer: it lost its settings {times} since the start and was started anew; its readings of that "
+            "time are left out. Its supply dips: check its 3.3 V and ground wires, and the Pi's own supply."]
 
 
 def _sensor_line(name: str, sensor: SensorStatus, words: str) -> str:

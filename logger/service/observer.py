@@ -179,7 +179,8 @@ class Observer:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=doubt or part.error or None,
             readings=readings,
-            counters={"faults": part.faults, "restarts": part.restarts, **self._counters[name]()},
+            counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
+                      "dropped_readings": part.dropped, **self._counters[name]()},
         )
 
     def _accelerometer_place(self) -> str:

@@ -7,6 +7,7 @@ import errno
 import math
 import random
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -28,7 +29,7 @@ from logger.records import WindowRecord
 from logger.service import assemble
 from logger.service.config import AccelerometerConfig, Bma220Config, Config, PascoConfig
 from logger.service.core import Core
-from logger.service.live import HANG_US, Deadlines, monotonic_us
+from logger.service.live import HANG_US, Deadlines, Listener, LiveService, monotonic_us
 from logger.service.observer import Observer
 from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.status import ServiceStatus
@@ -147,7 +148,11 @@ class Car:
         self.gps = Supervisor(SerialSource("nmea", self.port.opened, self.clock, 0.0), self.clock)
         self.observer = Observer(self.config, self.core, self.storage, self.pipeline, self.accelerometer, self.gps,
                                  {"accelerometer": sensor.counters, "gps": dict}, Deadlines(STEP_US))
+        events: deque[Event] = deque()
+        self.listeners = [Listener(part, events, lambda: None) for part in (self.accelerometer, self.gps)]
+        self.service = LiveService(self.core, self.storage, self.listeners, events, 1.0, 1.0, lambda now_us: None)
         self.heard_us: list[int] = []
+        self.core.feed = self._heard  # type: ignore[method-assign]
         self.longest_step_us = 0
         self._second = -1
 
@@ -157,6 +162,11 @@ class Car:
     @property
     def now_s(self) -> float:
         return (self.clock.now_us - self.begin_us) / 1e6
+
+    def _heard(self, event: Event) -> None:
+        if event.source != "nmea":
+            self.heard_us.append(event.t_us)
+        Core.feed(self.core, event)
 
     def rough_road(self, second: float) -> bytes:
         return bytes((0, 4 * self.rng.randrange(2), 4 * (16 + self.rng.randrange(-2, 3))))
@@ -180,12 +190,9 @@ class Car:
             self.travelled_m += self.speed_mps
             self.port.load(self.receiver(self._second))
             self.observer.write(self.clock.now_us)
-        for supervisor in (self.accelerometer, self.gps):
-            event = supervisor.step()
-            if event is not None:
-                self.core.feed(event)
-                if event.source != "nmea":
-                    self.heard_us.append(event.t_us)
+        for listener in self.listeners:
+            listener.look()
+        self.service.move(self.clock.now_us)
         self.longest_step_us = max(self.longest_step_us, self.clock.now_us - began_us)
         self.clock.now_us += STEP_US
 
@@ -569,8 +576,8 @@ HAZARDS = (
     Hazard("another device on a port", "receiver on the sensor's port, sensor on the receiver's, garbled lines",
            "no reading is made of it; the other sensor goes on; `status` says so", "as promised", another_device,
            ("receiver on the sensor's port", "sensor on the receiver's port", "wrong baud rate")),
-    Hazard("accelerometer loses its settings", "a brown-out, or registers that change: the readings go on, 2 to 8 times "
-           "too large or too small, or with no filter",
+    Hazard("accelerometer loses its settings", "a brown-out, or registers that change: the readings go on, "
+           "2 to 8 times too large or too small, or with no filter",
            "no such reading is taken; started anew within a second; the rows in it are flagged `gap`; `status` says so",
            "{unheard_s.most:.2f} s of readings left out, or less", settings_lost,
            ((4, "brown-out"), (2, "brown-out"), (2, "range and filter"), (2, "range"), (2, "filter"), (2, "axes"),
