@@ -254,6 +254,8 @@ class Bma220Decoder:
                      slowly than it is read, or nothing moves
     """
 
+    doubt = ""
+
     def __init__(self, range_g: int) -> None:
         self.mps2_per_count = mps2_per_count(range_g)
         self.anomalies = 0
@@ -268,6 +270,9 @@ class Bma220Decoder:
             raise BadReply(f"a BMA220 sample is {SAMPLE_BYTES} bytes (X, Y, Z), not {len(data)}")
         self._t_us.append(t_us)
         self._data += data
+
+    def flush(self) -> None:
+        """Nothing is held back."""
 
     def take(self) -> AccelerationBlock:
         """Decode everything fed since the last call; an empty block when that was nothing."""

@@ -27,9 +27,13 @@ log = logging.getLogger(__name__)
 
 
 class AccelerationDecoder(Protocol):
-    """What every accelerometer driver offers: bytes with their arrival time in, samples out."""
+    """What every accelerometer driver offers: bytes with their arrival time in, samples out; after ``flush`` the next
+    ``take`` gives all. ``doubt``: what is wrong with the samples that come; empty: nothing."""
 
+    @property
+    def doubt(self) -> str: ...
     def feed(self, t_us: int, data: bytes) -> None: ...
+    def flush(self) -> None: ...
     def take(self) -> AccelerationBlock: ...
 
 
@@ -110,6 +114,7 @@ class Core:
         """End of the events: what is inside comes out, the log is closed."""
         if self._next_step_us is not None:
             self._fixes += self._gps.flush()
+            self._accelerometer.flush()
             self._write(self._pipeline.step(self._next_step_us, self._take_block(), self._take_fixes()))
             self._write(self._pipeline.finish())
         self._sink.close()
@@ -118,6 +123,11 @@ class Core:
     def utc_known(self) -> bool:
         """True once UTC has been learnt from the GPS."""
         return self._offset_us is not None
+
+    @property
+    def accelerometer_doubt(self) -> str:
+        """What is wrong with the samples that come; empty: nothing."""
+        return self._accelerometer.doubt
 
     def _take_block(self) -> AccelerationBlock:
         block = self._accelerometer.take()

@@ -29,7 +29,6 @@ from logger.units import US_PER_S
 
 LOOP_S = 0.5
 HOLD_BACK_US = 60_000
-GATHER_S = 0.05
 CLOSED_WAIT_S = 0.1
 STOP_WAIT_S = 2.0
 HANG_US = 10 * US_PER_S
@@ -110,11 +109,6 @@ class Listener(threading.Thread):
     def hangs(self, now_us: int) -> bool:
         """True when the device has not returned from a look for so long that only a restart can help."""
         return now_us - self.looked_us > HANG_US
-
-
-def gather() -> None:
-    """Pause after a chunk of serial bytes, so that the next chunk is worth its wake-up."""
-    time.sleep(GATHER_S)
 
 
 class LiveService:

@@ -1,11 +1,12 @@
 """Where events come from: each source opens its device and turns one look at it into events.
 
-A source knows nothing of waiting, retrying or threads. The bus and the port are given as functions that open
+A source knows nothing of retrying or threads. The bus and the port are given as functions that open
 them, so real and recorded ones look the same.
 """
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,6 +21,7 @@ CHECK_EVERY_US = 60_000
 """One of the chip's four registers each time: all have been seen a quarter of a second after a reading."""
 
 READ_BYTES = 4096
+GATHER_S = 0.05
 
 
 class Source(Protocol):
@@ -126,18 +128,25 @@ class Bma220Source:
 
 
 class SerialSource:
-    """The bytes that have arrived on a serial port, as one chunk per poll. It holds nothing back."""
+    """The bytes that have arrived on a serial port, as one chunk per poll. It holds nothing back.
+
+    Where ``gather`` is called between polls, every other one takes what has come while it slept, and the one after it
+    waits for the next byte: a few wake-ups bring all bytes, and every other chunk has the time of its first byte.
+    """
 
     dropped = 0
     waiting_since_us = None
 
     def __init__(
-        self, name: str, open_port: Callable[[], BytePort], now_us: Callable[[], int], wait_s: float
+        self, name: str, open_port: Callable[[], BytePort], now_us: Callable[[], int], wait_s: float,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self.name = name
         self._open_port = open_port
         self._now_us = now_us
         self._wait_s = wait_s
+        self._sleep = sleep
+        self._has_slept = False
         self._port: BytePort | None = None
 
     def open(self) -> None:
@@ -149,10 +158,16 @@ class SerialSource:
         if self._port is None:
             raise NotPresent(f"the {self.name} port is not open")
         try:
-            data = self._port.read(READ_BYTES, self._wait_s)
+            data = self._port.read(READ_BYTES, 0.0 if self._has_slept else self._wait_s)
         except OSError as error:
             raise NotPresent(f"the {self.name} port has gone: {error}") from error
         return [Event(self._now_us(), self.name, data)] if data else []
+
+    def gather(self) -> None:
+        """Sleep after a poll that waited, so that the next one finds more than a byte; not after the one that slept."""
+        self._has_slept = not self._has_slept
+        if self._has_slept:
+            self._sleep(GATHER_S)
 
     def flush(self) -> list[Event]:
         """Nothing is held back."""

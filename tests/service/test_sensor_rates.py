@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from logger.commands.status import advice
 
 from replaying import rows_of
 from sensor_faults import Car
-from serial_drives import SPEED_MPS, drive_at, mean_iri, randomly_lost, rows_at, without_lines
+from serial_drives import SPEED_MPS, drive_at, mean_iri, randomly_lost, rows_at, same_rows, without_lines
 
 WHOLE_ROWS = 185
 
@@ -32,10 +33,10 @@ def test_a_sensor_that_is_too_slow_gives_no_iri() -> None:
 
 @pytest.mark.parametrize(("rate_hz", "share"), [(100, 0.1), (100, 0.03), (150, 0.1), (200, 0.05)])
 def test_rows_with_many_lost_lines_are_right_or_flagged(rate_hz: int, share: float) -> None:
-    expected, _ = mean_iri(rows_at(100)[1])
-    found, count = mean_iri(rows_at(rate_hz, share)[1])
-    assert count < WHOLE_ROWS / 4
-    assert count < 5 or found == pytest.approx(expected, rel=0.05)
+    pairs = same_rows(rows_at(rate_hz, share)[1], rows_at(100)[1])
+    assert len(pairs) < WHOLE_ROWS / 4
+    found, expected = np.mean(pairs, axis=0) if len(pairs) >= 5 else (0, 0)
+    assert found == pytest.approx(expected, rel=0.1)
 
 
 def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
@@ -52,7 +53,8 @@ def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
     assert found > 0.9 * hit
     clean = [row for row in driven if "gap" not in row.flags]
     assert len(clean) > 40  # and not everywhere
-    assert mean_iri(rows)[0] == pytest.approx(mean_iri(rows_at(100)[1])[0], rel=0.03)
+    found, expected = np.mean(same_rows(rows, rows_at(100)[1]), axis=0)
+    assert found == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize("second", [31.0, 47.37, 66.6, 80.0])

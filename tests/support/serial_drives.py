@@ -61,3 +61,11 @@ def mean_iri(rows: Rows) -> tuple[float, int]:
     """Mean IRI of the rows without a flag, and how many they are."""
     iri = [row.iri_m_per_km for row in rows.records if not row.flags and row.iri_m_per_km is not None]
     return (float(np.mean(iri)) if iri else float("nan")), len(iri)
+
+
+def same_rows(rows: Rows, others: Rows) -> list[tuple[float, float]]:
+    """IRI of the rows without a flag, each with that of the row of the same place in the other."""
+    known = {round(row.distance_start_m or 0.0, 1): row.iri_m_per_km for row in others.records if not row.flags}
+    pairs = [(row.iri_m_per_km, known.get(round(row.distance_start_m or 0.0, 1))) for row in rows.records
+             if not row.flags]
+    return [(found, other) for found, other in pairs if found is not None and other is not None]
