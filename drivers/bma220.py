@@ -37,6 +37,7 @@ CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)
 DATA_ADDRESS = 0x04  # X, Y, Z: three registers in one burst, which steps from register to register by itself
 SAMPLE_BYTES = 3
+REGISTER_STEP = 2  # from one register's address to the next one's
 AXES = Register("power and axes", 0x1E, reset_value=0x07)
 FILTER = Register("filter", 0x20)
 RANGE = Register("range", 0x22)

@@ -39,15 +39,15 @@ class SampleClock:
        ``SLOWEST`` of the profile's is refused: so much is not lost without harm. The samples are then not dated.
     2. Settling. Samples are held for ``SETTLE_US`` of arrival time; the line starts at their lower envelope.
     3. Following, in blocks of ``BLOCK_US``. An arrival below the line pulls it down at once: no sample is later than
-       its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of the least
-       distance, at most by the tolerance of the clock. The period is the median of the slopes between the lowest
+       its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of the
+       least distance, at most by the tolerance of the clock. The period is the median of the slopes between the lowest
        arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
        tolerance of the rate found.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
        ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
        where that is more, samples were lost: the line moves by as many periods and leaves a hole. (A link that is late
-       by 30 ms at random has such a second now and then: once in 1,000 samples.) Arrivals that stay more than ``OFF_US``
-       late, or that come that much too early, make the clock settle anew.
+       by 30 ms at random has such a second now and then: once in 1,000 samples.) Arrivals that stay more than
+       ``OFF_US`` late, or that come that much too early, make the clock settle anew.
     5. Steadiness. Losses from the start on look like a slower clock. But they come by chance, and arrivals of a slow
        clock lie on a line: where the lowest arrivals of the last blocks do not, neither as they came nor with the
        losses that were noticed, the profile's own rate is taken, by which losses show; a device of another rate is

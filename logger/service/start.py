@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
+from drivers.bma220 import REGISTER_STEP
 from drivers.dump import Event, open_dump
 from drivers.hardware import open_i2c, open_serial
 from drivers.ports import I2cBus
@@ -105,7 +106,7 @@ def _accelerometer(config: Config) -> Source:
 
 def _bus_opener(bus: int | Path) -> Callable[[], I2cBus]:
     if isinstance(bus, int):
-        return lambda: open_i2c(bus)
+        return lambda: open_i2c(bus, REGISTER_STEP)
 
     def play() -> I2cBus:
         with open_dump(bus) as reader:

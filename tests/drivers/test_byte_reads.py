@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.bma220 import Bma220, Bma220Settings
+from drivers.bma220 import REGISTER_STEP, Bma220, Bma220Settings
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 from drivers.replay import RecordedBus
@@ -32,7 +32,7 @@ def opened(monkeypatch: pytest.MonkeyPatch, functions: int, chip: RecordedBus | 
     monkeypatch.setattr(smbus2.SMBus, "read_byte_data", lambda self, *a, **k: bus.read_byte_data(*a))
     monkeypatch.setattr(smbus2.SMBus, "write_byte_data", lambda self, *a, **k: bus.write_byte_data(*a))
     monkeypatch.setattr(smbus2.SMBus, "read_i2c_block_data", lambda self, *a, **k: bus.read_i2c_block_data(*a))
-    return lambda: open_i2c(1)
+    return lambda: open_i2c(1, REGISTER_STEP)
 
 
 class Renewing(RecordedBus):
