@@ -20,6 +20,7 @@ from logger.store.rotation import ClockMap
 
 STEP_US = 500_000
 IDLE_US = 120_000_000
+TELLING_FIXES = 10
 STEP_BYTES = 1_000_000
 """More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
 
@@ -63,6 +64,7 @@ class Core:
         self._step_bytes = 0
         self._drive = pipeline.drive
         self._offset_us: int | None = None
+        self._fixes_without_speed = 0
         self.rows = 0
         self.samples = 0
         self.fixes = 0
@@ -129,6 +131,15 @@ class Core:
         """What is wrong with the samples that come; empty: nothing."""
         return self._accelerometer.doubt
 
+    @property
+    def gps_doubt(self) -> str:
+        """What is wrong with the fixes that come; empty: nothing."""
+        fix = self.last_fix
+        if fix is not None and fix.valid and fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
+            return ("it tells its place, but no speed, so no row has a distance: have it send RMC or VTG sentences, "
+                    "not GGA alone")
+        return self._pipeline.speed_check.doubt or self._gps.doubt
+
     def _take_block(self) -> AccelerationBlock:
         block = self._accelerometer.take()
         self.samples += len(block)
@@ -141,6 +152,9 @@ class Core:
         if fixes:
             self.fixes += len(fixes)
             self.last_fix = fixes[-1]
+        for fix in fixes:
+            if fix.valid:
+                self._fixes_without_speed = self._fixes_without_speed + 1 if fix.speed_mps is None else 0
         return fixes
 
     def _write(self, records: list[WindowRecord]) -> None:

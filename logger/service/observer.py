@@ -153,8 +153,9 @@ class Observer:
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""
         doubt = self._progress[name].look(now_us, state == "ok", readings)
-        if name == "accelerometer" and state == "ok" and self._core.accelerometer_doubt:
-            return self._core.accelerometer_doubt
+        told = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
+        if state == "ok" and told:
+            return told
         if doubt or state != "ok" or name != "accelerometer":
             return doubt
         frozen_s = self._pipeline.stillness.frozen_s

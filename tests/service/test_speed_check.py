@@ -36,9 +36,10 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     told, *_ = advice(status)
     assert "speed and its places disagree" in told
     assert "the car stands" not in screen(status, None)[0]
-    rows = [row for row in car.rows.records if row.speed_mps]
+    known_s = 13 if factor < 1 else 0  # a speed that is too small shows after a hundred metres of difference
+    rows = [row for row in car.rows.records if row.speed_mps and row.t_us > car.begin_us + known_s * 1e6]
     assert all("speed_doubtful" in row.flags for row in rows)
-    assert [row.iri_m_per_km or row.iri_rms_m_per_km or row.iri_class for row in rows] == [None] * len(rows) or not rows
+    assert not any(row.iri_m_per_km or row.iri_rms_m_per_km or row.iri_class for row in rows)
     assert any(row.a_w_mps2 is not None for row in rows) or factor == 0.0
     car.receiver = lambda second: epoch(second, car.speed_mps, car.travelled_m)
     status = car.drive(90)
