@@ -3,8 +3,9 @@
 Problem: the chip is easy to stop by accident (reading register 0x30 suspends it, reading 0x32 holds it in reset), it
 can hold the bus low for ever, and after a dip of its supply it goes on delivering plausible numbers at the wrong scale
 and without an anti-alias filter. Solution: ``start`` brings it from whatever state it is in to a known one, with its
-bus watchdog on, and reads every setting back; ``check_settings`` tells later whether it still is in that state;
-``read_raw`` is one burst and nothing else; decoding is done by the block, away from the bus.
+bus watchdog on, and reads every setting back; ``check_settings`` and, one register at a time, ``check_next`` tell later
+whether it still is in that state; ``read_raw`` is one burst and nothing else; decoding is done by the block, away from
+the bus.
 
 When anything raises a DeviceError, wait and call ``start`` again: it assumes nothing about the chip.
 
@@ -23,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, Timeout, WrongDevice
 from drivers.ports import I2cBus
 from drivers.readings import AccelerationBlock
 from drivers.registers import Field, Register, ToggleRegister
@@ -36,6 +37,7 @@ CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)
 DATA_ADDRESS = 0x04  # X, Y, Z: three registers in one burst, which steps from register to register by itself
 SAMPLE_BYTES = 3
+REGISTER_STEP = 2  # from one register's address to the next one's
 AXES = Register("power and axes", 0x1E, reset_value=0x07)
 FILTER = Register("filter", 0x20)
 RANGE = Register("range", 0x22)
@@ -120,7 +122,10 @@ class Bma220:
     NotPresent   nothing acknowledges, or a kernel driver owns the address
     Timeout      the bus is held low
     WrongDevice  another chip is at the address
-    BadReply     the chip does not do what it was told, or has lost its settings
+    BadReply     the chip does not do what it was told
+    SettingsLost    it did, and no longer does
+
+    registers_to_check   so many ``check_next`` see every setting once
     """
 
     def __init__(self, bus: I2cBus, settings: Bma220Settings, sleep: Callable[[float], None]) -> None:
@@ -129,16 +134,19 @@ class Bma220:
         self._settings = settings
         self._sleep = sleep
         self._chip: int | None = None
+        self._checked = 0
         self._wanted: tuple[tuple[Register, Mapping[Field, int]], ...] = (
             (WATCHDOG, {WATCHDOG_CODE: WATCHDOG_CODES[settings.watchdog_ms]}),
             (RANGE, {RANGE_CODE: RANGE_CODES[settings.range_g], SELF_TEST: 0}),
             (FILTER, {FILTER_CODE: FILTER_CODES[settings.filter_hz], SERIAL_HIGH_BANDWIDTH: 0}),
             (AXES, {ENABLED_AXES: 0b111, SLEEP_ENABLE: 0}),
         )
+        self.registers_to_check = len(self._wanted)
 
     def start(self) -> Bma220Identity:
         """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
         self._chip = None
+        self._checked = 0
         chip = self._probe()
         try:
             revision = REVISION.read(self._bus, chip)
@@ -165,15 +173,22 @@ class Bma220:
         return data
 
     def check_settings(self) -> None:
-        """BadReply when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
+        """SettingsLost when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
+        for _ in self._wanted:
+            self.check_next()
+
+    def check_next(self) -> None:
+        """Read back one register, each in its turn. SettingsLost when it does not hold what ``start`` wrote; after a
+        transfer that failed it is the same one's turn again."""
         chip = self._started()
+        register, values = self._wanted[self._checked]
         try:
-            for register, values in self._wanted:
-                register.check(self._bus, chip, values)
+            register.check(self._bus, chip, values)
         except OSError as error:
             raise _fault(error, chip) from error
         except BadReply as error:
-            raise BadReply(f"BMA220 lost its settings (did its supply dip?): {error}") from error
+            raise SettingsLost(f"BMA220 lost its settings (did its supply dip?): {error}") from error
+        self._checked = (self._checked + 1) % len(self._wanted)
 
     def stop(self) -> None:
         """Suspend the chip if it was running. Never raises: a chip that cannot be told is left as it is."""
@@ -240,6 +255,8 @@ class Bma220Decoder:
                      slowly than it is read, or nothing moves
     """
 
+    doubt = ""
+
     def __init__(self, range_g: int) -> None:
         self.mps2_per_count = mps2_per_count(range_g)
         self.anomalies = 0
@@ -254,6 +271,9 @@ class Bma220Decoder:
             raise BadReply(f"a BMA220 sample is {SAMPLE_BYTES} bytes (X, Y, Z), not {len(data)}")
         self._t_us.append(t_us)
         self._data += data
+
+    def flush(self) -> None:
+        """Nothing is held back."""
 
     def take(self) -> AccelerationBlock:
         """Decode everything fed since the last call; an empty block when that was nothing."""

@@ -5,7 +5,8 @@
     |  |- NotPresent      nothing answers: cable out, wrong address, no such port
     |  |- Timeout         it was there and has gone silent, or the bus is held low
     |  '- BadReply        something answers, but not what this device would say
-    |     '- WrongDevice  another chip or instrument sits at this place
+    |     |- WrongDevice  another chip or instrument sits at this place
+    |     '- SettingsLost it no longer holds what was written to it: start it anew at once
     |- SettingsError      a setting the device does not have; trying again cannot help
     '- DumpError          a recorded dump that cannot be read: file, line, what was expected
 """
@@ -33,6 +34,10 @@ class BadReply(DeviceError):
 
 class WrongDevice(BadReply):
     """Another device answers at this place."""
+
+
+class SettingsLost(BadReply):
+    """The device no longer has the settings that it was given."""
 
 
 class SettingsError(DriverError):

@@ -20,8 +20,9 @@ alone. The epoch's arrival is that of its first RMC or GGA. It closes when an RM
 Without a time, or without a fix, a second sentence of the same kind opens the next epoch. Of two valid sentences of
 one kind and one time (several talkers) the first counts.
 
-Dates come from RMC, else ZDA, else from the last date known, counted on by arrival time. Illegal dates and dates
-before ``earliest_utc_us`` are refused: the fix has no UTC then but keeps the rest. A receiver known to be 1024 weeks
+Dates come from RMC, else ZDA, else from the last date known, counted on by arrival time. Illegal dates, dates before
+``earliest_utc_us`` and those after the last that an RMC can name are refused: the fix has no UTC then but keeps the
+rest. A receiver known to be 1024 weeks
 late is put right by ``week_rollovers``. Around midnight a receiver may wrap the time before the date or after it:
 within a minute of midnight a date that is one day off, by the last one known and the time passed, is put right.
 
@@ -55,7 +56,9 @@ SECOND_US = 1_000_000
 MINUTE_US = 60 * SECOND_US
 DAY_US = 86_400 * SECOND_US
 ROLLOVER_DAYS = 1024 * 7
+ROLLOVERS_MAX = 8
 EPOCH_ORDINAL = datetime.date(1970, 1, 1).toordinal()
+LATEST_UTC_US = (datetime.date(2069, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
 RELEASE_UTC_US = (datetime.date(2026, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
 
 
@@ -338,7 +341,7 @@ class NmeaCounters:
     malformed       of a kind we read, right checksum, but a field that cannot be
     ubx_frames      binary frames stepped over
     dropped_bytes   bytes that belonged to nothing
-    refused_dates   dates of valid fixes that were illegal or too early
+    refused_dates   dates of valid fixes that were illegal, too early or too late
     """
 
     sentences: int
@@ -437,6 +440,21 @@ class NmeaDecoder:
         self._epoch: _Epoch | None = None
         self._zda: tuple[int, Zda] | None = None
         self._known: tuple[int, int] | None = None
+        self._too_early_us: int | None = None
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the dates, and what to do; empty: nothing."""
+        if self._too_early_us is None:
+            return ""
+        turns = -(-(self._earliest_utc_us - self._too_early_us) // (ROLLOVER_DAYS * DAY_US))
+        day = datetime.date.fromordinal(EPOCH_ORDINAL + self._too_early_us // DAY_US)
+        rollovers = self._added_us // (ROLLOVER_DAYS * DAY_US) + turns
+        wrong = f"it says that it is {day:%d %B %Y}, which cannot be, so no row has a date"
+        if rollovers > ROLLOVERS_MAX:
+            return f"{wrong}: give its antenna a free view of the sky, or replace it"
+        return (f"{wrong}: a receiver counts 1024 weeks and begins again. Set week_rollovers: {rollovers} under gps in "
+                "the settings, or renew its firmware")
 
     @property
     def counters(self) -> NmeaCounters:
@@ -522,7 +540,8 @@ class NmeaDecoder:
         if sentence.day is None or sentence.time_of_day_us is None:
             return None
         utc_us = sentence.day * DAY_US + sentence.time_of_day_us + self._added_us
-        if utc_us < self._earliest_utc_us:
+        self._too_early_us = utc_us if utc_us < self._earliest_utc_us else None
+        if not self._earliest_utc_us <= utc_us < LATEST_UTC_US:
             self._refused_dates += 1
             return None
         if self._known is None:

@@ -6,7 +6,7 @@ road roughness wants the time of each sample.
 
 The solution, three layers: a ``BytePort`` brings bytes, ``drivers.framing`` finds frames in them, and a profile says
 what a frame means. A profile is a data file: shipped ones lie in ``drivers/profiles``, anyone may name another by
-its path. ``SampleClock`` rebuilds the sample times from the arrival times.
+its path. ``SampleClock`` finds the rate of the samples and their times from the arrival times.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
-from itertools import combinations, pairwise
+from itertools import pairwise
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,6 +30,7 @@ from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_
 from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
 from drivers.readings import AccelerationBlock
 from drivers.regular_file import open_regular
+from drivers.sample_clock import NO_TIME, SampleClock
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
@@ -37,6 +38,7 @@ WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
 UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}
 AXES = "xyz"
 PROFILE_BYTES_MAX = 65_536
+WORTH_TELLING = 0.005
 
 Triple = tuple[float, float, float]
 
@@ -296,156 +298,6 @@ def _line_layout(keys: _Keys) -> LineLayout:
     return layout
 
 
-class SampleClock:
-    """Times of samples taken at even intervals, from the times at which they arrived.
-
-    A sample arrives a latency after it was taken that is never negative and now and then small. Arrival minus index
-    times period is therefore bounded below by the true time line, and the line is the lower envelope:
-
-    1. Settling. Samples are held for ``SETTLE_US`` of arrival time; the line starts at their lower envelope.
-    2. Following, in blocks of ``BLOCK`` samples. An arrival below the line pulls it down at once: no sample is later
-       than its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of
-       the least distance, at most by the tolerance of the clock. The period is the median of the slopes between the
-       lowest arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within
-       the tolerance of the nominal one.
-    3. Finding the line again. Arrivals more than ``OFF_US`` late are held. If one comes back to the line within
-       ``SETTLE_US``, they were a jam in the link and keep their places on the line. If not, samples were lost: the
-       clock settles anew behind the hole. Arrivals that much too early make it settle anew at once.
-
-    Times come out in whole microseconds, strictly increasing (where they must, by 1 us), and do not depend on how
-    the arrivals were cut into calls. The smallest latency cannot be known and stays in the times.
-    """
-
-    SETTLE_US = 300_000
-    OFF_US = 250_000
-    HELD_MAX = 4096
-    BLOCK = 128
-    BLOCKS = 8
-    GAIN = 0.25
-
-    def __init__(self, rate_hz: float, tolerance: float) -> None:
-        nominal_us = 1e6 / rate_hz
-        self._shortest_us = nominal_us * (1 - tolerance)
-        self._longest_us = nominal_us * (1 + tolerance)
-        self._climb_us_max = nominal_us * tolerance
-        self._period_us = nominal_us
-        self._held = np.empty(0, dtype=np.int64)
-        self._last_us = -(2**62)
-        self._points: list[tuple[int, int]] = []
-        self._lowest = (0, 0)
-        self._number = 0
-        self._following = False
-        self.resyncs = 0
-        self._begin_block(0.0, nominal_us)
-
-    def feed(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """Take (n,) arrivals, not decreasing; return the times [us] of the next samples that are certain, (m,)."""
-        waiting = np.concatenate((self._held, arrivals_us))
-        times = [np.empty(0, dtype=np.int64)]
-        while len(waiting):
-            count = self._on_line(waiting) if self._following else self._ripe(waiting)
-            if count is None:
-                self._following = False
-                self.resyncs += 1
-                continue
-            if count == 0:
-                break
-            accept = self._follow if self._following else self._settle
-            times.append(self._increasing(accept(waiting[:count])))
-            waiting = waiting[count:]
-        self._held = waiting
-        return np.concatenate(times)
-
-    def restart(self) -> npt.NDArray[np.int64]:
-        """Samples may be missing from here on: settle anew. Returns the times of those held so far."""
-        held, self._held = self._held, np.empty(0, dtype=np.int64)
-        times = self._increasing(self._settle(held)) if len(held) else held
-        self._following = False
-        return times
-
-    def _ripe(self, waiting: npt.NDArray[np.int64]) -> int:
-        """How many of the first samples are to settle together; 0 when more may belong to them."""
-        count = int(np.searchsorted(waiting, waiting[0] + self.SETTLE_US))
-        if count == len(waiting) < self.HELD_MAX:
-            return 0
-        return min(count, self.HELD_MAX)
-
-    def _on_line(self, waiting: npt.NDArray[np.int64]) -> int | None:
-        """How many of the first samples belong to the line; 0 when that is open, None when the line is lost."""
-        above_us = waiting[: self.BLOCK - self._index] - self._line(min(len(waiting), self.BLOCK - self._index))
-        off = np.abs(above_us) > self.OFF_US
-        if not off[0]:
-            return int(np.argmax(off)) if off.any() else len(off)
-        if above_us[0] < 0:
-            return None
-        waiting = waiting[: self.HELD_MAX]
-        returned = waiting - self._line(len(waiting)) <= self.OFF_US
-        ripe = self._ripe(waiting)
-        back = int(np.argmax(returned)) if returned.any() else len(waiting)
-        if back < len(waiting) and (ripe == 0 or back <= ripe):
-            return back
-        return None if ripe else 0
-
-    def _line(self, count: int) -> npt.NDArray[np.float64]:
-        """The line [us] at the next samples, as it was drawn at the beginning of the block."""
-        return self._base_us + self._step_us * np.arange(self._index, self._index + count, dtype=np.float64)
-
-    def _settle(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
-        """Start a line below all arrivals."""
-        run_us = self._period_us * np.arange(len(arrivals_us), dtype=np.float64)
-        lowest = int(np.argmin(arrivals_us - run_us))
-        start_us = float(arrivals_us[lowest] - run_us[lowest])
-        self._points = [(lowest, int(arrivals_us[lowest]))]
-        self._number = len(arrivals_us)
-        self._following = True
-        self._begin_block(start_us + self._period_us * len(arrivals_us), self._period_us)
-        return start_us + run_us
-
-    def _begin_block(self, base_us: float, step_us: float) -> None:
-        self._base_us = base_us
-        self._step_us = step_us
-        self._index = 0
-        self._pulled_us = 0.0
-        self._least_us = np.inf
-
-    def _follow(self, arrivals_us: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
-        """Times of samples that belong to the line."""
-        times = []
-        while len(arrivals_us):
-            part = arrivals_us[: self.BLOCK - self._index]
-            line_us = self._line(len(part))
-            above_us = part - line_us
-            lowest = int(np.argmin(above_us))
-            if above_us[lowest] < self._least_us:
-                self._least_us = float(above_us[lowest])
-                self._lowest = (self._number + self._index + lowest, int(part[lowest]))
-            pulled_us: npt.NDArray[np.float64] = np.minimum.accumulate(np.minimum(above_us, self._pulled_us))
-            self._pulled_us = float(pulled_us[-1])
-            times.append(line_us + pulled_us)
-            self._index += len(part)
-            if self._index == self.BLOCK:
-                self._next_block()
-            arrivals_us = arrivals_us[len(part) :]
-        return np.concatenate(times)
-
-    def _next_block(self) -> None:
-        self._points = [*self._points, self._lowest][-self.BLOCKS :]
-        self._number += self.BLOCK
-        if len(self._points) >= 3:
-            slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in combinations(self._points, 2)]
-            self._period_us = min(max(float(np.median(slopes)), self._shortest_us), self._longest_us)
-        climb_us = min(self.GAIN * max(self._least_us, 0.0) / self.BLOCK, self._climb_us_max)
-        self._begin_block(self._base_us + self._step_us * self.BLOCK + self._pulled_us, self._period_us + climb_us)
-
-    def _increasing(self, times_us: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-        """Whole microseconds, each at least one later than the one before."""
-        steps = np.arange(len(times_us))
-        whole = np.floor(times_us).astype(np.int64) - steps
-        times: npt.NDArray[np.int64] = np.maximum.accumulate(np.maximum(whole, self._last_us + 1)) + steps
-        self._last_us = int(times[-1])
-        return times
-
-
 class _Samples(NamedTuple):
     """Decoded samples, before they have their times: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
 
@@ -527,12 +379,16 @@ class PascoCounters:
     bad_frames      in their place, but with values or a checksum that cannot be
     dropped_bytes   bytes that belonged to no frame
     resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
+    lost            samples that were noticed to be missing between others
+    undated         samples left out because they came at a rate that cannot be used
     """
 
     frames: int
     bad_frames: int
     dropped_bytes: int
     resyncs: int
+    lost: int
+    undated: int
 
 
 class PascoDecoder:
@@ -540,9 +396,9 @@ class PascoDecoder:
 
     calibration   of this very unit, instead of the profile's; SettingsError where the profile has no raw counts
 
-    At the start and after a hole in the bytes the sample clock settles: 0.3 s of samples come out together, and are
-    lost if the stream ends before. A bad frame is left out and counted. What ``take`` returns over time does not
-    depend on when it is called.
+    Samples come out a second late, at the start 1.2 s together: by then it is known whether any were lost on the way.
+    ``flush`` gives what is held at the end. A bad frame is left out and counted; so are samples that come at a rate
+    that cannot be used. What ``take`` returns over time does not depend on when it is called.
     """
 
     def __init__(self, profile: Profile, calibration: Calibration | None = None) -> None:
@@ -554,22 +410,44 @@ class PascoDecoder:
             self._reader = _LineReader(profile.layout)
         else:
             raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
+        self._profile = profile
         self._clock = SampleClock(profile.rate_hz, profile.clock_tolerance)
         self._arrivals = Arrivals()
         self._chunks: list[bytes] = []
         self._untimed: list[_Samples] = []
         self._frames = 0
         self._bad_frames = 0
+        self._undated = 0
+        self._ended = False
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the samples that come, and what to do; empty: nothing."""
+        usual = f"{self._profile.rate_hz:g}"
+        if self._clock.refused_hz is not None:
+            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
+                    f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
+                    "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
+        if self._clock.lost_share >= WORTH_TELLING:
+            return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
+                    "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
+        return ""
 
     @property
     def counters(self) -> PascoCounters:
         """What came in so far and was taken."""
-        return PascoCounters(self._frames, self._bad_frames, self._reader.framer.dropped_bytes, self._clock.resyncs)
+        clock = self._clock
+        dropped = self._reader.framer.dropped_bytes
+        return PascoCounters(self._frames, self._bad_frames, dropped, clock.resyncs, clock.lost, self._undated)
 
     def feed(self, t_us: int, data: bytes) -> None:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]."""
         self._arrivals.note(t_us, len(data))
         self._chunks.append(data)
+
+    def flush(self) -> None:
+        """No more bytes will come: the next ``take`` gives all."""
+        self._ended = True
 
     def take(self) -> AccelerationBlock:
         """All samples that are complete and have their times, oldest first; may be none."""
@@ -585,6 +463,8 @@ class PascoDecoder:
             self._bad_frames += len(some.good) - good
         self._arrivals.forget(self._reader.framer.position)
         self._untimed += samples
+        if self._ended:
+            times.append(self._clock.restart())
         return self._timed(np.concatenate(times))
 
     def _timed(self, t_us: npt.NDArray[np.int64]) -> AccelerationBlock:
@@ -597,5 +477,7 @@ class PascoDecoder:
         n = len(t_us)
         no_offsets = np.empty(0, dtype=np.int64)
         self._untimed = [_Samples(False, no_offsets, accel_mps2[n:], clipped[n:], good[n:])]
-        keep = good[:n]
-        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep])
+        dated = t_us != NO_TIME
+        self._undated += int(np.count_nonzero(~dated))
+        keep = good[:n] & dated
+        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self._clock.rate_hz)

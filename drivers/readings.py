@@ -19,11 +19,13 @@ class AccelerationBlock:
     t_us          (n,) int64, monotonic time of each sample [us]
     accel_mps2    (n, 3) float64, specific force along the sensor's X, Y, Z [m/s2]; gravity is in it
     clipped       (n,) bool, an axis stood at the end of its range in that sample
+    rate_hz       samples per second, where the instrument finds it out [Hz]; None: as the settings say
     """
 
     t_us: npt.NDArray[np.int64]
     accel_mps2: npt.NDArray[np.float64]
     clipped: npt.NDArray[np.bool_]
+    rate_hz: float | None = None
 
     def __len__(self) -> int:
         return len(self.t_us)

@@ -15,6 +15,7 @@ from drivers.bma220 import (
     DATA_ADDRESS,
     FILTER,
     RANGE,
+    REGISTER_STEP,
     REVISION,
     SAMPLE_BYTES,
     SOFT_RESET,
@@ -68,7 +69,7 @@ class Bma220Chip:
         if address == DATA_ADDRESS and length == SAMPLE_BYTES and self.running and not self.stuck:
             return self.sample()
         sample = self.sample() if address == DATA_ADDRESS and self.running else bytes(SAMPLE_BYTES)
-        return bytes(self._answer(address + 2 * step, sample) for step in range(length))
+        return bytes(self._answer(address + REGISTER_STEP * step, sample) for step in range(length))
 
     def write(self, address: int, value: int) -> None:
         """Write one register. Ignored while not running, and for registers that cannot be written."""

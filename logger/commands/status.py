@@ -47,7 +47,8 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
     """The lines a person sees. ``fault`` is what ``trouble`` said."""
     if status is None or fault is not None:
         return [fault or "", "", "What to do", *(f"  {line}" for line in (_START, _JOURNAL))]
-    words = {"starting": "is starting", "standing": "is ready; the car stands", "recording": "is recording",
+    stands = "no speed that can be believed" if status.gps.state == "doubtful" else "the car stands"
+    words = {"starting": "is starting", "standing": f"is ready; {stands}", "recording": "is recording",
              "stopping": "is stopping"}
     writes = f", but writes NOTHING: {status.storage.trouble}" if status.storage.trouble else ""
     lines = [
@@ -70,6 +71,7 @@ def advice(status: ServiceStatus) -> list[str]:
         *_storage_advice(status.storage),
         *_sensor_advice("accelerometer", status.accelerometer),
         *_sensor_advice("GPS", status.gps),
+        *_settings_advice(status.accelerometer),
     ]
     if status.gps.state == "ok" and not status.fix_valid:
         steps.append("GPS: no fix. Give the antenna a free view of the sky; the first fix can take some minutes.")
@@ -115,6 +117,15 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     else:
         check = "check the cable, and the port in the settings (ls /dev/serial/by-id)"
     return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{error}"]
+
+
+def _settings_advice(sensor: SensorStatus) -> list[str]:
+    lost = sensor.counters.get("settings_lost", 0)
+    if not lost:
+        return []
+    times = "once" if lost == 1 else f"{lost} times"
+    return [f"accelerometer: it lost its settings {times} since the start and was started anew; its readings of that "
+            "time are left out. Its supply dips: check its 3.3 V and ground wires, and the Pi's own supply."]
 
 
 def _sensor_line(name: str, sensor: SensorStatus, words: str) -> str:

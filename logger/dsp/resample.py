@@ -84,6 +84,8 @@ class GridResampler:
     max_gap_s    two readings further apart than this are not joined: the run ends and a new one begins at the
                  second reading
 
+    A step is that of the grid, or the readings' own spacing where it is known (``expect``).
+
     Between readings up to 3.5 steps apart the eight-point polynomial holds (for 100 Hz and three missing readings it is
     within 0.4 % at 10 Hz); over longer holes, that only a fast grid can have within ``max_gap_s``, a straight line.
     Readings less than half a step after the last one, or not after it at all, are left out and counted in ``dropped``:
@@ -94,10 +96,15 @@ class GridResampler:
         self._rate_hz = rate_hz
         self._step_us = US_PER_S / rate_hz
         self._max_gap_us = max_gap_s * US_PER_S
+        self._spacing_us = self._step_us
         self.dropped = 0
         self._held = _NO_READINGS
         self._origin_us = 0
         self._made = 0
+
+    def expect(self, spacing_s: float | None) -> None:
+        """The readings lie so far apart [s] when none is missing; None: a step of the grid, as at the start."""
+        self._spacing_us = self._step_us if spacing_s is None else spacing_s * US_PER_S
 
     def push(self, t_us: Times, values: Floats, clipped: Bools) -> list[GridRun]:
         """More readings, arrays (n,) with times [us]; gives the runs that have become certain."""
@@ -122,7 +129,7 @@ class GridResampler:
 
     def _keep(self, t_us: Times) -> Bools:
         """Which readings are far enough after the one kept before them."""
-        closest_us = CLOSEST_STEPS * self._step_us
+        closest_us = CLOSEST_STEPS * self._spacing_us
         keep = np.ones(len(t_us), dtype=np.bool_)
         last_us = int(self._held.t_us[-1]) if len(self._held) else None
         first_step_us = closest_us if last_us is None or not len(t_us) else int(t_us[0]) - last_us
@@ -167,13 +174,13 @@ class GridResampler:
         nodes = start + np.arange(count)[:, np.newaxis]
         values = _lagrange(t_us[nodes], readings[nodes], grid_us)
         apart_us = t_us[after] - t_us[before]
-        far = np.flatnonzero(apart_us > LINE_STEPS * self._step_us)
+        far = np.flatnonzero(apart_us > LINE_STEPS * self._spacing_us)
         if len(far):
             share = since_us[far] / apart_us[far]
             values[far] = (1.0 - share) * readings[before[far]] + share * readings[after[far]]
         nearest = np.where(since_us <= until_us, before, after)
-        lonely = np.minimum(since_us, until_us) >= 0.5 * self._step_us
-        bridged = lonely & (apart_us > HOLE_STEPS * self._step_us)
+        lonely = np.minimum(since_us, until_us) >= 0.5 * self._spacing_us
+        bridged = lonely & (apart_us > HOLE_STEPS * self._spacing_us)
         clipped = self._held.clipped[nearest]
         return GridRun(int(grid_us[0]), self._rate_hz, values, readings[nearest], clipped, bridged, new_start)
 

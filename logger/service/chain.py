@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,8 @@ SETTLING_S = 4.0
 LINE_OVER_HOLE_US = 500_000
 SILENCE_US = 2_000_000
 START_MEAN_SAMPLES = 50
+NEARLY = 1.02
+"""So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz."""
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -54,7 +57,8 @@ class SignalChain:
     """The filters between a sensor and the windows, as one stream.
 
     weighting     frequency weighting with stored sections for 100 Hz
-    oversample    the sensor is read at this multiple of 100 Hz
+    oversample    the sensor is read at this multiple of 100 Hz; one that finds out its own rate is put on the grid of
+                  the next multiple above it
     low_pass_hz   corner of a second-order low-pass; None: not used
     coarse        the sensor's steps are larger than its noise: its readings are passed on as they were read, not
                   interpolated to the grid
@@ -65,6 +69,7 @@ class SignalChain:
                  make_filter: Callable[[SectionRows], BlockFilter | FixedFilter] = BlockFilter) -> None:
         self._axis = axis
         self._coarse = coarse
+        self._oversample = oversample
         self._resampler = GridResampler(GRID_RATE_HZ * oversample)
         self._decimator = Decimator(oversample)
         self._high_pass = make_filter(butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ))
@@ -76,12 +81,13 @@ class SignalChain:
         self._next_us: int | None = None
         self._last_mps2: float | None = None
         self._since_start = 0
+        self._crowded = 0
         self.late_samples = 0
 
     @property
     def crowded_samples(self) -> int:
         """Samples left out because they came less than half a step after another: a sensor that is too fast."""
-        return self._resampler.dropped
+        return self._crowded + self._resampler.dropped
 
     def push(self, block: AccelerationBlock) -> list[GridSamples]:
         """More samples of the sensor; gives what is ready on the grid."""
@@ -89,7 +95,23 @@ class SignalChain:
             return []
         vertical = self._axis.sign * block.accel_mps2[:, self._axis.column]
         first = self._first_in_time(block.t_us)
-        return self._thinned(self._resampler.push(block.t_us[first:], vertical[first:], block.clipped[first:]))
+        begun = self._take_rate(block.rate_hz) if block.rate_hz is not None else []
+        return begun + self._thinned(self._resampler.push(block.t_us[first:], vertical[first:], block.clipped[first:]))
+
+    def _take_rate(self, rate_hz: float) -> list[GridSamples]:
+        """A sensor's own rate [Hz]. When it needs another grid, what was read so far comes to its end."""
+        oversample = max(1, ceil(rate_hz / (GRID_RATE_HZ * NEARLY)))
+        spacing_s = 1 / max(rate_hz, GRID_RATE_HZ) if oversample > 1 else None
+        self._resampler.expect(spacing_s)
+        if oversample == self._oversample:
+            return []
+        out = self._thinned(self._resampler.flush()) + self._filtered(self._decimator.flush())
+        self._crowded += self._resampler.dropped
+        self._oversample = oversample
+        self._resampler = GridResampler(GRID_RATE_HZ * oversample)
+        self._resampler.expect(spacing_s)
+        self._decimator = Decimator(oversample)
+        return out
 
     def advance(self, start_us: int, now_us: int) -> list[GridSamples]:
         """Let time pass. A sensor that has been silent for two seconds is missing from the grid up to then;

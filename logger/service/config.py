@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from drivers.bma220 import Bma220Settings
 from drivers.errors import SettingsError
+from drivers.nmea import ROLLOVERS_MAX
 from logger.errors import BadInput
 from logger.shipped import is_path, shipped, vehicle_file, vehicle_path
 from logger.store.pairing import MODES, NOT_PAIRED, Pairing
@@ -280,7 +281,7 @@ _gps = _section(GpsConfig, {
     "baud": _number_out_of(_BAUDS),
     "latency_s": _number(0, 2),
     "bridge_s": _number(0, 60),
-    "week_rollovers": _whole(0, 8),
+    "week_rollovers": _whole(0, ROLLOVERS_MAX),
     "antenna_behind_front_axle_m": _number(-3, 15),
     "place_std_m": _number(0, 100),
 })

@@ -20,6 +20,7 @@ from logger.store.rotation import ClockMap
 
 STEP_US = 500_000
 IDLE_US = 120_000_000
+TELLING_FIXES = 10
 STEP_BYTES = 1_000_000
 """More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
 
@@ -27,9 +28,13 @@ log = logging.getLogger(__name__)
 
 
 class AccelerationDecoder(Protocol):
-    """What every accelerometer driver offers: bytes with their arrival time in, samples out."""
+    """What every accelerometer driver offers: bytes with their arrival time in, samples out; after ``flush`` the next
+    ``take`` gives all. ``doubt``: what is wrong with the samples that come; empty: nothing."""
 
+    @property
+    def doubt(self) -> str: ...
     def feed(self, t_us: int, data: bytes) -> None: ...
+    def flush(self) -> None: ...
     def take(self) -> AccelerationBlock: ...
 
 
@@ -59,6 +64,7 @@ class Core:
         self._step_bytes = 0
         self._drive = pipeline.drive
         self._offset_us: int | None = None
+        self._fixes_without_speed = 0
         self.rows = 0
         self.samples = 0
         self.fixes = 0
@@ -119,6 +125,7 @@ class Core:
         """End of the events: what is inside comes out, the log is closed."""
         if self._next_step_us is not None:
             self._fixes += self._gps.flush()
+            self._accelerometer.flush()
             self._write(self._pipeline.step(self._next_step_us, self._take_block(), self._take_fixes()))
             self._write(self._pipeline.finish())
         self._sink.close()
@@ -127,6 +134,20 @@ class Core:
     def utc_known(self) -> bool:
         """True once UTC has been learnt from the GPS."""
         return self._offset_us is not None
+
+    @property
+    def accelerometer_doubt(self) -> str:
+        """What is wrong with the samples that come; empty: nothing."""
+        return self._accelerometer.doubt
+
+    @property
+    def gps_doubt(self) -> str:
+        """What is wrong with the fixes that come; empty: nothing."""
+        fix = self.last_fix
+        if fix is not None and fix.valid and fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
+            return ("it tells its place, but no speed, so no row has a distance: have it send RMC or VTG sentences, "
+                    "not GGA alone")
+        return self._pipeline.speed_check.doubt or self._gps.doubt
 
     def _take_block(self) -> AccelerationBlock:
         block = self._accelerometer.take()
@@ -140,6 +161,9 @@ class Core:
         if fixes:
             self.fixes += len(fixes)
             self.last_fix = fixes[-1]
+        for fix in fixes:
+            if fix.valid:
+                self._fixes_without_speed = self._fixes_without_speed + 1 if fix.speed_mps is None else 0
         return fixes
 
     def _write(self, records: list[WindowRecord]) -> None:

@@ -2,7 +2,8 @@
 
 Each source has a thread of its own that does nothing but look at its device at the right moment and put what it
 got, with the time, into a queue. The main loop empties the queue twice a second, brings the events into
-order of time, records them if asked to, feeds the core, and tells systemd and the status file how things stand.
+order of time, as far as no source holds earlier ones back, records them if asked to, feeds the core, and tells systemd
+and the status file how things stand.
 So a slow card or a slow window never delays a sample, and a pipeline that hangs stops feeding the watchdog.
 What was written is synced at every second round: a row is on the disk half a second after it was made, or later where
 ``sync_s`` allows it.
@@ -20,6 +21,7 @@ from collections.abc import Callable
 
 from drivers.dump import Event
 from logger.service.core import Core
+from logger.service.merging import EventMerger
 from logger.service.stop import Stop
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
@@ -27,7 +29,6 @@ from logger.units import US_PER_S
 
 LOOP_S = 0.5
 HOLD_BACK_US = 60_000
-GATHER_S = 0.05
 CLOSED_WAIT_S = 0.1
 STOP_WAIT_S = 2.0
 HANG_US = 10 * US_PER_S
@@ -62,7 +63,10 @@ class Deadlines:
 
 
 class Listener(threading.Thread):
-    """Looks at one device for ever. ``pace`` waits between two looks."""
+    """Looks at one device for ever. ``pace`` waits between two looks.
+
+    waiting_since_us    an event as early as this may still come [us]; None: none is held back
+    """
 
     def __init__(self, supervisor: Supervisor, events: deque[Event], pace: Callable[[], None]) -> None:
         super().__init__(name=supervisor.name, daemon=True)
@@ -71,6 +75,7 @@ class Listener(threading.Thread):
         self._pace = pace
         self._stop_asked = threading.Event()
         self.failure: BaseException | None = None
+        self.waiting_since_us: int | None = None
         self.looked_us = monotonic_us()
 
     def run(self) -> None:
@@ -78,9 +83,7 @@ class Listener(threading.Thread):
         try:
             while not self._stop_asked.is_set():
                 self.looked_us = monotonic_us()
-                event = self._supervisor.step()
-                if event is not None:
-                    self._events.append(event)
+                self.look()
                 if self._supervisor.retry_at_us is not None:
                     self._stop_asked.wait(CLOSED_WAIT_S)
                 else:
@@ -88,7 +91,13 @@ class Listener(threading.Thread):
         except BaseException as failure:  # noqa: BLE001 - handed to the main thread, which raises it
             self.failure = failure
         finally:
-            self._supervisor.close()
+            self._events.extend(self._supervisor.close())
+            self.waiting_since_us = None
+
+    def look(self) -> None:
+        """Once. What comes is in the queue before ``waiting_since_us`` says that it does not wait any more."""
+        self._events.extend(self._supervisor.step())
+        self.waiting_since_us = self._supervisor.waiting_since_us
 
     def stop(self) -> None:
         """Ask it to end and wait for it, but not for one that hangs in its device."""
@@ -100,11 +109,6 @@ class Listener(threading.Thread):
     def hangs(self, now_us: int) -> bool:
         """True when the device has not returned from a look for so long that only a restart can help."""
         return now_us - self.looked_us > HANG_US
-
-
-def gather() -> None:
-    """Pause after a chunk of serial bytes, so that the next chunk is worth its wake-up."""
-    time.sleep(GATHER_S)
 
 
 class LiveService:
@@ -127,6 +131,7 @@ class LiveService:
         self._storage = storage
         self._listeners = listeners
         self._events = events
+        self._merger = EventMerger()
         self._sync_us = round(sync_s * US_PER_S)
         self._beat_us = round(beat_s * US_PER_S)
         self._beat = beat
@@ -143,7 +148,7 @@ class LiveService:
         beat_us = monotonic_us()
         while not stop.wait(LOOP_S):
             now_us = monotonic_us()
-            self._move(now_us - HOLD_BACK_US)
+            self.move(now_us)
             self._sync(now_us)
             self._storage.tend()
             if now_us - beat_us >= self._beat_us:
@@ -154,24 +159,25 @@ class LiveService:
     def _end(self) -> None:
         for listener in self._listeners:
             listener.stop()
-        self._move(monotonic_us())
+        self._feed_until(monotonic_us())
         self._core.finish()
         self._storage.close()
 
-    def _move(self, until_us: int) -> None:
-        """Take the events up to ``until_us``; later ones wait, for another source may still bring earlier ones.
+    def move(self, now_us: int) -> None:
+        """Take the events as far as they are complete; later ones wait for earlier ones that may still come.
 
         Only events move the pipeline. Time that passes without any would leave no trace in a recording, and what it
         did could not be played again.
         """
+        held_us = [listener.waiting_since_us for listener in self._listeners]
+        self._feed_until(min([now_us - HOLD_BACK_US, *(since_us - 1 for since_us in held_us if since_us is not None)]))
+
+    def _feed_until(self, until_us: int) -> None:
         for listener in self._listeners:
             if listener.failure is not None:
                 raise listener.failure
-        taken = [self._events.popleft() for _ in range(len(self._events))]
-        taken.sort(key=_time_of)
-        ready = [event for event in taken if event.t_us <= until_us]
-        self._events.extendleft(reversed(taken[len(ready) :]))
-        for event in ready:
+        self._merger.add([self._events.popleft() for _ in range(len(self._events))])
+        for event in self._merger.until(until_us):
             self._take(event)
 
     def _take(self, event: Event) -> None:
@@ -188,7 +194,3 @@ class LiveService:
         if now_us + LOOP_S * US_PER_S - self._unsynced_us > self._sync_us:
             self._unsynced_us = None
             self._storage.sync()
-
-
-def _time_of(event: Event) -> int:
-    return event.t_us

@@ -153,6 +153,9 @@ class Observer:
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""
         doubt = self._progress[name].look(now_us, state == "ok", readings)
+        told = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
+        if state == "ok" and told:
+            return told
         if doubt or state != "ok" or name != "accelerometer":
             return doubt
         frozen_s = self._pipeline.stillness.frozen_s
@@ -179,7 +182,8 @@ class Observer:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=doubt or part.error or None,
             readings=readings,
-            counters={"faults": part.faults, "restarts": part.restarts, **self._counters[name]()},
+            counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
+                      "dropped_readings": part.dropped, **self._counters[name]()},
         )
 
     def _accelerometer_place(self) -> str:

@@ -172,10 +172,10 @@ class Odometer:
         if abs(speed_mps - self._speed_mps[-1]) > ACCELERATION_LIMIT_MPS2 * max(gap_s, 0.2):
             return False
         reach_m = PLACE_JUMP_M + 1.5 * max(speed_mps, self._speed_mps[-1]) * gap_s
-        return _chord_m(self._lat_deg[-1], self._lon_deg[-1], lat_deg, lon_deg) <= reach_m
+        return chord_m(self._lat_deg[-1], self._lon_deg[-1], lat_deg, lon_deg) <= reach_m
 
 
-def _chord_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_deg: float) -> float:
+def chord_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_deg: float) -> float:
     """Distance of two near places [m] on a sphere laid flat."""
     east_deg = (lon1_deg - lon0_deg + 180.0) % 360.0 - 180.0
     return EARTH_RADIUS_M * hypot(radians(lat1_deg - lat0_deg), radians(east_deg) * cos(radians(lat0_deg)))

@@ -22,6 +22,7 @@ from logger.roads.from_acceleration import RmsRelation, iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain
 from logger.service.odometer import Odometer
 from logger.service.roughness import RoughnessQueue, Waiting
+from logger.service.speed_check import SpeedCheck
 from logger.service.stillness import Stillness
 from logger.service.timebase import Timebase
 from logger.units import US_PER_S
@@ -85,13 +86,16 @@ class Pipeline:
         self.timebase = Timebase(settings.latency_s)
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
         self.stillness = Stillness()
+        self.speed_check = SpeedCheck()
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
         if self._start_us is None:
             self._start_us = now_us
         for fix in fixes:
-            self.odometer.add(self.timebase.place(fix))
+            timed = self.timebase.place(fix)
+            self.odometer.add(timed)
+            self.speed_check.take(timed)
         self.stillness.take(block, fixes)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
@@ -178,7 +182,8 @@ class Pipeline:
             moving = np.flatnonzero(speed_mps > 0.0)
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
-            believed = replace(part, present=part.present & ~self.stillness.during(part.t_us))
+            doubtful = self.stillness.during(part.t_us) | self.speed_check.during(part.t_us)
+            believed = replace(part, present=part.present & ~doubtful)
             self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
 
@@ -211,9 +216,13 @@ class Pipeline:
         flags = set(window.flags)
         if offset_us is None:
             flags.add("time_unset")
-        if self.stillness.covers(window.t_us, window.t_us + round(window.duration_s * US_PER_S)):
+        end_us = window.t_us + round(window.duration_s * US_PER_S)
+        if self.stillness.covers(window.t_us, end_us):
             flags.add("frozen")
             window = window.without_figures()
+        if window.start_m is not None and self.speed_check.covers(window.t_us, end_us):
+            flags.add("speed_doubtful")
+        if flags & {"frozen", "speed_doubtful"}:
             estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan)
         if estimate is not None:
             flags |= estimate.flags
@@ -251,6 +260,8 @@ class Pipeline:
     def _iri_by_rms(self, window: Window, flags: set[str]) -> float | None:
         """IRI by the r.m.s. relation [m/km]; flags say why there is none."""
         if window.start_m is None or window.end_m is None or not isfinite(window.accel_rms_mps2):
+            return None
+        if "speed_doubtful" in flags:
             return None
         if window.speed_mps < self._settings.slow_mps:
             flags.add("slow")

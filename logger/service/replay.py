@@ -1,7 +1,8 @@
 """A recorded drive through the service: the real drivers on recorded buses, under a clock of its own.
 
 The player is the only thing that differs from the live service. It sets the clock to the time of the next event,
-lays the event's bytes on the recorded bus or port, and lets the supervised source look at its device once.
+lays the event's bytes on the recorded bus or port, and lets the supervised source look at its device once. What comes
+goes to the core in order of time, as far as no source holds earlier events back.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ from drivers.bma220 import Bma220Settings
 from drivers.dump import Event
 from drivers.replay import RecordedBus, RecordedPort
 from logger.service.core import Core
+from logger.service.merging import EventMerger
 from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.supervisor import Supervisor
 from logger.units import US_PER_S
 
 PROGRESS_EVERY_US = 60 * US_PER_S
+LONGEST_HELD_US = US_PER_S
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,9 @@ class Player:
         sources: list[Source] = [Bma220Source(lambda: bus, bma220, self._now_us, _no_wait)]
         sources += [SerialSource(name, _opener(port), self._now_us, wait_s=0.0) for name, port in ports.items()]
         self._load = {"bma220": bus.load, **{name: port.load for name, port in ports.items()}}
-        self._step = {source.name: Supervisor(source, self._now_us).step for source in sources}
+        self._supervisors = {source.name: Supervisor(source, self._now_us) for source in sources}
+        self._chip = self._supervisors["bma220"]
+        self._merger = EventMerger()
 
     def play(self, events: Iterable[Event]) -> Played:
         """All events, then the end of the drive."""
@@ -67,19 +72,37 @@ class Player:
             if t_us - told_us >= PROGRESS_EVERY_US:
                 told_us = t_us
                 self._progress((t_us - first_us) / US_PER_S)
+        for supervisor in self._supervisors.values():
+            self._merger.add(supervisor.close())
+        self._feed_until(self._clock_us)
         self._core.finish()
         return Played(count, (self._clock_us - first_us) / US_PER_S if first_us is not None else 0.0)
 
     def _one(self, event: Event) -> None:
         self._clock_us = event.t_us
         self._load[event.source](event.data)
-        step = self._step[event.source]
-        seen = step()
-        while seen is not None:
-            self._core.feed(seen)
-            if event.source == "bma220":
-                return
-            seen = step()
+        supervisor = self._supervisors[event.source]
+        seen = supervisor.step()
+        self._merger.add(seen)
+        while seen and supervisor is not self._chip:
+            seen = supervisor.step()
+            self._merger.add(seen)
+        self._feed(bool(seen))
+
+    def _feed(self, chip_gave: bool) -> None:
+        """Give the core what is complete. A chip that is not heard any more must not hold up the rest."""
+        held_us = self._chip.waiting_since_us
+        if held_us is not None and self._clock_us - held_us > LONGEST_HELD_US:
+            self._merger.add(self._chip.flush())
+            held_us = None
+        if held_us is None:
+            self._feed_until(self._clock_us)
+        elif chip_gave:
+            self._feed_until(held_us - 1)
+
+    def _feed_until(self, until_us: int) -> None:
+        for event in self._merger.until(until_us):
+            self._core.feed(event)
 
     def _now_us(self) -> int:
         return self._clock_us

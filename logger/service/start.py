@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from drivers.bma220 import REGISTER_STEP
 from drivers.disk import FileSystem
 from drivers.dump import Event, open_dump
 from drivers.hardware import open_i2c, open_serial
@@ -20,7 +21,7 @@ from logger.errors import BadInput
 from logger.service import assemble
 from logger.service.config import Config
 from logger.service.core import Core
-from logger.service.live import Deadlines, Listener, LiveService, gather, monotonic_us
+from logger.service.live import Deadlines, Listener, LiveService, monotonic_us
 from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
 from logger.service.priority import go_first
@@ -58,10 +59,10 @@ def _serve(config: Config, stop: Stop) -> None:
     core = Core(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
     deadlines = Deadlines(US_PER_S // (100 * sensor.oversample))
-    accelerometer = Supervisor(_accelerometer(config), monotonic_us)
-    gps = Supervisor(_serial("nmea", config.gps.port, config.gps.baud), monotonic_us)
-    pace = deadlines.wait if config.accelerometer.driver == "bma220" else gather
-    listeners = [Listener(accelerometer, events, pace), Listener(gps, events, gather)]
+    sources: list[Source] = [_accelerometer(config), _serial("nmea", config.gps.port, config.gps.baud)]
+    accelerometer, gps = (Supervisor(source, monotonic_us) for source in sources)
+    paces = [source.gather if isinstance(source, SerialSource) else deadlines.wait for source in sources]
+    listeners = [Listener(part, events, pace) for part, pace in zip((accelerometer, gps), paces, strict=True)]
     counters = {"accelerometer": sensor.counters, "gps": lambda: asdict(decoder.counters)}
     notices = assemble.notices(vehicle)
     for notice in notices:
@@ -112,7 +113,7 @@ def _accelerometer(config: Config) -> Source:
 
 def _bus_opener(bus: int | Path) -> Callable[[], I2cBus]:
     if isinstance(bus, int):
-        return lambda: open_i2c(bus)
+        return lambda: open_i2c(bus, REGISTER_STEP)
 
     def play() -> I2cBus:
         with open_dump(bus) as reader:

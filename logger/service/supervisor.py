@@ -10,7 +10,7 @@ import logging
 from collections.abc import Callable
 
 from drivers.dump import Event
-from drivers.errors import BadReply, DeviceError
+from drivers.errors import BadReply, DeviceError, SettingsLost
 from logger.service.sources import Source
 from logger.service.status import SensorState
 from logger.units import US_PER_S
@@ -28,7 +28,11 @@ class Supervisor:
 
     A single failed read (a NACK, a time-out) costs one sample and the device is asked again at the next poll; after
     some in a row, and a third of a second of nothing else, it is closed and started anew. Starting takes many
-    transfers, and on a bus that refuses every third one it is better not to have to.
+    transfers, and on a bus that refuses every third one it is better not to have to. A device that has lost its
+    settings is started anew at once; one that loses them again before it has given a reading is waited for as after
+    any other fault.
+
+    restarts, faults, settings_lost     how often each happened
     """
 
     def __init__(self, source: Source, now_us: Callable[[], int]) -> None:
@@ -46,6 +50,17 @@ class Supervisor:
         self.error = ""
         self.restarts = 0
         self.faults = 0
+        self.settings_lost = 0
+
+    @property
+    def dropped(self) -> int:
+        """Readings left out because the device did not vouch for them in the end."""
+        return self._source.dropped
+
+    @property
+    def waiting_since_us(self) -> int | None:
+        """Time of the oldest reading that may still come [us]; None: none is held back."""
+        return self._source.waiting_since_us
 
     @property
     def retry_at_us(self) -> int | None:
@@ -58,35 +73,44 @@ class Supervisor:
             return "retrying" if self._seen else "absent"
         return "ok" if self._now_us() - self._heard_us < SILENT_AFTER_US else "silent"
 
-    def step(self) -> Event | None:
-        """One look at the device. None: nothing there, or not yet time to try again."""
+    def step(self) -> list[Event]:
+        """One look at the device, and what it gives. Empty: nothing there, or not yet time to try again."""
         doubt, self._doubt = self._doubt, ""
         if doubt and self._is_open:
             self.restarts += 1
             self._give_up(BadReply(doubt), self._now_us())
         if not self._is_open and not self._try_open():
-            return None
+            return []
         try:
-            event = self._source.poll()
+            events = self._source.poll()
+        except SettingsLost as error:
+            self._lost(error)
+            return []
         except DeviceError as error:
             self._fault(error)
-            return None
+            return []
         self._faults = 0
-        if event is not None:
-            self._heard_us = event.t_us
+        if events:
+            self._heard_us = events[-1].t_us
             self._wait_us = FIRST_WAIT_US
             self._seen = True
             self.error = ""
-        return event
+        return events
+
+    def flush(self) -> list[Event]:
+        """What the device holds back, as far as it vouches for it."""
+        return self._source.flush()
 
     def start_anew(self, doubt: str) -> None:
         """Ask for the device to be closed and opened at its next turn, though it answers. Any thread may."""
         self._doubt = doubt
 
-    def close(self) -> None:
-        """Let go of the device for good."""
+    def close(self) -> list[Event]:
+        """Let go of the device for good; gives what it held back."""
+        events = self.flush()
         self._is_open = False
         self._source.close()
+        return events
 
     def _try_open(self) -> bool:
         now_us = self._now_us()
@@ -102,6 +126,17 @@ class Supervisor:
         self._heard_us = self._now_us()
         self._faults = 0
         return True
+
+    def _lost(self, error: SettingsLost) -> None:
+        is_new = not self.error
+        now_us = self._now_us()
+        self.faults += 1
+        self.settings_lost += 1
+        self.restarts += 1
+        self._give_up(error, now_us)
+        if is_new:
+            self._retry_us = now_us
+            self._try_open()
 
     def _fault(self, error: DeviceError) -> None:
         now_us = self._now_us()

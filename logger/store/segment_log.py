@@ -28,10 +28,14 @@ from logger.units import US_PER_S
 LINE_BYTES = 4096
 """More than any row; a longer line is taken for several damaged ones."""
 
+LARGEST = 1e9
+"""Beyond any quantity of a row in the unit of its column; what is larger is not known, and not read."""
+
 _EPOCH = datetime(1970, 1, 1)
+_LATEST_US = (datetime(2200, 1, 1) - _EPOCH) // timedelta(microseconds=1)
 _MICROSECOND = timedelta(microseconds=1)
 _UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
-_SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,14})\.([0-9]{6})")
+_SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,9})\.([0-9]{6})")
 _COUNT = re.compile(r"0|-?[1-9][0-9]{0,17}")
 _SHOWN = 40
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
@@ -43,16 +47,18 @@ class BadRow(BadInput):
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name in the file, the record's attribute, and how a value is written and read."""
+    """One column: its name in the file, the record's attribute, how a value is written and read, and how large a number
+    may be; 0: it holds no such number."""
 
     name: str
     attribute: str
     write: Callable[[Any], str]
     read: Callable[[str], Any]
+    largest: float = 0.0
 
 
 def _write_utc(utc_us: int | None) -> str:
-    if utc_us is None:
+    if utc_us is None or not 0 <= utc_us < _LATEST_US:
         return ""
     return (_EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds") + "Z"
 
@@ -62,7 +68,10 @@ def _read_utc(text: str) -> int | None:
         return None
     if not _UTC.fullmatch(text):
         raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text[:_SHOWN]!a}")
-    return (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
+    utc_us = (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
+    if not 0 <= utc_us < _LATEST_US:
+        raise BadRow(f"expected UTC from 1970 to 2199, found {text!a}")
+    return utc_us
 
 
 def _write_seconds(t_us: int) -> str:
@@ -90,37 +99,39 @@ def _seconds_of_us(name: str, attribute: str) -> Column:
     return Column(name, attribute, _write_seconds, _read_seconds)
 
 
-def _read_decimal(text: str, pattern: str) -> float:
+def _read_decimal(text: str, pattern: str, largest: float) -> float:
     """A number as the pattern writes it, and in no other way."""
     value = float(text)
     if not isfinite(value) or pattern % value != text:
         raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {text[:_SHOWN]!a}")
+    if abs(value) > largest:
+        raise BadRow(f"expected a number up to {largest:g}, found {text[:_SHOWN]!a}")
     return value
 
 
-def _number(name: str, decimals: int) -> Column:
-    """A float that may be unknown: None, NaN and infinity are written as nothing."""
+def _number(name: str, decimals: int, largest: float = LARGEST) -> Column:
+    """A float that may be unknown: None, NaN and what is beyond ``largest`` are written as nothing."""
     pattern = f"%.{decimals}f"
 
     def write(value: float | None) -> str:
-        return "" if value is None or not isfinite(value) else pattern % value
+        return "" if value is None or not abs(value) <= largest else pattern % value
 
     def read(text: str) -> float | None:
-        return _read_decimal(text, pattern) if text else None
+        return _read_decimal(text, pattern, largest) if text else None
 
-    return Column(name, name, write, read)
+    return Column(name, name, write, read, largest)
 
 
 def _known_number(name: str, decimals: int) -> Column:
-    """A float that is always known. Writing NaN or infinity raises ``ValueError``."""
+    """A float that is always known. Writing NaN or one beyond ``LARGEST`` raises ``ValueError``."""
     pattern = f"%.{decimals}f"
 
     def write(value: float) -> str:
-        if not isfinite(value):
-            raise ValueError(f"{name} is {value}, expected a finite number")
+        if not abs(value) <= LARGEST:
+            raise ValueError(f"{name} is {value}, expected a finite number up to {LARGEST:g}")
         return pattern % value
 
-    return Column(name, name, write, lambda text: _read_decimal(text, pattern))
+    return Column(name, name, write, lambda text: _read_decimal(text, pattern, LARGEST), LARGEST)
 
 
 def _count(name: str) -> Column:
@@ -137,8 +148,8 @@ COLUMNS = (
     _seconds_of_us("t_s", "t_us"),
     _number("distance_start_m", 3),
     _number("distance_end_m", 3),
-    _number("lat_deg", 7),
-    _number("lon_deg", 7),
+    _number("lat_deg", 7, 90.0),
+    _number("lon_deg", 7, 180.0),
     _number("speed_mps", 3),
     _number("iri_m_per_km", 3),
     _number("iri_std_m_per_km", 3),
@@ -165,7 +176,7 @@ SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n"
 def format_row(record: WindowRecord) -> str:
     """The row of a record, without a newline.
 
-    Raises ``ValueError`` for a duration that is not finite and ``OverflowError`` for a UTC outside the years 1 to 9999.
+    Raises ``ValueError`` for a duration that is not finite. What no column can hold is written as not known.
     """
     text = ",".join([column.write(getattr(record, column.attribute)) for column in COLUMNS])
     return f"{text},{zlib.crc32(text.encode()):08x}"

@@ -371,6 +371,18 @@ def test_a_date_once_known_counts_on_over_midnight_and_days():
     ]
 
 
+@pytest.mark.parametrize("week_rollovers", [0, 1, 400])
+@pytest.mark.parametrize("clock", ["000000.00", "120000.00", "235959.00"])
+@pytest.mark.parametrize("date", ["31,12,9999", "01,01,2069", "31,12,2068", "01,01,0001", "31,12,0001"])
+def test_a_date_of_another_age_is_refused(date, clock, week_rollovers):
+    decoder = NmeaDecoder(week_rollovers)
+    decoder.feed(0, lines(f"GPZDA,{clock},{date},00,00", gga(clock)))
+    fixes = decoder.feed(1_000_000, lines(gga("120001.00"))) + decoder.flush()
+    is_known = date == "31,12,2068" and week_rollovers == 0
+    assert [fix.utc_us is not None for fix in fixes] == [is_known, is_known]
+    assert decoder.counters.refused_dates == (not is_known)
+
+
 def test_zda_of_a_receiver_without_fix_is_not_believed():
     fixes, _ = decode(lines(gga("120000", quality="0"), "GPZDA,120000,15,06,2026,00,00", gga("120001")))
     assert [fix.utc_us for fix in fixes] == [None, None]

@@ -2,18 +2,21 @@
 
 import json
 import re
+import zlib
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from logger.commands import main
 from logger.commands import report as report_command
 from logger.errors import BadInput
 from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, LoggedFile, page
-from logger.store.segment_log import HEADER, format_row
+from logger.store.segment_log import COLUMNS, HEADER, format_row
 
 SIDECAR: dict[str, Any] = {"ridelog_version": "1.2", "sensor": {"driver": "bma220", "verified": True},
                            "vehicle": {"name": "rav4-2009"}, "settings": {"gps": {"baud": 9600}}, "log": {"part": 1}}
@@ -43,6 +46,28 @@ def text_of(page_text: str) -> str:
     return " ".join(unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", page_text)).split())
 
 
+VALUES = [
+    "", "0", "-1", "1", "7.620", "-7.620000", "1.0000", "0.500000", "90.0000000", "-180.0000000", "1000000000.000",
+    "-1000000000.0000", "1000000000.000000", f"{1e300:.4f}", f"{1e300:.3f}", f"{-1e150:.3f}", f"{1e308:.6f}",
+    f"{1e15:.6f}", "999999999999999.999999", "999999999999999999", "9999-12-31T23:59:59.999Z", "gap|x", "A", "H",
+    "0001-01-01T00:00:00.000Z", "2026-07-04T10:15:00.250Z", "2199-12-31T23:59:59.999Z", "uncomfortable",
+]
+
+
+@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=st.lists(st.dictionaries(st.integers(0, len(COLUMNS) - 1), st.sampled_from(VALUES), max_size=4),
+                        min_size=1, max_size=5))
+def test_any_value_in_any_column_gives_a_page(drive, tmp_path: Path, changes: list[dict[int, str]]) -> None:
+    rows = [format_row(row).split(",")[:-1] for row in drive(len(changes), {})]
+    for row, change in zip(rows, changes, strict=True):
+        for column, value in change.items():
+            row[column] = value
+    bodies = [",".join(row) for row in [format_row(drive(1, {})[0]).split(",")[:-1], *rows]]
+    path = tmp_path / "00001-001.csv"
+    path.write_text("\n".join([HEADER, *(f"{body},{zlib.crc32(body.encode()):08x}" for body in bodies)]) + "\n")
+    assert main.main(["report", str(path), "--out", str(tmp_path / "out.html"), "--json"]) == 0
+
+
 def test_the_page_says_the_figures(drive) -> None:
     rows = drive(300, {40: {"iri_m_per_km": 14.2, "iri_std_m_per_km": 2.1, "iri_class": "D", "flags": ("clipped",)}})
     text = text_of(page([LoggedFile("00001-001.csv", rows, 2, SIDECAR)]))
@@ -54,7 +79,7 @@ def test_the_page_says_the_figures(drive) -> None:
 
 def test_every_flag_that_rows_carry_is_explained() -> None:
     assert set(FLAG_MEANINGS) == {"gps_lost", "gap", "clipped", "slow", "fast", "stationary", "time_unset", "partial",
-                                  "unsettled", "faint", "blind", "frozen"}
+                                  "unsettled", "faint", "blind", "frozen", "speed_doubtful"}
 
 
 def test_the_page_needs_nothing_from_elsewhere(drive) -> None:

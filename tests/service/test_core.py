@@ -21,6 +21,7 @@ from logger.store.vehicle_file import read_vehicle
 
 from drives import SHORT_PLAN
 from replaying import core_for, rows_of
+from sensor_faults import checked
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +47,18 @@ def cut_anywhere(events: list[Event], seed: int) -> list[Event]:
             data = data[cut:]
         pieces.append(Event(event.t_us, event.source, data))
     return pieces
+
+
+@pytest.mark.parametrize("date", ["31,12,9999", "01,01,0001"])
+def test_a_date_that_cannot_be_ends_nothing(short_drive: Drive, expected: list[str], date: str) -> None:
+    """At the end of time, at midnight: a second later there is no date any more."""
+    nine = [(Event(event.t_us, "nmea", checked(f"GPZDA,235959.00,{date},00,00")
+                   + checked("GPGGA,235959.00,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,")))
+            for event in short_drive.events if event.source == "nmea"]
+    events = [event for event in short_drive.events if event.source != "nmea"] + nine
+    rows = rows_of(short_drive.header, sorted(events, key=lambda event: event.t_us)).records
+    assert len(rows) > 10
+    assert all(row.utc_us is None for row in rows)
 
 
 def test_the_drive_makes_rows(expected: list[str]) -> None:

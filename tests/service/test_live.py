@@ -20,6 +20,8 @@ class Stuck:
     """A device whose driver never returns."""
 
     name = "bma220"
+    dropped = 0
+    waiting_since_us = None
 
     def __init__(self) -> None:
         self.release = threading.Event()
@@ -27,9 +29,12 @@ class Stuck:
     def open(self) -> None:
         """Opens well."""
 
-    def poll(self) -> Event | None:
+    def poll(self) -> list[Event]:
         self.release.wait()
         raise NotPresent("released")
+
+    def flush(self) -> list[Event]:
+        return []
 
     def close(self) -> None:
         """Nothing to let go of."""

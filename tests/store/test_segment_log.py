@@ -16,9 +16,11 @@ from logger.records import WindowRecord
 from logger.store.segment_log import (
     COLUMNS,
     HEADER,
+    LARGEST,
     LINE_BYTES,
     SHORTEST_ROW_BYTES,
     BadRow,
+    Column,
     format_row,
     parse_row,
     read_log,
@@ -42,11 +44,12 @@ UNKNOWN = replace(
 CONTRACT = ("segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,"
             "iri_std_m_per_km,iri_rms_m_per_km,a_w_mps2,mtvv_mps2,vdv_mps175,crest_factor,comfort,iri_class,flags,")
 
-maybe = st.none() | st.floats(allow_nan=False, allow_infinity=False, width=32)
+maybe = st.none() | st.floats(-LARGEST, LARGEST, width=32)
 records = st.builds(
     WindowRecord, segment=st.integers(0, 10**9), drive=st.integers(0, 10**6), t_us=st.integers(-10**6, 10**15),
     utc_us=st.none() | st.integers(0, 4_000_000_000_000_000), duration_s=st.floats(0, 1e4),
-    distance_start_m=maybe, distance_end_m=maybe, lat_deg=maybe, lon_deg=maybe, speed_mps=maybe, iri_m_per_km=maybe,
+    distance_start_m=maybe, distance_end_m=maybe, lat_deg=st.none() | st.floats(-90, 90),
+    lon_deg=st.none() | st.floats(-180, 180), speed_mps=maybe, iri_m_per_km=maybe,
     iri_std_m_per_km=maybe, iri_rms_m_per_km=maybe, a_w_mps2=maybe, mtvv_mps2=maybe, vdv_mps175=maybe,
     crest_factor=maybe, comfort=st.sampled_from(["", "uncomfortable"]), iri_class=st.sampled_from(["", "C"]),
     accel_rms_mps2=maybe, samples=st.integers(0, 10**6), clipped_samples=st.integers(0, 10**6),
@@ -99,6 +102,29 @@ def test_numbers_that_are_none_are_never_written(value: float) -> None:
     assert format_row(record) == format_row(replace(RECORD, a_w_mps2=None, lat_deg=None))
     with pytest.raises(ValueError, match="duration_s"):
         format_row(replace(RECORD, duration_s=value))
+
+
+@pytest.mark.parametrize("value", [2 * LARGEST, -2 * LARGEST, 1e300, 3e38])
+@pytest.mark.parametrize("column", [column for column in COLUMNS if column.largest], ids=lambda column: column.name)
+def test_what_no_row_can_hold_is_written_as_unknown_and_refused_when_read(column: Column, value: float) -> None:
+    values = format_row(RECORD).split(",")[:-1]
+    values[COLUMNS.index(column)] = f"{value:.{7 if 'deg' in column.name else 3}f}"
+    with pytest.raises(BadRow, match=r"expected|finite"):
+        parse_row(checked(",".join(values)))
+    if column.name == "duration_s":
+        with pytest.raises(ValueError, match="duration_s"):
+            format_row(replace(RECORD, duration_s=value))
+    else:
+        row = format_row(replace(RECORD, **{column.attribute: value}))
+        assert row == format_row(replace(RECORD, **{column.attribute: None}))
+
+
+@pytest.mark.parametrize("day", ["9999-12-31", "0001-01-01", "1969-12-31", "2200-01-01"])
+def test_a_date_of_another_age_is_refused_and_never_written(day: str) -> None:
+    with pytest.raises(BadRow, match="expected UTC"):
+        parse_row(checked(BODY.replace("2026-07-04", day)))
+    for utc_us in (-1, 8_000_000_000_000_000, -(10**18), 10**18):
+        assert format_row(replace(RECORD, utc_us=utc_us)) == format_row(replace(RECORD, utc_us=None))
 
 
 @settings(deadline=None, max_examples=100)

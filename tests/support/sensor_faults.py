@@ -4,8 +4,10 @@ buses and ports that misbehave, in time that a trial lets pass."""
 from __future__ import annotations
 
 import errno
+import math
 import random
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -15,16 +17,19 @@ from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
-from drivers.bma220 import CHIP_ID, Bma220Settings
+import numpy as np
+
+from drivers.bma220 import AXES, CHIP_ID, FILTER, RANGE, RANGE_CODES, WATCHDOG, Bma220Settings
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
+from drivers.simulator import Bma220Chip
 from logger.commands.status import advice
 from logger.records import WindowRecord
 from logger.service import assemble
-from logger.service.config import AccelerometerConfig, Config, PascoConfig
+from logger.service.config import AccelerometerConfig, Bma220Config, Config, PascoConfig
 from logger.service.core import Core
-from logger.service.live import HANG_US, Deadlines, monotonic_us
+from logger.service.live import HANG_US, Deadlines, Listener, LiveService, monotonic_us
 from logger.service.observer import Observer
 from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.status import ServiceStatus
@@ -127,6 +132,8 @@ class Car:
         if serial:
             lines = PascoConfig(profile="lines")
             config = replace(config, accelerometer=AccelerometerConfig("pasco", "+z", pasco=lines))
+        elif settings is not None:
+            config = replace(config, accelerometer=AccelerometerConfig(bma220=Bma220Config(range_g=settings.range_g)))
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = assemble.instrument(self.config.accelerometer)
         vehicle = read_vehicle(self.config.vehicle)
@@ -141,7 +148,11 @@ class Car:
         self.gps = Supervisor(SerialSource("nmea", self.port.opened, self.clock, 0.0), self.clock)
         self.observer = Observer(self.config, self.core, self.storage, self.pipeline, self.accelerometer, self.gps,
                                  {"accelerometer": sensor.counters, "gps": dict}, Deadlines(STEP_US))
+        events: deque[Event] = deque()
+        self.listeners = [Listener(part, events, lambda: None) for part in (self.accelerometer, self.gps)]
+        self.service = LiveService(self.core, self.storage, self.listeners, events, 1.0, 1.0, lambda now_us: None)
         self.heard_us: list[int] = []
+        self.core.feed = self._heard  # type: ignore[method-assign]
         self.longest_step_us = 0
         self._second = -1
 
@@ -151,6 +162,11 @@ class Car:
     @property
     def now_s(self) -> float:
         return (self.clock.now_us - self.begin_us) / 1e6
+
+    def _heard(self, event: Event) -> None:
+        if event.source != "nmea":
+            self.heard_us.append(event.t_us)
+        Core.feed(self.core, event)
 
     def rough_road(self, second: float) -> bytes:
         return bytes((0, 4 * self.rng.randrange(2), 4 * (16 + self.rng.randrange(-2, 3))))
@@ -174,12 +190,9 @@ class Car:
             self.travelled_m += self.speed_mps
             self.port.load(self.receiver(self._second))
             self.observer.write(self.clock.now_us)
-        for supervisor in (self.accelerometer, self.gps):
-            event = supervisor.step()
-            if event is not None:
-                self.core.feed(event)
-                if event.source != "nmea":
-                    self.heard_us.append(event.t_us)
+        for listener in self.listeners:
+            listener.look()
+        self.service.move(self.clock.now_us)
         self.longest_step_us = max(self.longest_step_us, self.clock.now_us - began_us)
         self.clock.now_us += STEP_US
 
@@ -285,6 +298,64 @@ def another_device(folder: Path, kind: str) -> Found:
     told = " ".join(advice(status))
     assert "no other device" in told
     return found(told=told)
+
+
+def settings_lost(folder: Path, case: tuple[int, str]) -> Found:
+    """A chip whose readings follow its registers, as a real one's do. What it says under others than were written to
+    it must not come near a row."""
+    range_g, loss = case
+    lost_s = 20.003
+    car = Car(folder, settings=Bma220Settings(range_g=range_g))
+    wrong_us: list[int] = []
+    right: dict[int, int] = {}
+
+    def sample(second: float) -> bytes:
+        if second > 1 and not right:
+            right.update(car.bus.chip.registers)
+        if second >= lost_s and not wrong_us:
+            lose(car.bus.chip, loss)
+        if right and car.bus.chip.registers != right:
+            wrong_us.append(car.clock.now_us)
+        codes = {code: full_g for full_g, code in RANGE_CODES.items()}
+        counts_per_g = 32 / codes[car.bus.chip.registers[RANGE.address] & 3]
+        felt_g = 1 + 0.3 * math.sin(40 * second) + 0.1 * math.sin(9 * second)
+        return bytes((0, 0, 4 * max(-32, min(31, round(counts_per_g * felt_g))) & 0xFF))
+
+    car.sample = sample
+    car.drive(lost_s - 0.5)
+    status = car.drive(20)
+    restored_s = (wrong_us[-1] - wrong_us[0]) / 1e6
+    assert restored_s < 1
+    assert not set(car.heard_us) & set(wrong_us)
+    assert status.accelerometer.state == "ok"
+    assert car.accelerometer.restarts == 1
+    told = " ".join(advice(status))
+    assert "lost its settings" in told
+    doubtful = [record for record in car.rows.records
+                if record.t_us <= wrong_us[-1] and wrong_us[0] <= record.t_us + record.duration_s * 1e6]
+    assert doubtful
+    assert all("gap" in record.flags for record in doubtful)
+    heard = np.array(car.heard_us)
+    unheard_s = float(np.diff(heard[heard > car.begin_us + 1e6]).max()) / 1e6
+    assert unheard_s < 1
+    after = [record for record in car.rows.records if record.t_us > wrong_us[-1]]
+    assert len(after) > 5
+    usual = np.median([record.accel_rms_mps2 for record in car.rows.records if record.t_us < wrong_us[0]
+                       and record.accel_rms_mps2 is not None])
+    assert all(abs(record.accel_rms_mps2 / usual - 1) < 0.15 for record in car.rows.records
+               if record.accel_rms_mps2 is not None)
+    return found(told=told, unheard_s=unheard_s)
+
+
+def lose(chip: Bma220Chip, loss: str) -> None:
+    """Settings go, without a word."""
+    if loss == "brown-out":
+        chip.lose_power()
+    elif loss == "range and filter":
+        chip.registers |= {RANGE.address: 3, FILTER.address: 0}
+    else:
+        register = {"range": RANGE, "filter": FILTER, "axes": AXES, "watchdog": WATCHDOG}[loss]
+        chip.registers |= {register.address: 1 if loss == "range" else 0}
 
 
 def bus_held_low(folder: Path, watchdog_ms: int) -> Found:
@@ -505,6 +576,12 @@ HAZARDS = (
     Hazard("another device on a port", "receiver on the sensor's port, sensor on the receiver's, garbled lines",
            "no reading is made of it; the other sensor goes on; `status` says so", "as promised", another_device,
            ("receiver on the sensor's port", "sensor on the receiver's port", "wrong baud rate")),
+    Hazard("accelerometer loses its settings", "a brown-out, or registers that change: the readings go on, "
+           "2 to 8 times too large or too small, or with no filter",
+           "no such reading is taken; started anew within a second; the rows in it are flagged `gap`; `status` says so",
+           "{unheard_s.most:.2f} s of readings left out, or less", settings_lost,
+           ((4, "brown-out"), (2, "brown-out"), (2, "range and filter"), (2, "range"), (2, "filter"), (2, "axes"),
+            (2, "watchdog"))),
     Hazard("I2C bus held low", "every transfer times out after a second; with the chip's watchdog and without",
            f"the GPS and the rows go on, no step takes {HANG_US / 1e6:g} s; with its watchdog the chip is back within "
            "3 s, without it after a power cycle, and `status` says what is held low",

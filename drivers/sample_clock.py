@@ -1,0 +1,318 @@
+"""Times of samples taken at even intervals, from the times at which they arrived on a serial line.
+
+The problem: a line delivers late and in bursts, and it says neither at which rate the samples were taken nor which of
+them were lost on the way. A rate that is taken for another one, or a lost sample that is closed up, makes a smooth road
+rough without any sign of it.
+
+The solution: a sample arrives a latency after it was taken that is never negative and now and then small. Arrival minus
+index times period is therefore bounded below by the true time line, and the line is the lower envelope. Where samples
+are lost, the envelope makes a step up by whole periods, and stays; where the link only jams, it comes back.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Times = npt.NDArray[np.int64]
+
+NO_TIME = -(2**63)
+"""Stands for the time of a sample that cannot be dated."""
+
+
+class _Point(NamedTuple):
+    """A lowest arrival: how many samples came before it, how many of those lost were noticed, when it came [us]."""
+
+    number: int
+    lost: int
+    arrival_us: int
+
+
+class SampleClock:
+    """Follows the time line of one device.
+
+    1. Finding the rate. Samples are held for ``FIND_US`` of arrival time. The slope of their lower envelope is the
+       period. A rate that is not that of the profile, to within its tolerance, is taken as it is found; one below
+       ``SLOWEST`` of the profile's is refused: so much is not lost without harm. The samples are then not dated.
+    2. Settling. Samples are held for ``SETTLE_US`` of arrival time; the line starts at their lower envelope.
+    3. Following, in blocks of ``BLOCK_US``. An arrival below the line pulls it down at once: no sample is later than
+       its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of the
+       least distance, at most by the tolerance of the clock. The period is the median of the slopes between the lowest
+       arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
+       tolerance of the rate found.
+    4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
+       ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
+       where that is more, samples were lost: the line moves by as many periods and leaves a hole. (A link that is late
+       by 30 ms at random has such a second now and then: once in 1,000 samples.) Arrivals that stay more than
+       ``OFF_US`` late, or that come that much too early, make the clock settle anew.
+    5. Steadiness. Losses from the start on look like a slower clock. But they come by chance, and arrivals of a slow
+       clock lie on a line: where the lowest arrivals of the last blocks do not, neither as they came nor with the
+       losses that were noticed, the profile's own rate is taken, by which losses show; a device of another rate is
+       refused until it has kept one through ``STEADY`` findings in a row.
+
+    Times come out in whole microseconds, strictly increasing (where they must, by 1 us), and do not depend on how
+    the arrivals were cut into calls. The smallest latency cannot be known and stays in the times.
+
+    resyncs    times the line was lost and settled anew
+    lost       samples that were noticed to be missing, each by itself or some in a row
+    """
+
+    FIND_US = 1_200_000
+    SETTLE_US = 300_000
+    OFF_US = 250_000
+    LOOK_AHEAD_US = 1_000_000
+    LASTING_US = 100_000
+    STEP_SHARE = 0.75
+    JITTER_US = 5_000  # of the lower envelope, over a block: what adapters and a waking thread leave of it
+    HELD_MAX = 4096
+    BLOCK_US = 1_280_000
+    BLOCKS = 8
+    GAIN = 0.25
+    SLOWEST = 0.95
+    FASTEST = 10.0
+    FIND_ERROR = 0.01
+    OTHER_TOLERANCE = 0.02
+    STEADY = 4
+
+    def __init__(self, rate_hz: float, tolerance: float) -> None:
+        self._nominal_us = 1e6 / rate_hz
+        self._nominal_tolerance = tolerance
+        self._held: Times = np.empty(0, dtype=np.int64)
+        self._last_us = -(2**62)
+        self._points: list[_Point] = []
+        self._lowest = _Point(0, 0, 0)
+        self._number = 0
+        self._finding = True
+        self._following = False
+        self._ended = False
+        self._steady_needed = 0
+        self.refused_hz: float | None = None
+        self.resyncs = 0
+        self.lost = 0
+        self._expect(self._nominal_us, tolerance)
+        self._begin_block(0.0, self._period_us)
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate that the samples are dated by [Hz]."""
+        return 1e6 / self._found_us
+
+    @property
+    def lost_share(self) -> float:
+        """Share of the samples of the last blocks that were noticed to be missing."""
+        if len(self._points) < 2:
+            return 0.0
+        first, last = self._points[0], self._points[-1]
+        lost = last.lost - first.lost
+        return lost / max(1, last.number - first.number + lost)
+
+    def feed(self, arrivals_us: Times) -> Times:
+        """Take (n,) arrivals, not decreasing; return the times [us] of the next samples that are certain, (m,)."""
+        waiting = np.concatenate((self._held, arrivals_us))
+        times = [np.empty(0, dtype=np.int64)]
+        while len(waiting):
+            count = self._on_line(waiting) if self._following else self._ripe(waiting)
+            if count is None:
+                continue
+            if count == 0:
+                break
+            accept = self._follow if self._following else self._settle
+            times.append(accept(waiting[:count]))
+            waiting = waiting[count:]
+        self._held = waiting
+        return np.concatenate(times)
+
+    def restart(self) -> Times:
+        """Samples may be missing from here on: settle anew. Returns the times of those held so far."""
+        self._ended = True
+        times = self.feed(np.empty(0, dtype=np.int64))
+        self._ended = False
+        self._following = False
+        return times
+
+    def _ripe(self, waiting: Times) -> int:
+        """How many of the first samples are to settle together; 0 when more may belong to them."""
+        count = int(np.searchsorted(waiting, waiting[0] + (self.FIND_US if self._finding else self.SETTLE_US)))
+        if count == len(waiting) < self.HELD_MAX and not self._ended:
+            return 0
+        return min(count, self.HELD_MAX)
+
+    def _on_line(self, waiting: Times) -> int | None:
+        """How many of the first samples belong to the line; 0: that is open; None: the line was moved or lost."""
+        waiting = waiting[: self._block + self.HELD_MAX]
+        heard_us = np.concatenate(([0], np.cumsum(np.minimum(np.diff(waiting), self.LASTING_US))))
+        known = int(np.searchsorted(heard_us, heard_us[-1] - self.LOOK_AHEAD_US, "right"))
+        known = max(known, len(waiting) - self.HELD_MAX)
+        count = min(len(waiting) if self._ended else known, self._block - self._index)
+        if count == 0:
+            return 0
+        above_us = waiting - self._line(len(waiting)) - self._pulled_us
+        early = above_us[:count] < -self.OFF_US
+        if early[0]:
+            self._lose_line(find=True)
+            return None
+        near = np.flatnonzero(above_us < self._step_least_us)
+        following = np.searchsorted(near, np.arange(count))
+        back = np.append(near, len(waiting) - 1)[following]
+        stays_off = (following == len(near)) | (heard_us[back] > heard_us[:count] + self.LOOK_AHEAD_US)
+        ends = early | (stays_off & (not self._ended))
+        if not ends[0]:
+            return int(np.argmax(ends)) if ends.any() else count
+        soon, late = (int(np.searchsorted(heard_us, us, "right")) for us in (self.LASTING_US, self.LOOK_AHEAD_US))
+        return self._step(above_us, soon, late, count)
+
+    def _step(self, above_us: npt.NDArray[np.float64], soon: int, late: int, count: int) -> int | None:
+        """The first sample and those after it stay above the line. A step that another follows at once did not come
+        here: what lies before that one is late by chance, and belongs to the line."""
+        least_us, lasting_us = float(above_us[:late].min()), float(above_us[soon:late].min(initial=np.inf))
+        before = np.flatnonzero(above_us[:soon] <= lasting_us - self._step_least_us)
+        if len(before) and lasting_us < np.inf:
+            return min(int(before[-1]) + 1, count)
+        if least_us > self.OFF_US:
+            self._lose_line(find=False)
+        else:
+            missing = max(1, round(least_us / self._period_us))
+            self.lost += missing
+            self._base_us += missing * self._period_us
+        return None
+
+    def _lose_line(self, find: bool) -> None:
+        self._following = False
+        self._finding |= find
+        self.resyncs += 1
+
+    def _line(self, count: int) -> npt.NDArray[np.float64]:
+        """The line [us] at the next samples, as it was drawn at the beginning of the block."""
+        return self._base_us + self._step_us * np.arange(self._index, self._index + count, dtype=np.float64)
+
+    def _expect(self, period_us: float, tolerance: float) -> None:
+        """The period is about this."""
+        self._found_us = self._period_us = period_us
+        self._shortest_us = period_us * (1 - tolerance)
+        self._longest_us = period_us * (1 + tolerance)
+        self._climb_us_max = period_us * tolerance
+        self._step_least_us = max(self.STEP_SHARE * period_us, self.JITTER_US)
+        self._block = max(16, round(self.BLOCK_US / period_us))
+
+    def _find(self, arrivals_us: Times) -> None:
+        """The rate of samples that came together, or that it is refused."""
+        points = self._envelope(arrivals_us)
+        if len(points) < 4:
+            return
+        slope_us, spread_us = _slope(points, with_lost=False)
+        nominal_us = self._nominal_us
+        is_steady = spread_us <= self._step_least_us
+        steady_needed, self._steady_needed = self._steady_needed - is_steady, 0
+        self.refused_hz = None
+        if abs(slope_us / nominal_us - 1) <= self._nominal_tolerance + self.FIND_ERROR:
+            self._expect(nominal_us, self._nominal_tolerance)
+            if is_steady:
+                self._period_us = min(max(slope_us, self._shortest_us), self._longest_us)
+        elif nominal_us < slope_us <= nominal_us / self.SLOWEST and not is_steady:
+            self._expect(nominal_us, self._nominal_tolerance)
+        elif nominal_us / self.FASTEST <= slope_us <= nominal_us / self.SLOWEST and is_steady and steady_needed <= 0:
+            self._expect(slope_us, self.OTHER_TOLERANCE)
+        else:
+            self.refused_hz = 1e6 / slope_us
+            self._steady_needed = steady_needed if is_steady and steady_needed > 0 else self.STEADY
+
+    def _envelope(self, arrivals_us: Times) -> list[_Point]:
+        """The lowest arrivals of some pieces of time."""
+        numbers = np.arange(len(arrivals_us), dtype=np.float64)
+        span_us = float(arrivals_us[-1] - arrivals_us[0])
+        if len(arrivals_us) < 16 or span_us < 0.5 * self.FIND_US:
+            return []
+        last = np.flatnonzero(np.append(arrivals_us[1:] > arrivals_us[:-1], True))
+        mean_us = (arrivals_us[last[-1]] - arrivals_us[last[0]]) / max(1, last[-1] - last[0])
+        above_us = arrivals_us - mean_us * numbers
+        piece = ((arrivals_us - arrivals_us[0]) * (2 * self.BLOCKS) / (span_us + 1)).astype(np.int64)
+        lowest = [np.flatnonzero(piece == k) for k in range(2 * self.BLOCKS)]
+        found = [int(inside[np.argmin(above_us[inside])]) for inside in lowest if len(inside)]
+        return [_Point(number, 0, int(arrivals_us[number])) for number in found]
+
+    def _settle(self, arrivals_us: Times) -> Times:
+        """Start a line below all arrivals."""
+        if self._finding:
+            self._find(arrivals_us)
+            if self.refused_hz is not None:
+                return np.full(len(arrivals_us), NO_TIME, dtype=np.int64)
+            self._finding = False
+        run_us = self._period_us * np.arange(len(arrivals_us), dtype=np.float64)
+        lowest = int(np.argmin(arrivals_us - run_us))
+        start_us = float(arrivals_us[lowest] - run_us[lowest])
+        self._points = [_Point(lowest, self.lost, int(arrivals_us[lowest]))]
+        self._number = len(arrivals_us)
+        self._following = True
+        self._begin_block(start_us + self._period_us * len(arrivals_us), self._period_us)
+        return self._increasing(start_us + run_us)
+
+    def _begin_block(self, base_us: float, step_us: float) -> None:
+        self._base_us = base_us
+        self._step_us = step_us
+        self._index = 0
+        self._pulled_us = 0.0
+        self._least_us = np.inf
+
+    def _follow(self, arrivals_us: Times) -> Times:
+        """Times of samples of this block that belong to the line."""
+        line_us = self._line(len(arrivals_us))
+        above_us = arrivals_us - line_us
+        lowest = int(np.argmin(above_us))
+        if above_us[lowest] < self._least_us:
+            self._least_us = float(above_us[lowest])
+            self._lowest = _Point(self._number + self._index + lowest, self.lost, int(arrivals_us[lowest]))
+        pulled_us: npt.NDArray[np.float64] = np.minimum.accumulate(np.minimum(above_us, self._pulled_us))
+        self._pulled_us = float(pulled_us[-1])
+        times = self._increasing(line_us + pulled_us)
+        self._index += len(arrivals_us)
+        if self._index == self._block:
+            self._next_block()
+        return times
+
+    def _next_block(self) -> None:
+        self._points = [*self._points, self._lowest][-self.BLOCKS :]
+        self._number += self._index
+        if len(self._points) >= 3:
+            self._look_at_the_rate()
+        climb_us = min(self.GAIN * max(self._least_us, 0.0) / self._block, self._climb_us_max)
+        self._begin_block(self._base_us + self._step_us * self._index + self._pulled_us, self._period_us + climb_us)
+
+    def _look_at_the_rate(self) -> None:
+        """Renew the period, and see whether the device keeps it."""
+        came_us, came_spread_us = _slope(self._points, with_lost=False)
+        slope_us, spread_us = _slope(self._points, with_lost=True)
+        if came_us > self._nominal_us / self.SLOWEST:
+            self._lose_line(find=True)
+        if came_spread_us <= self._step_least_us:
+            slope_us = came_us
+        elif spread_us > self._step_least_us and len(self._points) == self.BLOCKS:
+            if self._found_us != self._nominal_us and came_us < self._nominal_us:
+                self._steady_needed = self.STEADY
+                self._lose_line(find=True)
+            elif slope_us > self._nominal_us:
+                self._points = []
+                self._expect(self._nominal_us, self._nominal_tolerance)
+                return
+        self._period_us = min(max(slope_us, self._shortest_us), self._longest_us)
+
+    def _increasing(self, times_us: npt.NDArray[np.float64]) -> Times:
+        """Whole microseconds, each at least one later than the one before."""
+        steps = np.arange(len(times_us))
+        whole = np.floor(times_us).astype(np.int64) - steps
+        times: Times = np.maximum.accumulate(np.maximum(whole, self._last_us + 1)) + steps
+        self._last_us = int(times[-1])
+        return times
+
+
+def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:
+    """Median of the slopes between points [us per sample], and how far the points lie about that line [us]; the latest
+    quarter is left out: a link that stalls delays some."""
+    counts = [point.number + point.lost * with_lost for point in points]
+    slopes = [(b.arrival_us - a.arrival_us) / max(1, last - first)
+              for (a, first), (b, last) in combinations(zip(points, counts, strict=True), 2)]
+    slope_us = float(np.median(slopes))
+    off_us = sorted(point.arrival_us - slope_us * count for point, count in zip(points, counts, strict=True))
+    return slope_us, off_us[-1 - len(off_us) // 4] - off_us[0]

@@ -1,0 +1,108 @@
+"""A serial sensor that keeps another rate, or whose line loses samples: right, or flagged, and said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.commands.status import advice
+
+from replaying import rows_of
+from sensor_faults import Car
+from serial_drives import SPEED_MPS, drive_at, mean_iri, randomly_lost, rows_at, same_rows, without_lines
+
+WHOLE_ROWS = 185
+
+
+@pytest.mark.parametrize("rate_hz", [96, 98, 104, 120, 150, 200, 400, 800])
+def test_a_sensor_of_another_rate_gives_the_same_iri(rate_hz: int) -> None:
+    expected, _ = mean_iri(rows_at(100)[1])
+    found, count = mean_iri(rows_at(rate_hz)[1])
+    assert found == pytest.approx(expected, rel=0.03)
+    assert count > WHOLE_ROWS - 5
+
+
+def test_a_sensor_that_is_too_slow_gives_no_iri() -> None:
+    rows = rows_at(80)[1]
+    figures = [row for row in rows.records if row.iri_m_per_km is not None or row.a_w_mps2 is not None]
+    assert figures == []
+    assert all("gap" in row.flags for row in rows.records if row.speed_mps)
+
+
+@pytest.mark.parametrize(("rate_hz", "share"), [(100, 0.1), (100, 0.03), (150, 0.1), (200, 0.05)])
+def test_rows_with_many_lost_lines_are_right_or_flagged(rate_hz: int, share: float) -> None:
+    pairs = same_rows(rows_at(rate_hz, share)[1], rows_at(100)[1])
+    assert len(pairs) < WHOLE_ROWS / 4
+    found, expected = np.mean(pairs, axis=0) if len(pairs) >= 5 else (0, 0)
+    assert found == pytest.approx(expected, rel=0.1)
+
+
+def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
+    lost = randomly_lost(100, 0.01)
+    drive, rows = rows_at(100, 0.01)
+    driven = [row for row in rows.records if row.speed_mps and not set(row.flags) & {"partial", "unsettled", "slow"}]
+    hit, found = 0, 0
+    for row in driven:
+        begin = (row.t_us - drive.start_us) / 10_000
+        if any(begin <= number < begin + row.samples for number in lost):
+            hit += 1
+            found += "gap" in row.flags
+    assert hit > 50
+    assert found > 0.9 * hit
+    clean = [row for row in driven if "gap" not in row.flags]
+    assert len(clean) > 40  # and not everywhere
+    found, expected = np.mean(same_rows(rows, rows_at(100)[1]), axis=0)
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("second", [31.0, 47.37, 66.6, 80.0])
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_a_single_line_that_is_lost_shows(second: float, count: int) -> None:
+    drive = drive_at(100)
+    first = round(second * 100)
+    rows = rows_of(drive.header, without_lines(drive.events, set(range(first, first + count))))
+    flagged = [row for row in rows.records if "gap" in row.flags]
+    assert 1 <= len(flagged) <= 2
+    lost_us = drive.start_us + first * 10_000
+    assert any(abs(row.t_us + row.duration_s * 5e5 - lost_us) < 400_000 for row in flagged)
+
+
+def test_nothing_is_lost_on_a_line_that_loses_nothing() -> None:
+    for rate_hz in (96, 98, 100, 104, 120, 150, 200, 400, 800):
+        assert not any("gap" in row.flags for row in rows_at(rate_hz)[1].records[3:])
+
+
+@pytest.mark.parametrize(("rate_hz", "share", "says"), [
+    (80, 0.0, ("80 samples a second", "100")),
+    (100, 0.1, ("samples a second", "lost")),
+    (100, 0.02, ("lost",)),
+])
+def test_status_says_which_rate_was_seen_and_what_to_do(
+    tmp_path: Path, rate_hz: int, share: float, says: tuple[str, ...]
+) -> None:
+    lost = randomly_lost(rate_hz, share)
+    car = Car(tmp_path, serial=True)
+    car.speed_mps = SPEED_MPS
+    sent = 0
+
+    def sample(second: float) -> bytes:
+        nonlocal sent
+        lines = b""
+        while sent < second * rate_hz:
+            lines += b"" if sent in lost else b"0.01,0.02,%.3f\r\n" % (1 + 0.1 * car.rng.random())
+            sent += 1
+        return lines
+
+    car.sample = sample
+    status = car.drive(40)
+    assert status.accelerometer.state == "doubtful"
+    told = " ".join(advice(status))
+    for words in says:
+        assert words in told
+    assert "baud" in told
+    rate_hz, share, lost, sent = 100, 0.0, set(), round(car.now_s * 100)
+    status = car.drive(25)
+    assert status.accelerometer.state == "ok"
+    assert advice(status) == ["Nothing: all is well."]

@@ -1,0 +1,105 @@
+"""A receiver whose speed and places disagree, or that tells no speed or a date of another age: flagged, and said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import timedelta
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from drivers.dump import open_dump
+from drivers.nmea import NmeaDecoder
+from logger.commands.status import advice, screen
+
+from replaying import rows_of
+from sensor_faults import NOON, Car, checked, epoch
+
+ROLLOVER = timedelta(weeks=1024)
+
+
+def driven(folder: Path, told_mps: Callable[[float], float], seconds: float = 60) -> Car:
+    """A car that drives at 15 m/s, by a receiver that says another speed."""
+    car = Car(folder)
+    car.speed_mps = 15.0
+    car.receiver = lambda second: epoch(second, told_mps(second), car.travelled_m)
+    car.drive(seconds)
+    return car
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.4, 1.6, 2.0, 3.6])
+def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_path: Path, factor: float) -> None:
+    car = driven(tmp_path, lambda second: 15.0 * factor)
+    status = car.drive(1)
+    assert status.gps.state == "doubtful"
+    told, *_ = advice(status)
+    assert "speed and its places disagree" in told
+    assert "the car stands" not in screen(status, None)[0]
+    known_s = 13 if factor < 1 else 0  # a speed that is too small shows after a hundred metres of difference
+    rows = [row for row in car.rows.records if row.speed_mps and row.t_us > car.begin_us + known_s * 1e6]
+    assert all("speed_doubtful" in row.flags for row in rows)
+    assert not any(row.iri_m_per_km or row.iri_rms_m_per_km or row.iri_class for row in rows)
+    assert any(row.a_w_mps2 is not None for row in rows) or factor == 0.0
+    car.receiver = lambda second: epoch(second, car.speed_mps, car.travelled_m)
+    status = car.drive(90)
+    assert status.gps.state == "ok"
+    assert "speed_doubtful" not in car.rows.records[-1].flags
+    assert car.rows.records[-1].iri_m_per_km is not None
+
+
+@pytest.mark.parametrize("factor", [0.93, 1.0, 1.07])
+def test_a_speed_that_is_a_little_off_is_believed(tmp_path: Path, factor: float) -> None:
+    car = driven(tmp_path, lambda second: 15.0 * factor, 90)
+    assert "speed_doubtful" not in car.flags()
+
+
+def test_a_parked_car_whose_place_wanders_is_believed(tmp_path: Path) -> None:
+    car = Car(tmp_path)
+    car.speed_mps = 0.0
+    car.receiver = lambda second: epoch(second, 0.0, 30 * ((second // 20) % 3))
+    status = car.drive(120)
+    assert status.gps.state == "ok"
+    assert "speed_doubtful" not in car.flags()
+
+
+def test_the_demo_raises_no_doubt() -> None:
+    with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump, open_dump(dump) as reader:
+        rows = rows_of(reader.header, reader)
+    assert not any("speed_doubtful" in row.flags for row in rows.records)
+
+
+def test_a_receiver_that_tells_no_speed_is_told_of(tmp_path: Path) -> None:
+    car = Car(tmp_path)
+
+    def places_alone(second: float) -> bytes:
+        minutes = 60 * car.travelled_m / 111_195.0
+        return checked(f"GPGGA,{NOON + timedelta(seconds=second):%H%M%S}.00,46{minutes:08.5f},N,00630.00000,E,1,09,0.9,"
+                       "400.0,M,47.0,M,,")
+
+    car.receiver = places_alone
+    status = car.drive(30)
+    assert status.gps.state == "doubtful"
+    told, *_ = advice(status)
+    assert "RMC" in told
+    assert "no speed" in told
+
+
+@pytest.mark.parametrize("turns", [1, 2])
+def test_a_date_that_is_weeks_back_is_told_of_with_the_setting(tmp_path: Path, turns: int) -> None:
+    car = Car(tmp_path)
+    car.receiver = lambda second: epoch(second, car.speed_mps, car.travelled_m, NOON - turns * ROLLOVER)
+    status = car.drive(30)
+    assert status.gps.state == "doubtful"
+    told, *_ = advice(status)
+    assert f"week_rollovers: {turns}" in told
+    decoder = NmeaDecoder(week_rollovers=turns)
+    fixes = decoder.feed(0, epoch(0, 1, 1, NOON - turns * ROLLOVER)) + decoder.flush()
+    assert [fix.utc_us for fix in fixes] == [round(NOON.timestamp() * 1e6)]
+    assert decoder.doubt == ""
+
+
+def test_a_good_receiver_is_not_doubted(tmp_path: Path) -> None:
+    status = Car(tmp_path).drive(40)
+    assert status.gps.state == "ok"
+    assert advice(status) == ["Nothing: all is well."]
