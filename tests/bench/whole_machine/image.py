@@ -27,11 +27,13 @@ PACKAGES = ("systemd", "systemd-sysv", "udev", "dbus", "kmod", "python3", "pytho
 KERNELS = {"amd64": "linux-image-amd64", "arm64": "linux-image-arm64"}
 LIBRARIES = {"amd64": "x86_64", "arm64": "aarch64"}
 WHEEL_TAGS = ("manylinux2014", "manylinux_2_17", "manylinux_2_24", "manylinux_2_27", "manylinux_2_28")
-# What takes time at boot and has no part in any trial. The getty on ttyS0 would eat the receiver's sentences.
+# What takes time at boot and has no part in any trial (a login's units too). The getty on ttyS0 would eat the receiver's sentences.
 MASKED = ("getty@tty1.service", "serial-getty@ttyS0.service", "getty.target", "apt-daily.timer",
           "apt-daily-upgrade.timer", "dpkg-db-backup.timer", "e2scrub_all.timer", "e2scrub_reap.service",
           "fstrim.timer", "systemd-timesyncd.service", "cron.service", "systemd-networkd.service",
-          "networking.service", "ifupdown-pre.service", "logrotate.timer", "rsyslog.service")
+          "networking.service", "ifupdown-pre.service", "logrotate.timer", "rsyslog.service", "systemd-logind.service",
+          "systemd-binfmt.service", "proc-sys-fs-binfmt_misc.automount", "modprobe@drm.service",
+          "systemd-pstore.service", "modprobe@efi_pstore.service")
 # Modules of Debian's stock kernel that stand between its start and its disk, and those of the shared folder.
 INITRAMFS_MODULES = ("virtio_pci", "virtio_blk", "ext4", "9pnet_virtio", "9p", "virtio_mmio")
 
@@ -120,13 +122,13 @@ def _furnish(root: Path, arch: str) -> None:
     bench.mkdir(parents=True)
     shutil.copy(IN_GUEST / "start.sh", bench)
     units = root / "etc/systemd/system"
-    shutil.copy(IN_GUEST / "bench-agent.service", units)
     (units / "sysinit.target.wants").mkdir(exist_ok=True)
-    (units / "sysinit.target.wants/bench-agent.service").symlink_to("/etc/systemd/system/bench-agent.service")
+    for unit in ("bench-boot.service", "bench-agent.service"):
+        shutil.copy(IN_GUEST / unit, units)
+        (units / "sysinit.target.wants" / unit).symlink_to(f"/etc/systemd/system/{unit}")
     for unit in MASKED:
         (units / unit).unlink(missing_ok=True)
         (units / unit).symlink_to("/dev/null")
-    # Raspberry Pi OS has this group for /dev/i2c-N; Debian makes it with i2c-tools.
     (root / "etc/fstab").write_text("LABEL=root / ext4 defaults,noatime 0 1\n")
     (root / "etc/hostname").write_text("bench\n")
     (root / "etc/machine-id").write_text("0123456789abcdef0123456789abcdef\n")

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs in the guest, early: finds the folder shared with the host, and starts what the host put there.
+# Runs in the guest, early: finds the folder shared with the host, and does first what the host put there.
 mkdir -p /host
 share=$(sed -n 's/.*bench_share=\([^ ]*\).*/\1/p' /proc/cmdline)
 if [ "$share" = 9p ]; then
@@ -7,5 +7,4 @@ if [ "$share" = 9p ]; then
 else
     mount -t hostfs -o "$share" none /host
 fi
-[ ! -e /host/boot.sh ] || sh /host/boot.sh >/host/boot.log 2>&1
-exec python3 /host/in_guest/agent.py /host
+[ ! -e /host/boot.sh ] || sh /host/boot.sh >>/host/boot.log 2>&1
