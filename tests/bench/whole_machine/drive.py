@@ -8,10 +8,14 @@ guest boots.
 
 from __future__ import annotations
 
+import fcntl
 import os
+import struct
+import termios
 import threading
 import time
 import tty
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -24,6 +28,7 @@ from logger.store.vehicle_file import read_vehicle
 
 FAST_MPS, SLOW_MPS = 20.0, 14.0
 SPEED_CHANGE_S = 30.0
+MOST_UNREAD_BYTES = 400  # some sentences: what a UART and its driver hold
 
 
 def make_drive(path: Path, seconds: float) -> None:
@@ -97,7 +102,12 @@ class Receiver:
             if self._stop.wait(max(wait_s, 0)):
                 return
             if not self.silent.is_set():
-                try:
+                self._forget_unread()
+                with suppress(BlockingIOError):
                     os.write(self._master, event.data)
-                except BlockingIOError:
-                    pass  # nobody reads: a serial line does not wait either
+
+    def _forget_unread(self) -> None:
+        """A serial line keeps nothing for a machine that does not listen yet; a pseudo-terminal would."""
+        waiting = struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, b"\0" * 4))[0]
+        if waiting > MOST_UNREAD_BYTES:
+            termios.tcflush(self._slave, termios.TCIFLUSH)

@@ -24,7 +24,7 @@ from typing import Any, Self
 from .image import IN_GUEST, Image
 from .shell import run
 
-UML_MEMORY = "mem=448M"
+UML_MEMORY = "mem=512M"
 KERNEL_WORDS = ("rw", "systemd.show_status=0", "loglevel=4", "systemd.unified_cgroup_hierarchy=1")
 POLL_S = 0.05
 
