@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from .drive import Receiver, make_drive
-from .guest import GuestFailed, UmlGuest
+from .guest import Guest, GuestFailed, UmlGuest
 from .image import Image, build
 from .shell import run
 
@@ -115,7 +115,7 @@ class Bench:
 class Car:
     """A guest and its receiver, which speaks from power on."""
 
-    guest: UmlGuest
+    guest: Guest
     receiver: Receiver
 
     def __enter__(self) -> Self:

@@ -45,6 +45,7 @@ class Guest:
     """What both kinds share: the folder through which commands go, and the process."""
 
     boot_limit_s = 300.0
+    layer: Path
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -93,6 +94,10 @@ class Guest:
             time.sleep(POLL_S)
         self.booted_s = time.monotonic() - self.started_s
         return self.booted_s
+
+    def forget(self) -> None:
+        """Throw away all that was written since the base disk."""
+        self.layer.unlink(missing_ok=True)
 
     @property
     def is_on(self) -> bool:
@@ -171,10 +176,6 @@ class UmlGuest(Guest):
         self.serial = serial
         self.umid = f"bench-{os.getpid()}-{folder.name}"
 
-    def forget(self) -> None:
-        """Throw away all that was written since the base disk."""
-        self.layer.unlink(missing_ok=True)
-
     def save_as(self, disk: Path) -> None:
         """Make a new base disk of this guest's, which must be off."""
         new = disk.with_suffix(".new")
@@ -198,11 +199,8 @@ class QemuGuest(Guest):
         self.base = base or image.disk
         self.arch = arch
         self.layer = folder / "disk.qcow2"
+        self.devices: list[str] = []
         self._monitor = folder / "monitor"
-
-    def forget(self) -> None:
-        """Throw away all that was written since the base disk."""
-        self.layer.unlink(missing_ok=True)
 
     def ask(self, command: str, **arguments: Any) -> Any:
         """One command of QEMU's machine protocol (QMP). GuestFailed when it is refused."""
@@ -235,4 +233,4 @@ class QemuGuest(Guest):
                 "-fsdev", f"local,id=share,path={self.share},security_model=none",
                 "-device", "virtio-9p-pci,fsdev=share,mount_tag=share",
                 "-device", "qemu-xhci,id=usb", "-serial", "stdio",
-                "-qmp", f"unix:{self._monitor},server=on,wait=off", "-nic", "none"]
+                "-qmp", f"unix:{self._monitor},server=on,wait=off", "-nic", "none", *self.devices]
