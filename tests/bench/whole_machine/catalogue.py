@@ -61,6 +61,9 @@ def read_report(path: Path) -> Report:
     return Report(**{**fields, "checks": [Check(**check) for check in fields["checks"]]})
 
 
+Try = Callable[["Bench", Report], None]
+
+
 @dataclass(frozen=True)
 class Trial:
     """A trial: what is promised, and the function that tries it on a ``guest``."""
@@ -68,7 +71,7 @@ class Trial:
     name: str
     promise: str
     guest: str
-    run: Callable[[Bench, Report], None]
+    run: Try
 
     def carry_out(self, bench: Bench) -> Report:
         """Run it; whatever goes wrong with it is a check that did not hold."""
@@ -87,10 +90,10 @@ class Trial:
 CATALOGUE: dict[str, Trial] = {}
 
 
-def trial(promise: str, guest: str = "UML") -> Callable[[Callable[[Bench, Report], None]], Callable[[Bench, Report], None]]:
+def trial(promise: str, guest: str = "UML") -> Callable[[Try], Try]:
     """Register a function as the trial of its name."""
 
-    def register(function: Callable[[Bench, Report], None]) -> Callable[[Bench, Report], None]:
+    def register(function: Try) -> Try:
         CATALOGUE[function.__name__] = Trial(function.__name__, promise, guest, function)
         return function
 

@@ -27,7 +27,8 @@ PACKAGES = ("systemd", "systemd-sysv", "udev", "dbus", "kmod", "python3", "pytho
 KERNELS = {"amd64": "linux-image-amd64", "arm64": "linux-image-arm64"}
 LIBRARIES = {"amd64": "x86_64", "arm64": "aarch64"}
 WHEEL_TAGS = ("manylinux2014", "manylinux_2_17", "manylinux_2_24", "manylinux_2_27", "manylinux_2_28")
-# What takes time at boot and has no part in any trial (a login's units too). The getty on ttyS0 would eat the receiver's sentences.
+# What takes time at boot and has no part in any trial (a login's units too). The getty on ttyS0 would eat what the
+# receiver says.
 MASKED = ("getty@tty1.service", "serial-getty@ttyS0.service", "getty.target", "apt-daily.timer",
           "apt-daily-upgrade.timer", "dpkg-db-backup.timer", "e2scrub_all.timer", "e2scrub_reap.service",
           "fstrim.timer", "systemd-timesyncd.service", "cron.service", "systemd-networkd.service",

@@ -20,7 +20,8 @@ against a model of ours but for the instruments: the kernel, systemd, udev, file
   `scsi_debug` disks that udev takes for USB. A power cut kills the guest: its memory and its page cache are gone. In
   the trials of power cuts the logs are on a disk with a write cache of its own, which the cut empties too: what was not
   flushed is lost, but for some blocks that it wrote unasked, in any order.
-- **QEMU**: an emulated PC with Debian's stock kernel, xHCI, usb-storage and usb-serial, plugged and pulled by the monitor.
+- **QEMU**: an emulated PC with Debian's stock kernel, xHCI, usb-storage and usb-serial, plugged and pulled by its
+  monitor.
 - **aarch64**: Debian for arm64, by user emulation and on an emulated board.
 
 Times are those of guests on a host that had other work ({cores} cores); a Pi is faster than any of them.

@@ -10,8 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-from drivers.dump import open_dump
 from smbus2 import SMBus
+
+from drivers.dump import open_dump
 
 ADDRESS = 0x0A
 CHIP_ID, REVISION, DATA, AXES, FILTER, RANGE, WATCHDOG = 0x00, 0x02, 0x04, 0x1E, 0x20, 0x22, 0x2E

@@ -54,7 +54,7 @@ def upgrade_and_uninstall(bench: Bench, report: Report) -> None:
         wheels.symlink_to(bench.work / "wheels-amd64")
         car.boot()
         car.wait_for_rows(3)
-        car.guest.must(f"echo '# mine' >> /etc/ridelog/ridelog.yaml; cp -r /host/newer /root/newer; cd /root/newer && "
+        car.guest.must("echo '# mine' >> /etc/ridelog/ridelog.yaml; cp -r /host/newer /root/newer; cd /root/newer && "
                        "/opt/ridelog/bin/pip install -q --no-index --no-deps --no-build-isolation "
                        "--find-links /root/wheels setuptools wheel >/dev/null 2>&1; "
                        "/opt/ridelog/bin/pip install -q --no-index --no-deps --find-links /root/wheels .", 900)

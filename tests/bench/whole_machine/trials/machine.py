@@ -20,8 +20,8 @@ def restarts(car: Car) -> int:
     return int(car.guest.must("systemctl show ridelog -p NRestarts --value"))
 
 
-@trial("a process that hangs is replaced within the watchdog's 30 s and the 15 s it is given to end; one that is killed "
-       "within seconds; rows go on")
+@trial("a process that hangs is replaced within the watchdog's 30 s and the 15 s it is given to end; one that is "
+       "killed within seconds; rows go on")
 def watchdog(bench: Bench, report: Report) -> None:
     """SIGSTOP and SIGKILL."""
     with bench.car("watchdog", chip="dump") as car:

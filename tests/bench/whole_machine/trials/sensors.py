@@ -119,7 +119,8 @@ def receiver_silent_and_back(bench: Bench, report: Report) -> None:
         time.sleep(30)
         found = rows(car)
         flags = [row["flags"] for row in found]
-        report.check("rows of the minute are flagged", any("blind" in text and "gps_lost" in text for text in flags[5:]),
+        report.check("rows of the minute are flagged",
+                     any("blind" in text and "gps_lost" in text for text in flags[5:]),
                      f"{sum('gps_lost' in text for text in flags)} of {len(flags)} rows say gps_lost")
         report.check("rows after it hold figures again", bool(found[-1]["iri_m_per_km"] or found[-5]["iri_m_per_km"]),
                      flags[-1] or "no flag")
@@ -134,6 +135,6 @@ def recording_replays(bench: Bench, report: Report) -> None:
         car.guest.must("systemctl stop ridelog")
         out = car.guest.must("cd /var/lib/ridelog; n=$(ls -t *.dump.gz | head -1); s=${n%%-*}; rm -rf /tmp/again; "
                              "ridelog replay $n --out /tmp/again --config /etc/ridelog/ridelog.yaml >/tmp/replay.txt; "
-                             "cat $s-*.csv >/tmp/live.csv; cat /tmp/again/*.csv >/tmp/again.csv; wc -l < /tmp/live.csv; "
-                             "cmp /tmp/live.csv /tmp/again.csv && echo same", 400)
+                             "cat $s-*.csv >/tmp/live.csv; cat /tmp/again/*.csv >/tmp/again.csv; "
+                             "wc -l < /tmp/live.csv; cmp /tmp/live.csv /tmp/again.csv && echo same", 400)
         report.check("the same to the byte", "same" in out, f"{out.split()[0]} lines: {out.strip()[-100:]}")

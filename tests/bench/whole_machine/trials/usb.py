@@ -91,8 +91,8 @@ def partitioned(make: str) -> str:
             "dd if=IMAGE.part of=IMAGE bs=1M seek=1 conv=notrunc status=none")
 
 
-@trial("sticks on real USB: exFAT on a partition, FAT; copied, checked, unmounted; pulled in mid-copy and back within a "
-       "second; two at once", "QEMU")
+@trial("sticks on real USB: exFAT on a partition, FAT; copied, checked, unmounted; pulled in mid-copy and back within "
+       "a second; two at once", "QEMU")
 def usb_sticks(bench: Bench, report: Report) -> None:
     """usb-storage at an xHCI controller, one boot for all."""
     exfat, fat = partitioned("mkfs.exfat -L RIDELOG IMAGE"), partitioned("mkfs.vfat -n RIDELOG IMAGE")
@@ -155,7 +155,8 @@ def usb_receiver(bench: Bench, report: Report) -> None:
         time.sleep(30)
         found = rows(car)
         report.check("rows of the outage are flagged", any("gps_lost" in row["flags"] for row in found[3:]))
-        report.check("rows hold places again", any(row["lat_deg"] for row in found[-6:]), found[-1]["flags"] or "no flag")
+        report.check("rows hold places again", any(row["lat_deg"] for row in found[-6:]),
+                     found[-1]["flags"] or "no flag")
         restarted = guest.must("systemctl show ridelog -p NRestarts --value").strip()
         report.check("restarts", restarted == "0", restarted)
 
