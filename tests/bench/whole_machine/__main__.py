@@ -11,14 +11,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
 
 from .bench import Bench
 from .catalogue import CATALOGUE, read_report
 from .page import write_page
-from .trials import arm, installation, machine, power, sensors, sticks, usb
 
-ALL = (installation, power, sticks, sensors, machine, usb, arm)
+# in the order in which they are carried out and stand on the page
+for module in ("installation", "power", "sticks", "sensors", "machine", "usb", "arm"):
+    import_module(f".trials.{module}", __package__)
 WORK = Path("/var/tmp/ridelog-whole-machine")
 
 
