@@ -1,0 +1,1 @@
+"""ridelog on a whole machine: real systemd, udev, kernel, disks, sticks and power cuts, in a guest."""

@@ -1,0 +1,1 @@
+"""The trials, by what they try; importing a module registers its trials."""
