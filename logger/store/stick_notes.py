@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 FOLDER = Path("/run/ridelog-export")
+BLOCK_DEVICES = Path("/sys/class/block")
 LED_MEMORY = "led-trigger"
 LARGEST_BYTES = 10_000
 """Most that is read of a note; what is cut there is none."""
@@ -67,8 +68,21 @@ def read_note(path: Path) -> StickNote | None:
 
 
 def read_notes(folder: Path = FOLDER) -> list[StickNote]:
-    """All notes, by the names of their sticks."""
-    return [note for path in sorted(folder.glob("*.json")) if (note := read_note(path)) is not None]
+    """All notes of sticks that are plugged in, by their names."""
+    return [note for path in sorted(folder.glob("*.json"))
+            if _is_plugged_in(path) and (note := read_note(path)) is not None]
+
+
+def _is_plugged_in(path: Path) -> bool:
+    """False for the note of a disk that has gone, or is another by now; a note without a number is somebody's own."""
+    device, _, number = path.stem.partition(".")
+    if not number.isdecimal():
+        return True
+    place = (BLOCK_DEVICES / device).resolve()
+    for disk in (place, place.parent):  # a partition lies in its disk
+        with suppress(OSError):
+            return (disk / "diskseq").read_text("ascii").strip() == number
+    return False
 
 
 def show_on_led(led: Path, folder: Path) -> None:

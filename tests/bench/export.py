@@ -3,7 +3,8 @@
     python export.py [--files N] [--at FOLDER]
 
 Exports N files (65,000), half and a quarter of them, each time to an empty stick, and once more when all is there. The
-folder is in memory by default, so that what is measured is our own work and no disk.
+folder is in memory by default, so that what is measured is our own work and no disk. Then to a stick that somebody
+prepared.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from logger.store import manifest
+from logger.store.manifest import Manifest, format_manifest
+
 from figures import Figures
 
 MEMORY = Path("/dev/shm")
@@ -23,15 +27,15 @@ LINEAR = 1.3
 """Twice the files in at most twice the time, and three tenths for a busy machine."""
 
 EXPORT = """
-import resource, sys, time
+import argparse, re, sys, time
 from pathlib import Path
 from logger.commands.export import add_arguments, run
-import argparse
 parser = argparse.ArgumentParser()
 add_arguments(parser)
 begun = time.process_time()
 status = run(parser.parse_args(sys.argv[1:]))
-print(status, time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000, sep="\\n")
+most_kb = re.search(r"VmHWM:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]
+print(status, time.process_time() - begun, int(most_kb) / 1000, sep="\\n")
 """
 
 
@@ -54,7 +58,20 @@ def main() -> int:
         figures.at_most("    once more, all there: processor time", again_s, PATIENCE_S, "s")
         figures.at_most("    memory", again_mb, UNIT_MEMORY_MB, "MB")
     figures.at_most("time for the last half, to that for the first", seconds[2] / seconds[1] - 1, LINEAR, "")
+    with tempfile.TemporaryDirectory(dir=args.at) as name:
+        logs, stick = _filled(Path(name), 20)
+        _export(logs, stick)
+        _hostile(next((stick / manifest.FOLDER).iterdir()))
+        figures.at_most("hostile manifest and names: memory", _export(logs, stick)[1], UNIT_MEMORY_MB, "MB")
     return 1 if figures.missed else 0
+
+
+def _hostile(own: Path) -> None:
+    """A whole manifest of 63 MB in the logger's folder on a stick, and 300,000 long names beside it."""
+    listed = {f"{number:05d}-00000.csv": "0" * 64 for number in range(760_000)}
+    (own / manifest.NAME).write_bytes(format_manifest(Manifest(own.name, listed)))
+    for number in range(300_000):
+        (own / f"{number:06d}-{'x' * 240}").touch()
 
 
 def _filled(folder: Path, files: int) -> tuple[Path, Path]:

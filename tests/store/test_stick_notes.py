@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from logger.store import stick_notes
 from logger.store.stick_notes import StickNote, StickState, read_note, read_notes, show_on_led, write_note
 
 COPYING = StickNote("sda1", "copying", True, "copying, 1 of 4 files")
@@ -49,14 +51,35 @@ def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
     assert read_notes(notes) == [COPYING, FAILED]
 
 
-def test_a_stick_whose_note_is_still_empty_waits(led: Path, notes: Path) -> None:
+def test_a_stick_whose_note_is_still_empty_waits(led: Path, notes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The unit makes it before anything else, so that a stick is never without a note, nor with that of another."""
     (notes / "sda1.27.json").touch()
+    monkeypatch.setattr(stick_notes, "_is_plugged_in", lambda path: True)
     waiting, = read_notes(notes)
     assert (waiting.stick, waiting.state, waiting.ok) == ("sda1", "waiting", True)
     assert read_note(notes / "sda1.27.json") == waiting
     show_on_led(led, notes)
     assert (led / "trigger").read_text() == "heartbeat"
+
+
+def test_the_note_of_a_stick_that_was_pulled_counts_no_more(
+        led: Path, notes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is removed when systemd comes to it, and an export that was cut short may still write to it."""
+    disk = tmp_path / "devices" / "sda"
+    (disk / "sda1").mkdir(parents=True)
+    (disk / "diskseq").write_text("28\n")
+    block = tmp_path / "block"
+    block.mkdir()
+    for name, place in (("sda", disk), ("sda1", disk / "sda1")):
+        (block / name).symlink_to(place)
+    monkeypatch.setattr(stick_notes, "BLOCK_DEVICES", block)
+    for name in ("sda1.27", "sda.28", "sda1.28", "sdb1.27", "by-hand"):
+        write_note(notes / f"{name}.json", replace(FAILED, stick=name))
+    assert [note.stick for note in read_notes(notes)] == ["by-hand", "sda.28", "sda1.28"]
+    for name in ("sda.28", "sda1.28", "by-hand"):
+        (notes / f"{name}.json").unlink()
+    show_on_led(led, notes)
+    assert "[mmc0]" in (led / "trigger").read_text()
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", '{"stick": 1}', '{"stick":"a","state":"x","ok":true,"text":""}'])

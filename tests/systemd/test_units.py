@@ -268,9 +268,10 @@ def test_the_note_of_a_stick_comes_first_and_goes_before_anything_that_takes_tim
 
 
 def test_one_stick_at_a_time_gets_the_logs() -> None:
-    """A stick may have a hundred partitions of that label. The others wait, in a program that takes no memory."""
+    """A stick may have a hundred partitions of that label. The others wait, in a program that takes no memory. That a
+    stick may be pulled is told at once, and not after the next one's copy."""
     ours = [line for line in command_lines(EXPORT) if inner(line)[0] == str(PROGRAM)]
     assert all(line[0] == ONE_AT_A_TIME for line in ours)
-    places = {next(word for word in line if word.startswith("/run/")) for line in ours}
-    assert len(places) == 1
-    assert Path(places.pop()).parent == stick_notes.FOLDER
+    places = {next(Path(word) for word in line if word.startswith("/run/")): "--to" in line for line in ours}
+    assert sorted(places.values()) == [False, True]
+    assert {place.parent for place in places} == {stick_notes.FOLDER}
