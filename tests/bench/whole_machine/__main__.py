@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -45,6 +46,7 @@ def main() -> int:
         parser.error(f"no trial {', '.join(unknown)}; see --list")
     if os.geteuid() != 0:
         parser.error("expected to be run as root: it makes images and boots machines")
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # guests are ended on the way out
     bench = Bench(args.work.resolve(), args.tree.resolve(), args.quick)
     results = bench.work / "results"
     reports = []

@@ -32,7 +32,7 @@ for i in $(seq 100); do [ "$(cat /sys/block/nbd0/size)" -gt 0 ] && break; sleep 
 e2fsck -p /dev/nbd0
 mkdir -p /var/lib/ridelog && mount /dev/nbd0 /var/lib/ridelog
 """
-WATCH = "python3 /host/in_guest/watch.py /host/looks.txt &\n"
+WATCH = "ls /var/lib/ridelog >/host/before.txt; python3 /host/in_guest/watch.py /host/looks.txt /host/before.txt &\n"
 
 
 @dataclass

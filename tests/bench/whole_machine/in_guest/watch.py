@@ -2,7 +2,9 @@
 
 One line a look, into a file of the shared folder, which outlives a power cut: the seconds since boot, the rows that
 the service says it has written, and the new lines of the open log, as JSON. The clock is the guest's own, so a look
-that never came is later than the last that did. Logs that were there before its start are left out.
+that never came is later than the last that did. Logs that were there before the service started, whose names are in BEFORE, are left out.
+
+watch.py OUT BEFORE
 """
 
 import json
@@ -15,10 +17,10 @@ STATUS = Path("/run/ridelog/status.json")
 LOOK_S = 0.2
 
 
-def main(out: Path) -> None:
+def main(out: Path, before: Path) -> None:
     """Look for ever."""
     read: dict[Path, int] = {}
-    old = set(LOGS.glob("*.csv*"))
+    old = {LOGS / name for name in before.read_text().splitlines()}
     with out.open("a") as file:
         while True:
             looked_s = time.monotonic()
@@ -50,4 +52,4 @@ def rows_written() -> int:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -225,8 +225,8 @@ def stick_pulled_in_mid_copy(bench: Bench, report: Report) -> None:
     with Sticks(bench, "stick-pulled", [FAT]) as sticks:
         early, wrong, gone = 0, [], 0
         for number in range(report.times):
-            sticks.do(f"plug 0; for i in $(seq 200); do grep -q $(stick 0) /proc/mounts && break; sleep 0.1; done; "
-                      f"sleep {0.3 + 0.4 * number:.1f}")
+            sticks.do(f"plug 0; for i in $(seq 600); do {NOTES} | grep -q copying && break; sleep 0.1; done; "
+                      f"sleep {0.4 * number:.1f}")
             early += "copying" in sticks.car.guest.run(NOTES).out
             sticks.do("pull 0")
             gone += sticks.no_notes(90)
