@@ -22,17 +22,13 @@ CARD_BYTES = 600_000_000
 CHIP = """modprobe i2c-stub chip_addr=0x0a; modprobe i2c-dev
 /opt/ridelog/bin/python /host/in_guest/chip.py /host/drive.dump.gz 0 >>/host/chip.log 2>&1 &
 """
-CARD = """# not a device of systemd's: it would unmount it until udev has seen its size
-mkdir -p /run/udev/rules.d
-echo 'KERNEL=="nbd*", TAG-="systemd", ENV{{SYSTEMD_READY}}=""' >/run/udev/rules.d/99-z-card.rules
-udevadm control --reload
-modprobe nbd nbds_max=1
+CARD = """modprobe nbd nbds_max=1
 python3 /host/in_guest/volatile_disk.py /host/card.img /dev/nbd0 {lies} &
 for i in $(seq 100); do [ "$(cat /sys/block/nbd0/size)" -gt 0 ] && break; sleep 0.05; done
 e2fsck -p /dev/nbd0
 mkdir -p /var/lib/ridelog && mount /dev/nbd0 /var/lib/ridelog
 """
-WATCH = "ls /var/lib/ridelog >/host/before.txt; python3 /host/in_guest/watch.py /host/looks.txt /host/before.txt &\n"
+WATCH = "python3 /host/in_guest/watch.py /host/looks.txt $(ls /var/lib/ridelog 2>/dev/null) &\n"
 
 
 @dataclass

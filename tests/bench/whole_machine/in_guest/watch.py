@@ -2,9 +2,8 @@
 
 One line a look, into a file of the shared folder, which outlives a power cut: the seconds since boot, the rows that
 the service says it has written, and the new lines of the open log, as JSON. The clock is the guest's own, so a look
-that never came is later than the last that did. Logs that were there before the service started, whose names are in BEFORE, are left out.
-
-watch.py OUT BEFORE
+that never came is later than the last that did. Started as
+``watch.py OUT NAME ...``: logs of these names, which were there before, are left out.
 """
 
 import json
@@ -17,14 +16,13 @@ STATUS = Path("/run/ridelog/status.json")
 LOOK_S = 0.2
 
 
-def main(out: Path, before: Path) -> None:
+def main(out: Path, old: set[str]) -> None:
     """Look for ever."""
     read: dict[Path, int] = {}
-    old = {LOGS / name for name in before.read_text().splitlines()}
     with out.open("a") as file:
         while True:
             looked_s = time.monotonic()
-            logs = sorted(set(LOGS.glob("*.csv*")) - old)
+            logs = sorted(path for path in LOGS.glob("*.csv*") if path.name not in old)
             new = {path.name: text for path in logs if (text := new_lines(path, read))}
             print(json.dumps({"t_s": looked_s, "rows_written": rows_written(), "lines": new}), file=file, flush=True)
             time.sleep(LOOK_S)
@@ -52,4 +50,4 @@ def rows_written() -> int:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), set(sys.argv[2:]))
