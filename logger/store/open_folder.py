@@ -180,8 +180,19 @@ class OpenFolder:
                 self.discard(name)
 
     def rename(self, name: str, new_name: str) -> None:
-        """Give a file its name, in place of the file that had it, and wait until this is on the disk."""
+        """Give a file its name, in place of the file that had it, and wait until this is on the disk.
+
+        On FAT the new name comes without size and blocks, which follow when the file is flushed again: else it is empty
+        after a pull (Linux, fs/fat/namei_vfat.c, vfat_rename).
+        """
         os.rename(name, new_name, src_dir_fd=self._descriptor, dst_dir_fd=self._descriptor)
+        found = self.find(new_name)
+        if found is not None and stat.S_ISREG(found.st_mode):
+            descriptor = os.open(new_name, _READ, dir_fd=self._descriptor)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
         self.sync()
 
     def replace(self, name: str, blocks: Iterable[bytes]) -> None:
