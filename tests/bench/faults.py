@@ -91,7 +91,8 @@ lies about fsync can lose what it lied about; no software can help that, but a d
 Power is cut in a model of the disk (what each write, fsync and rename leaves behind when all ends there), not at a
 plug: a cut at every single change of the disk can only be tried so. Sensors are bytes on simulated buses and ports, in
 simulated time. Kills, and a service that may write no more, are those of the real process. Sticks are folders behind a
-model of the system's calls, which forgets what FAT would: a FAT file system is mounted by root alone. Limits of time are of the processor's, so that a busy machine breaks none.
+model of the system's calls, which forgets what FAT would: a FAT file system is mounted by root alone. Limits of time
+are of the processor's, so that a busy machine breaks none.
 
 The unit does not ask systemd for `CPUSchedulingPolicy=rr`: with a kernel that schedules real-time tasks in groups
 (`CONFIG_RT_GROUP_SCHED`) it would fail, and the service never start. It permits the priority (`LimitRTPRIO=10`) and the
