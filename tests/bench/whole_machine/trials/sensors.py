@@ -133,7 +133,7 @@ def recording_replays(bench: Bench, report: Report) -> None:
         car.boot()
         car.wait_for_rows(40)
         car.guest.must("systemctl stop ridelog")
-        out = car.guest.must("cd /var/lib/ridelog; n=$(ls -t *.dump.gz | head -1); s=${n%%-*}; rm -rf /tmp/again; "
+        out = car.guest.must("cd /var/lib/ridelog; n=$(ls -t *.dump.gz | head -1); s=${n%%[-.]*}; rm -rf /tmp/again; "
                              "ridelog replay $n --out /tmp/again --config /etc/ridelog/ridelog.yaml >/tmp/replay.txt; "
                              "cat $s-*.csv >/tmp/live.csv; cat /tmp/again/*.csv >/tmp/again.csv; "
                              "wc -l < /tmp/live.csv; cmp /tmp/live.csv /tmp/again.csv && echo same", 400)

@@ -39,7 +39,7 @@ class Sticks:
         self.car.guest.must(
             # two starts of the service leave a finished log, so that there is something to fetch
             f"sleep 20; systemctl restart ridelog; cd /var/lib/ridelog; for n in $(seq {DUMPS}); do "
-            "cp /host/drive.dump.gz 000$((n + 10))-001.dump.gz; done; chown ridelog: *.gz; sync", 180)
+            "cp /host/drive.dump.gz 000$((n + 10)).dump.gz; done; chown ridelog: *.gz; sync", 180)
         loads = "; ".join(f"load {number} /host/stick-{number}.img" for number in range(self._count))
         self.do(f"sticks_ready {self._count} {STICK_MB}; {loads}")
         return self

@@ -51,7 +51,7 @@ class UsbSticks(Sticks):
     def fill(self) -> None:
         """Leave something to fetch."""
         self.guest.must(f"systemctl restart ridelog; cd /var/lib/ridelog; for n in $(seq {self._dumps}); do "
-                        "cp /host/drive.dump.gz 000$((n + 10))-001.dump.gz; done; chown ridelog: *.gz; sync", 600)
+                        "cp /host/drive.dump.gz 000$((n + 10)).dump.gz; done; chown ridelog: *.gz; sync", 600)
 
     def plug(self, number: int) -> None:
         """Put it in."""
