@@ -3,7 +3,7 @@
 python -m tests.bench.whole_machine [--quick] [--only NAME,...] [--list] [--work DIR] [--tree DIR] [--out FILE.md]
 
 Needs root and the packages user-mode-linux, uml-utilities, mmdebstrap, qemu-system-x86, qemu-system-arm,
-qemu-user-static, qemu-utils, e2fsprogs, dosfstools, exfatprogs; and this package's Python with ridelog in it.
+qemu-user-static, e2fsprogs, fdisk, dosfstools, exfatprogs; and this package's Python with ridelog in it.
 """
 
 from __future__ import annotations

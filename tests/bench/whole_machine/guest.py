@@ -2,8 +2,8 @@
 
 Two kinds with one interface. ``UmlGuest`` is user-mode Linux: quick to boot, its receiver a pseudo-terminal of the
 host. ``QemuGuest`` is a whole emulated PC (or an aarch64 board) with Debian's own kernel: slow, and the only one with
-real USB. Each begins from a base disk that is never written to; what it writes goes to a layer of its own, which stays
-over a power cut and can be thrown away.
+real USB. Each begins from a base disk that is never written to; what it writes goes to a layer (or copy) of its own,
+which stays over a power cut and can be thrown away.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ class UmlGuest(Guest):
 
 
 class QemuGuest(Guest):
-    """An emulated machine on a layer over ``image``'s disk; ``arch`` amd64 (a PC) or arm64 (board "virt")."""
+    """An emulated machine on a copy of ``image``'s disk; ``arch`` amd64 (a PC) or arm64 (board "virt")."""
 
     boot_limit_s = 900.0
 
@@ -197,7 +197,7 @@ class QemuGuest(Guest):
         self.image = image
         self.base = base or image.disk
         self.arch = arch
-        self.layer = folder / "disk.qcow2"
+        self.layer = folder / "disk.img"
         self.devices: list[str] = []
         self._monitor = folder / "monitor"
 
@@ -221,14 +221,14 @@ class QemuGuest(Guest):
 
     def _command(self) -> list[str]:
         if not self.layer.exists():
-            run("qemu-img", "create", "-q", "-f", "qcow2", "-F", "raw", "-b", self.base, self.layer)
+            run("cp", "--sparse=always", self.base, self.layer)
         machine = (["qemu-system-x86_64", "-machine", "q35", "-cpu", "max"] if self.arch == "amd64" else
                    ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a72"])
         console = "ttyS0" if self.arch == "amd64" else "ttyAMA0"
         return [*machine, "-accel", "tcg,thread=multi", "-m", "640", "-smp", "1", "-display", "none", "-no-reboot",
                 "-kernel", str(self.image.kernel), "-initrd", str(self.image.initrd),
                 "-append", " ".join(["root=/dev/vda", f"console={console}", "bench_share=9p", *KERNEL_WORDS]),
-                "-drive", f"file={self.layer},if=virtio,cache=writeback",
+                "-drive", f"file={self.layer},format=raw,if=virtio,cache=writeback",
                 "-fsdev", f"local,id=share,path={self.share},security_model=none",
                 "-device", "virtio-9p-pci,fsdev=share,mount_tag=share",
                 "-device", "qemu-xhci,id=usb", "-serial", "stdio",
