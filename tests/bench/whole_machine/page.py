@@ -21,7 +21,7 @@ against a model of ours but for the instruments: the kernel, systemd, udev, file
   the trials of power cuts the logs are on a disk with a write cache of its own, which the cut empties too: what was not
   flushed is lost, but for some blocks that it wrote unasked, in any order.
 - **QEMU**: an emulated PC with Debian's stock kernel, xHCI, usb-storage and usb-serial, plugged and pulled by its
-  monitor.
+  monitor. The service's watchdog waits 10 min there: without KVM it can be slower than real time on a busy host.
 - **aarch64**: Debian for arm64, by user emulation and on an emulated board.
 
 Times are those of guests on a host that had other work ({cores} cores); a Pi is faster than any of them.
