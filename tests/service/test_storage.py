@@ -11,8 +11,9 @@ import pytest
 from logger.commands.status import advice
 from logger.service import storage as storage_module
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, read_status, write_status
-from logger.service.storage import Storage
+from logger.service.storage import LOOK_US, Storage
 from logger.store.rotation import SegmentLog
+from logger.store.segment_log import read_log
 
 from crashes import FACTS, WHOLE_DISK, window
 from faulty_disk import RefusingFiles
@@ -79,3 +80,31 @@ def test_notices_are_shown_with_what_to_do_and_are_bounded(tmp_path: Path) -> No
     assert steps[0].startswith("Log folder: 00001-001.json: damaged: expected a JSON object")
     assert "replace it" in steps[storage_module.SHOWN_NOTICES + 1]
     assert StorageStatus().notices == ()
+
+
+def test_a_disk_that_became_read_only_is_noticed_though_it_refuses_nothing(tmp_path: Path) -> None:
+    """A kernel that makes every disk read-only in an emergency lets open files be written to, and keeps nothing."""
+    class Emergency(RefusingFiles):
+        read_only = False
+
+        def is_read_only(self, directory: Path) -> bool:
+            return self.read_only
+
+    files, now_us = Emergency(), 0
+    storage = Storage(tmp_path, FACTS, 10**6, None, WHOLE_DISK, lambda: now_us, files)
+    storage.log.append(window(1, utc=True))
+    files.read_only = True
+    now_us += LOOK_US
+    storage.tend()
+    storage.log.append(window(2, utc=True))
+    status = storage.status()
+    assert status.trouble == "the disk has become read-only"
+    assert status.rows_waiting == 1
+    files.read_only = False
+    for _ in range(20):
+        now_us += LOOK_US
+        storage.tend()
+    assert storage.status().trouble == ""
+    storage.close()
+    segments = [record.segment for path in sorted(tmp_path.glob("*.csv")) for record in read_log(path).records]
+    assert segments == [1, 2]

@@ -31,7 +31,7 @@ OPEN_PART = f"{SESSION:05d}-002.csv.part"
 NAMES = (
     "last-session", "last-session.tmp", "00002-001.json", "00002-001.json.tmp", "00002-001.csv.tmp", "00002-002.json",
     "00002-002.json.tmp", "00002-002.csv.tmp", "00002-002.csv", OPEN_PART, "00001-001.json", "00001-009.json",
-    "00002.dump.gz.part", "exported.json", "exported.lock", "logger-id",
+    "00002.dump.gz.part", "exported-marks", "exported.lock", "logger-id",
 )
 """Each small file of the folder, and files that are open."""
 
