@@ -69,3 +69,7 @@ class FileSystem:
         """Room for files of this user on the disk that holds a folder."""
         there = os.statvfs(directory)
         return there.f_bavail * there.f_frsize
+
+    def is_read_only(self, directory: Path) -> bool:
+        """True for a disk that was mounted read-only, or has become so, as a failing one does."""
+        return bool(os.statvfs(directory).f_flag & os.ST_RDONLY)

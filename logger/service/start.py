@@ -95,13 +95,9 @@ def _make(directory: Path) -> None:
                 FileSystem().sync_directory(folder.parent)
     except (PermissionError, NotADirectoryError, FileExistsError) as error:
         raise BadInput(f"{directory}: expected a folder for the logs ({error.strerror})") from None
-    if not (os.access(directory, os.W_OK | os.X_OK) or _is_read_only(directory)):
+    # one that is mounted read-only is no wrong setting, and may pass
+    if not (os.access(directory, os.W_OK | os.X_OK) or FileSystem().is_read_only(directory)):
         raise BadInput(f"{directory}: expected a folder that the service may write to")
-
-
-def _is_read_only(directory: Path) -> bool:
-    """True for a disk that was mounted read-only, as a failing one is: that is no wrong setting, and may pass."""
-    return bool(os.statvfs(directory).f_flag & os.ST_RDONLY)
 
 
 def _accelerometer(config: Config) -> Source:

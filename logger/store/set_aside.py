@@ -22,6 +22,7 @@ Warn = Callable[[str], None]
 
 ENDING = ".aside"
 _ASIDE = re.compile(re.escape(ENDING) + r"(-\d+)?\Z")
+READ_ONLY = "the disk has become read-only"
 log = logging.getLogger(__name__)
 
 
@@ -35,7 +36,7 @@ def disk_words(error: OSError) -> str:
     words = {
         errno.ENOSPC: "the disk is full",
         errno.EDQUOT: "the disk quota is used up",
-        errno.EROFS: "the disk has become read-only",
+        errno.EROFS: READ_ONLY,
         errno.EIO: "the disk fails (input/output error)",
     }
     return words.get(error.errno or 0, error.strerror or str(error))

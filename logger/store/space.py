@@ -25,7 +25,7 @@ from pathlib import Path
 from drivers.disk import FileSystem
 from logger.store.pairing import NOT_PAIRED, Pairing
 from logger.store.recording import ENDING
-from logger.store.set_aside import file_size, is_file, is_taken
+from logger.store.set_aside import READ_ONLY, file_size, is_file, is_taken
 
 RESERVE_BYTES = 50_000_000
 STEP_BYTES = 5_000_000
@@ -75,12 +75,15 @@ class SpaceKeeper:
         self._files = files
         self._logs_held = False
         self._dumps_held = False
+        self._read_only = False
         self.room_bytes = 0
         self.exported_removed = 0
         self.dumps_lost = 0
 
     def look(self) -> None:
         """Measure the room and make some where it is short. Raises ``OSError`` for a disk that fails."""
+        # An emergency makes disks read-only under open files: what is written to those is taken, and kept nowhere.
+        self._read_only = self._files.is_read_only(self._directory)
         self.room_bytes = self._measure()
         if self.room_bytes < RESERVE_BYTES:
             kept = self._kept()
@@ -93,11 +96,15 @@ class SpaceKeeper:
     @property
     def why_no_dumps(self) -> str:
         """Why no raw bytes may be recorded; empty: they may."""
+        if self._read_only:
+            return READ_ONLY
         return "little room is left, and it is kept for the logs" if self._dumps_held else ""
 
     @property
     def why_no_logs(self) -> str:
         """Why no rows may be written; empty: they may."""
+        if self._read_only:
+            return READ_ONLY
         return "no room is left, and nothing that could be removed" if self._logs_held else ""
 
     def _measure(self) -> int:
