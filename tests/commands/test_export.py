@@ -226,6 +226,40 @@ def test_a_mistake_in_settings_with_a_pairing_gives_no_logs_away(
     assert list(stick.iterdir()) == []
 
 
+@pytest.mark.parametrize("settings", [
+    None, b"pairing:\n  mode:\n    first_stick\nnonsense: [\n", "pairing: {mode: first_stick}\nx: [\n".encode("utf-16"),
+    b"pairing: {mode: first_stick}\n#" + b"x" * 300_000, b"log: [\n",
+], ids=["missing", "on the next line", "UTF-16", "too long", "nothing of it"])
+def test_a_logger_that_was_paired_gives_no_logs_away_whatever_became_of_its_settings(
+        logs: Path, stick: Path, tmp_path: Path, settings: bytes | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = Config(log=LogConfig(logs))
+    monkeypatch.setattr(export_command, "Config", lambda: usual)
+    own = tmp_path / "own"
+    own.mkdir()
+    assert main(["export", "--config", str(paired(tmp_path, logs, "first_stick")), "--to", str(own)]) == 0
+    if settings is None:
+        (tmp_path / "ridelog.yaml").unlink()
+    else:
+        (tmp_path / "ridelog.yaml").write_bytes(settings)
+    with pytest.raises(BadInput):
+        main(["export", "--config", str(tmp_path / "ridelog.yaml"), "--to", str(stick)])
+    assert list(stick.iterdir()) == []
+
+
+@pytest.mark.parametrize("settings", [
+    b"pairing:\n  mode:\n    first_stick\nnonsense: [\n", "pairing: {mode: first_stick}\nx: [\n".encode("utf-16"),
+    b"pairing: {mode: first_stick}\n#" + b"x" * 300_000,
+], ids=["on the next line", "UTF-16", "too long"])
+def test_settings_that_may_ask_for_a_pairing_give_no_logs_away(
+        logs: Path, stick: Path, tmp_path: Path, settings: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = Config(log=LogConfig(logs))
+    monkeypatch.setattr(export_command, "Config", lambda: usual)
+    (tmp_path / "ridelog.yaml").write_bytes(settings)
+    with pytest.raises(BadInput):
+        main(["export", "--config", str(tmp_path / "ridelog.yaml"), "--to", str(stick)])
+    assert list(stick.iterdir()) == []
+
+
 def test_settings_that_cannot_be_read_are_in_the_note(stick: Path, note: Path, tmp_path: Path) -> None:
     (tmp_path / "ridelog.yaml").write_text("log: 7\n")
     with pytest.raises(Exception, match="expected a mapping"):

@@ -412,3 +412,14 @@ def test_more_rows_than_the_sidecar_tells_of_are_wrong(tmp_path: Path) -> None:
         file.write(f"{format_row(row(4))}\n")
     assert found(tmp_path / "00001-001.csv").problems == (
         "gap: expected the 3 rows that the sidecar tells of, found 4",)
+
+
+@pytest.mark.parametrize("place", [".", "/", "..", "./"])
+@pytest.mark.parametrize("command", ["verify", "report"])
+def test_a_folder_without_a_name_of_its_own_is_a_folder(
+        tmp_path: Path, place: str, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "inside").mkdir()
+    monkeypatch.chdir(tmp_path / "inside")
+    monkeypatch.setattr(Path, "rglob", lambda folder, pattern: iter(()))  # not the whole disk
+    with pytest.raises(BadInput, match="expected"):
+        main([command, place, *(["--out", "page.html"] if command == "report" else [])])
