@@ -18,9 +18,11 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.printable import printable
-from logger.service.config import Config, find_config, load_config
+from logger.service.config import Config, find_config, load_config, load_pairing
 from logger.store.bounded import read_bounded
 from logger.store.export import ExportResult, Progress, export
+from logger.store.pairing import OFF, PAIRED_NAME, Pairing
+from logger.store.set_aside import is_taken
 from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
 from logger.store.yaml_lines import MAX_BYTES
 
@@ -81,19 +83,30 @@ def _settings(place: Path | None, logs: Path | None) -> Config:
     except BadInput as error:
         usual = Config()
         where = logs if logs is not None else usual.log.directory
-        if _names_a_pairing(found) or not any(where.glob("*.csv")):
+        if _may_be_paired(found, where) or not any(where.glob("*.csv")):
             raise
         print(printable(f"{error}; the logs in {where} are copied"), file=sys.stderr)
         return usual
 
 
-def _names_a_pairing(settings: Path) -> bool:
-    """True for settings, whatever else is in them, where a mode other than off stands outside of comments."""
+def _may_be_paired(settings: Path, logs: Path) -> bool:
+    """False where a logger gives its logs to any stick for sure, though its settings are wrong or gone. What cannot be
+    read counts as a pairing: the doubt is the owner's."""
+    try:
+        return load_pairing(settings).mode != OFF
+    except BadInput:
+        pass
+    if is_taken(logs / PAIRED_NAME) or is_taken(Pairing().key_file):
+        return True
+    if not is_taken(settings):
+        return False
     try:
         text = read_bounded(settings, MAX_BYTES)
     except BadInput:
-        return False
-    return any(re.search(rb"\bmode\W+(first_stick|key_file)\b", line.partition(b"#")[0]) for line in text.split(b"\n"))
+        return True
+    # No YAML, perhaps not even UTF-8: all that can be looked for is a mode, outside of comments.
+    said = re.sub(rb"#[^\n]*", b"", text.replace(b"\0", b""))
+    return re.search(rb"\bmode\W+(first_stick|key_file)\b", said) is not None
 
 
 def summary(result: ExportResult) -> str:

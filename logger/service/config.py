@@ -142,6 +142,12 @@ def load_config(path: Path) -> Config:
     })(load_mapping(path))
 
 
+def load_pairing(path: Path) -> Pairing:
+    """The pairing alone, of settings in which other keys may be wrong. Raises BadInput where it cannot be read."""
+    entry = load_mapping(path).mapping().get("pairing")
+    return NOT_PAIRED if entry is None else _pairing(entry)
+
+
 Read = Callable[[Node], Any]
 Section = TypeVar("Section")
 

@@ -35,7 +35,7 @@ def open_path(finished: Path) -> Path:
 
 def finished_path(part: Path) -> Path:
     """What a log or a recording is called once it is finished; that of a finished one is its own."""
-    return part.with_name(part.name.removesuffix(PART))
+    return part.with_name(part.name.removesuffix(PART)) if part.name.endswith(PART) else part
 
 
 def sidecar_path(log: Path) -> Path:

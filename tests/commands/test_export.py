@@ -236,7 +236,9 @@ def test_a_logger_that_was_paired_gives_no_logs_away_whatever_became_of_its_sett
     monkeypatch.setattr(export_command, "Config", lambda: usual)
     own = tmp_path / "own"
     own.mkdir()
-    assert main(["export", "--config", str(paired(tmp_path, logs, "first_stick")), "--to", str(own)]) == 0
+    monkeypatch.setattr(Path, "is_mount", lambda path: True)
+    config = paired(tmp_path, logs, "first_stick")
+    assert main(["export", "--mounted", "--config", str(config), "--to", str(own)]) == 0
     if settings is None:
         (tmp_path / "ridelog.yaml").unlink()
     else:
