@@ -554,3 +554,17 @@ def test_noise_gives_no_fix_and_no_error(data):
 def test_anything_behind_a_right_checksum_is_survived(fields):
     for kind in ("RMC", "GGA", "VTG", "GSA", "ZDA"):
         decode(lines(f"GP{kind},{fields}"))
+
+
+@pytest.mark.parametrize(("date", "advised"), [
+    ("091106", "week_rollovers: 1, if today is about 25 June 2026"),  # 1024 weeks before that day
+    ("060180", ""), ("100180", ""), ("220899", ""), ("070419", ""),  # a count that has just begun: no date yet
+    ("010170", ""),  # before the first week: a clock that was never set
+])
+def test_a_rollover_is_advised_with_the_date_that_it_gives_and_never_of_a_date_that_is_none(date, advised):
+    decoder = NmeaDecoder()
+    decoder.feed(0, lines(f"GPRMC,120000.00,A,4600.0,N,00630.0,E,30.0,0.0,{date},,,A"))
+    decoder.flush()
+    assert "cannot be" in decoder.doubt
+    assert ("week_rollovers" in decoder.doubt) == bool(advised)
+    assert advised in decoder.doubt
