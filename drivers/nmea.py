@@ -58,6 +58,10 @@ DAY_US = 86_400 * SECOND_US
 ROLLOVER_DAYS = 1024 * 7
 ROLLOVERS_MAX = 8
 EPOCH_ORDINAL = datetime.date(1970, 1, 1).toordinal()
+GPS_EPOCH_DAY = datetime.date(1980, 1, 6).toordinal() - EPOCH_ORDINAL
+DAYS_OF_WEEK = 7
+"""A date in the first week of a count is that of a receiver that has not heard yet which week it is."""
+
 LATEST_UTC_US = (datetime.date(2069, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
 RELEASE_UTC_US = (datetime.date(2026, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
 
@@ -422,6 +426,12 @@ class _Epoch:
         return self.gsa.hdop if self.gsa else None
 
 
+def _words_of(day: int) -> str:
+    """A date for people; ``day`` counts from 1970-01-01."""
+    date = datetime.date.fromordinal(EPOCH_ORDINAL + day)
+    return f"{date.day} {date:%B %Y}"
+
+
 class NmeaDecoder:
     """Bytes of a receiver in, fixes out. Raises nothing, whatever the bytes.
 
@@ -447,14 +457,15 @@ class NmeaDecoder:
         """What is wrong with the dates, and what to do; empty: nothing."""
         if self._too_early_us is None:
             return ""
+        day = self._too_early_us // DAY_US
         turns = -(-(self._earliest_utc_us - self._too_early_us) // (ROLLOVER_DAYS * DAY_US))
-        day = datetime.date.fromordinal(EPOCH_ORDINAL + self._too_early_us // DAY_US)
         rollovers = self._added_us // (ROLLOVER_DAYS * DAY_US) + turns
-        wrong = f"it says that it is {day:%d %B %Y}, which cannot be, so no row has a date"
-        if rollovers > ROLLOVERS_MAX:
+        wrong = f"it says that it is {_words_of(day)}, which cannot be, so no row has a date"
+        counted_days = day - self._added_us // DAY_US - GPS_EPOCH_DAY
+        if rollovers > ROLLOVERS_MAX or counted_days < 0 or counted_days % ROLLOVER_DAYS < DAYS_OF_WEEK:
             return f"{wrong}: give its antenna a free view of the sky, or replace it"
-        return (f"{wrong}: a receiver counts 1024 weeks and begins again. Set week_rollovers: {rollovers} under gps in "
-                "the settings, or renew its firmware")
+        return (f"{wrong}: a receiver counts 1024 weeks and begins again. Set week_rollovers: {rollovers}, if today is "
+                f"about {_words_of(day + turns * ROLLOVER_DAYS)}, under gps in the settings, or renew its firmware")
 
     @property
     def counters(self) -> NmeaCounters:

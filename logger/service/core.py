@@ -144,8 +144,10 @@ class Core:
     def gps_doubt(self) -> str:
         """What is wrong with the fixes that come; empty: nothing."""
         fix = self.last_fix
-        if fix is not None and fix.valid and fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
-            return ("it tells its place, but no speed, so no row has a distance: have it send RMC or VTG sentences, "
+        if fix is None or not fix.valid:
+            return ""
+        if fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
+            return ("it sends positions but no speed, so no row has a distance: have it send RMC or VTG sentences, "
                     "not GGA alone")
         return self._pipeline.speed_check.doubt or self._gps.doubt
 
