@@ -15,7 +15,8 @@ DUMPS = 24
 """Recordings of 0.9 MB beside the logs, so that copying takes some seconds."""
 
 EXPORT_S = 150.0
-MISSING = ("cat /var/lib/ridelog/exported-marks 2>/dev/null | while read -r sha size time stick name; do [ -n \"$name\" ] || continue; "
+MISSING = ("cat /var/lib/ridelog/exported-marks 2>/dev/null | while read -r sha size time stick name; do "
+           "[ -n \"$name\" ] || continue; "
            "f=$(find . -name $name -type f | head -1); [ \"$(sha256sum <$f 2>/dev/null | cut -c1-64)\" = $sha ] || "
            "echo $name; done")
 """Names of files that the logger takes for exported and that do not lie, as they were, in this folder."""
