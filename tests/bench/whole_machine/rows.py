@@ -71,8 +71,8 @@ def read_looks(text: str) -> Looks:
 
 
 def stem(name: str) -> str:
-    """``00012-003`` for an open and for a finished file alike."""
-    return name.removesuffix(".part").removesuffix(".csv")
+    """``00012-003`` for an open file, a finished one, and one that a repair is about to put in place."""
+    return name.split(".", 1)[0]
 
 
 def is_row(line: str) -> bool:

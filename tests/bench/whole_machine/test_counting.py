@@ -32,6 +32,11 @@ def test_a_row_is_promised_when_it_was_seen_more_than_a_second_before_the_last_l
     assert set(looks.ages_s) == {("00001-001", row(1)), ("00001-001", row(2))}
 
 
+def test_a_row_in_a_file_that_a_repair_is_about_to_put_in_place_is_that_of_its_log() -> None:
+    looks = read_looks("\n".join([look(10, row(1), name="00001-001.csv.tmp"), look(12)]))
+    assert compare(looks, {"00001-001.csv": f"{HEADER}\n{row(1)}\n"}).lost == 0
+
+
 def test_a_last_look_that_was_cut_short_does_not_count() -> None:
     looks = read_looks(look(10, row(1)) + "\n" + look(13)[:20])
     assert not looks.promised

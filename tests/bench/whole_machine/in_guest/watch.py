@@ -3,7 +3,7 @@
 One line a look, into a file of the shared folder, which outlives a power cut: the seconds since boot, the rows that
 the service says it has written, and the new lines of the open log, as JSON. The clock is the guest's own, so a look
 that never came is later than the last that did. Started as
-``watch.py OUT NAME ...``: logs of these names, which were there before, are left out.
+``watch.py OUT NAME ...``: these names were there before, and logs of their sessions are left out.
 """
 
 import json
@@ -22,7 +22,7 @@ def main(out: Path, old: set[str]) -> None:
     with out.open("a") as file:
         while True:
             looked_s = time.monotonic()
-            logs = sorted(path for path in LOGS.glob("*.csv*") if path.name not in old)
+            logs = sorted(path for path in LOGS.glob("*.csv*") if path.name.split("-")[0] not in old)
             new = {path.name: text for path in logs if (text := new_lines(path, read))}
             print(json.dumps({"t_s": looked_s, "rows_written": rows_written(), "lines": new}), file=file, flush=True)
             time.sleep(LOOK_S)
@@ -50,4 +50,4 @@ def rows_written() -> int:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), set(sys.argv[2:]))
+    main(Path(sys.argv[1]), {name.split("-")[0] for name in sys.argv[2:]})
