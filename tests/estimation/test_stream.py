@@ -279,6 +279,22 @@ def test_readings_that_begin_late() -> None:
 
 
 @pytest.mark.parametrize("sensor", [FINE, COARSE])
+def test_a_hole_from_standing_into_the_drive_makes_no_smooth_road(sensor: Sensor) -> None:
+    """What was driven unread says nothing about the level: as if it had not been driven at all."""
+    one = driven(((0, 0), (9, 0), (17, 15), (60, 15)))
+    reading, usable = one.read(sensor), np.ones(6000, dtype=bool)
+    whole = {window.number: window for window in estimated(an_estimator(sensor), reading, one.distance_m)}
+    usable[1000:2500] = False
+    found = estimated(an_estimator(sensor), reading, one.distance_m, usable)
+    begin, end = one.distance_m[[2700, 3700]] / WINDOW_M
+    after = [window for window in found if begin <= window.number < end]
+    assert len(after) >= 19 and not any(window.flags for window in after)
+    mean, expected = (np.mean([of.iri_m_per_km for of in some])
+                      for some in (after, [whole[window.number] for window in after]))
+    assert mean == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("sensor", [FINE, COARSE])
 def test_clipped_readings_do_not_flatten_the_road(sensor: Sensor) -> None:
     """A range that the road leaves now and then: bounds or no readings, and a similar IRI either way."""
     one = driven(steady(18.0), 6.0, 3)
