@@ -208,9 +208,8 @@ class Block:
         return result
 
     def seen_points(self, read: npt.NDArray[np.bool_]) -> int:
-        """How many points of the distance grid the car passed between its first and its last reading."""
-        at = np.flatnonzero(read)
-        return int(self._front[at[-1]] - self._front[at[0]]) if len(at) else 0
+        """How many points of the distance grid the car passed while there were readings."""
+        return int(np.diff(self._front, append=self._front[-1])[read].sum())
 
     def driven(self, road: ComplexArray) -> Array:
         """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
