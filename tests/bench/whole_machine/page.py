@@ -24,7 +24,7 @@ against a model of ours but for the instruments: the kernel, systemd, udev, file
   monitor. The service's watchdog waits 10 min there: without KVM it can be slower than real time on a busy host.
 - **aarch64**: Debian for arm64, by user emulation and on an emulated board.
 
-Times are those of guests on a host that had other work ({cores} cores); a Pi is faster than any of them.
+Times are those of guests on a host that had other work ({cores} cores); no measure of a Pi.
 
 | trial | guest | times | |
 | --- | --- | --- | --- |
