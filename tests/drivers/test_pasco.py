@@ -328,6 +328,20 @@ def test_lost_samples_leave_a_hole(lost):
     assert int(np.argmax(np.diff(times_us))) == 1999
 
 
+def test_samples_are_not_dated_while_more_are_lost_than_can_be_located():
+    """Three in a hundred lost for half a minute: undated from soon after it began until it is over for good."""
+    truth_us, arrival_us = radio(100, 12_000, 9, latency_us=15_000)
+    kept = np.random.default_rng(9).random(12_000) >= 0.03 * ((np.arange(12_000) // 3000) == 1)
+    clock = SampleClock(100, load_profile("lines").clock_tolerance)
+    times_us = timed(clock, arrival_us[kept])
+    second = (truth_us[kept] - truth_us[0]) / 1e6
+    dated = times_us != NO_TIME
+    assert dated[second < 30].all()
+    assert not dated[(second > 45) & (second < 60)].any()
+    assert dated[second > 75].all()
+    assert np.abs(times_us - truth_us[kept])[second > 75].max() < 5000
+
+
 def test_a_device_that_was_late_from_the_start_is_caught_up_with():
     """Its first second arrives a second late: the times must come back to the truth and never run backwards. Before it
     is known how fast the samples come they are not dated."""
