@@ -380,7 +380,7 @@ class PascoCounters:
     dropped_bytes   bytes that belonged to no frame
     resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
     lost            samples that were noticed to be missing between others
-    undated         samples left out because they came at a rate that cannot be used
+    undated         samples left out because they came at a rate that cannot be used, or too many were lost among them
     """
 
     frames: int
@@ -428,6 +428,9 @@ class PascoDecoder:
             return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
                     f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
                     "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
+        if self._clock.too_many_lost:
+            return ("more samples are lost on the line than can be located: no rows are made of those that come. Check "
+                    "the baud rate at both ends, the cable, and whether the bridge keeps up")
         if self._clock.lost_share >= WORTH_TELLING:
             return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
                     "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
