@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was promised: in words, whether it held, and what was measured."""
+    """One thing that was tried: in words, whether the promise held (None: a figure without one), what was measured."""
 
     what: str
-    held: bool
+    held: bool | None
     figure: str
 
 
@@ -44,10 +44,16 @@ class Report:
         self.checks.append(Check(what, bool(held), str(figure)))
         print(f"  {'ok   ' if held else 'WRONG'} {what}: {figure}", flush=True)
 
+    def measure(self, what: str, figure: object) -> None:
+        """Write down a figure of which nothing is promised, and print it."""
+        self.checks.append(Check(what, None, str(figure)))
+        print(f"        {what}: {figure}", flush=True)
+
     @property
     def held(self) -> bool:
         """Whether all that was promised held."""
-        return bool(self.checks) and all(check.held for check in self.checks)
+        promised = [check.held for check in self.checks if check.held is not None]
+        return bool(promised) and all(promised)
 
     def save(self, folder: Path) -> None:
         """Keep it for the page."""

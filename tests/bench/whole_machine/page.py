@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from .catalogue import CATALOGUE, Report
+from .catalogue import CATALOGUE, Check, Report
 
 HEAD = """# ridelog on a whole machine
 
@@ -64,8 +64,7 @@ def page(reports: Sequence[Report], day: str) -> str:
             continue
         lines.append(f"\n{report.times} times, {report.seconds / 60:.0f} min, at commit {report.commit}"
                      f"{': ' + report.cannot if report.cannot else ''}.\n\n| | | |\n| --- | --- | --- |\n")
-        lines += [f"| {cell(check.what)} | {'held' if check.held else '**did not hold**'} | {cell(check.figure)} |\n"
-                  for check in report.checks]
+        lines += [f"| {cell(check.what)} | {outcome(check)} | {cell(check.figure)} |\n" for check in report.checks]
     return "".join([*lines, NOT_TRIED])
 
 
@@ -76,6 +75,13 @@ def verdict(report: Report | None) -> str:
     if report.cannot:
         return "could not be tried"
     return "held" if report.held else "**did not hold**"
+
+
+def outcome(check: Check) -> str:
+    """Whether a promise held; "measured" where nothing is promised."""
+    if check.held is None:
+        return "measured"
+    return "held" if check.held else "**did not hold**"
 
 
 def words(name: str) -> str:

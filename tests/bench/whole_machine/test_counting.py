@@ -69,3 +69,12 @@ def test_the_page_names_what_did_not_hold_and_what_was_not_run() -> None:
     text = page([report], "1 May 2026")
     assert "1 May 2026" in text
     assert "| rows \\| lost | **did not hold** | 3 |" in text
+
+
+def test_a_trial_that_only_measured_has_not_held_what_it_promised() -> None:
+    report = Report("boot", "it boots", "UML")
+    report.measure("seconds", 11)
+    assert not report.held
+    report.check("rows come", held=True)
+    assert report.held
+    assert "| seconds | measured | 11 |" in page([Report("power_cuts", "", "UML", checks=report.checks)], "")

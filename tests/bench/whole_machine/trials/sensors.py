@@ -88,7 +88,7 @@ def chip_late_and_frozen(bench: Bench, report: Report) -> None:
         car.guest.must(CHIP)
         took_s = car.wait_for("the chip", "grep -q '\"accelerometer\": {[^}]*\"state\": \"ok\"' "
                               "/run/ridelog/status.json", 120)
-        report.check("found, seconds after its bus came", True, f"{took_s:.0f}")
+        report.measure("found, seconds after its bus came", f"{took_s:.0f}")
         car.wait_for_rows(12)
         car.guest.must("pkill -STOP -f in_guest/chip.py")
         began_s = time.monotonic()
