@@ -19,6 +19,8 @@ INSTALL = "/opt/ridelog/bin/ridelog install"
 CARD_BYTES = 600_000_000
 """More than the 200 MB that ridelog leaves to others."""
 
+# unless they are there: a root that is read-only takes none
+SETTINGS = "cmp -s /host/ridelog.yaml /etc/ridelog/ridelog.yaml || cp /host/ridelog.yaml /etc/ridelog/ridelog.yaml\n"
 CHIP = """modprobe i2c-stub chip_addr=0x0a; modprobe i2c-dev
 /opt/ridelog/bin/python /host/in_guest/chip.py /host/drive.dump.gz 0 >>/host/chip.log 2>&1 &
 """
@@ -101,7 +103,7 @@ class Bench:
             with image.open("wb") as file:
                 file.truncate(CARD_BYTES)
             run("mkfs.ext4", "-q", "-b", "4096", image)
-        guest.on_boot("cp /host/ridelog.yaml /etc/ridelog/ridelog.yaml\n"
+        guest.on_boot(SETTINGS
                       + (CARD.format(lies="lies" if card == "lies" else "") if card else "")
                       + (CHIP if chip == "stub" else "") + (WATCH if watch else "") + before)
         return Car(guest, receiver)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 
-from ..bench import Bench, Car
+from ..bench import SETTINGS, Bench, Car
 from ..catalogue import Report, trial
 from ..drive import Receiver
 from ..guest import PATIENT, QemuGuest
@@ -30,7 +30,7 @@ class UsbSticks(Sticks):
         shutil.copy(bench.drive, guest.share / "drive.dump.gz")
         (guest.share / "ridelog.yaml").write_text(
             "accelerometer: {bma220: {i2c_bus: 'dump:/host/drive.dump.gz'}}\ngps: {port: /dev/ttyUSB0}\n")
-        guest.on_boot("cp /host/ridelog.yaml /etc/ridelog/ridelog.yaml\n" + PATIENT)
+        guest.on_boot(SETTINGS + PATIENT)
         self.car = Car(guest, receiver)
         self.guest = guest
         self._dumps = dumps
