@@ -168,7 +168,7 @@ def test_it_is_watched_and_never_given_up() -> None:
 
 def test_who_boots_without_memory_limits_is_told() -> None:
     assert "MemoryMax" in settings(SERVICE)
-    for place in (shipped("systemd") / SERVICE, Path(__file__).resolve().parents[2] / "README.md"):
+    for place in (shipped("systemd") / SERVICE, Path(__file__).resolve().parents[2] / "docs/installation.md"):
         assert {"cgroup_disable=memory", "cgroup_enable=memory"} <= set(re.findall(r"cgroup_\w+=memory",
                                                                                   place.read_text()))
 

@@ -305,8 +305,8 @@ def table() -> str:
     return "\n".join(["| effect | what it is | parameters |", "| --- | --- | --- |", *rows])
 
 
-def test_the_table_in_the_readme_is_that_of_the_catalogue() -> None:
-    assert table() in (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+def test_the_table_in_the_documents_is_that_of_the_catalogue() -> None:
+    assert table() in (Path(__file__).parents[2] / "docs/effects.md").read_text("utf-8")
 
 
 def test_what_a_full_car_carries_is_carried_by_the_whole_car() -> None:
