@@ -98,6 +98,7 @@ def test_the_screen_of_a_healthy_service_says_so() -> None:
     ({"fix_valid": None}, "view of the sky"),
     ({"free_bytes": 1_000_000}, "1 MB left"),
     ({"storage": StorageStatus("the disk is full", 70.0, 12)}, "12 rows wait in memory"),
+    ({"storage": StorageStatus("the disk has become read-only", 70.0, 12)}, "sudo systemctl restart ridelog"),
     ({"storage": StorageStatus(rows_lost=3)}, "3 rows were lost"),
     ({"storage": StorageStatus(recording_trouble="little room")}, "not recorded: little room"),
     ({"storage": StorageStatus(dumps_lost=2)}, "2 dumps were removed"),
