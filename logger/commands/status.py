@@ -12,6 +12,7 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
+from logger.store.set_aside import READ_ONLY
 from logger.store.stick_notes import FOLDER, StickNote, read_notes
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
@@ -87,6 +88,10 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
     if storage.trouble:
         cure = ("Copy the logs away (plug in the USB stick, or ridelog export) and delete what was copied; if it says "
                 "so again, the card is dying: replace it")
+        if storage.trouble.startswith(READ_ONLY):
+            # a service that was started on it sees it through a mount of its own, which stays read-only
+            cure = ("Mount it writable (sudo mount -o remount,rw /); if this stays, also sudo systemctl restart ridelog. "
+                    "When it comes again, copy the logs away (plug in the USB stick): the card is dying, replace it")
         steps.append(f"Log: not written for {_span(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
                      f"wait in memory and are lost if the power goes. {cure}.")
     if storage.rows_lost:

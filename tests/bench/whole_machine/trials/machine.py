@@ -103,6 +103,9 @@ def read_only_root(bench: Bench, report: Report) -> None:
                              "journalctl -u ridelog -b -o cat -n 3", 120).out
         report.check("status or journal says so", "ead-only" in said, said[-300:].strip())
         car.guest.must("mount -o remount,rw /")
+        advice = "sudo systemctl restart ridelog"  # its own mount of the folder was made read-only at its start
+        report.check("status says what to do then", advice in car.guest.run("ridelog status", 120).out, advice)
+        car.guest.must("systemctl restart ridelog", 120)
         took_s = car.wait_for("the service", f"systemctl is-active ridelog && ls /var/lib/ridelog/*.part && {WRITES}",
                               240)
         car.wait_for_rows(3)
