@@ -195,6 +195,20 @@ def test_a_part_that_is_finished_before_it_is_read_is_read_as_what_it_has_become
     assert json.loads(capsys.readouterr().out)["files"] == ["00001-002.csv", "00001-003.csv"]
 
 
+def test_a_folder_with_the_name_of_a_log_is_no_log(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "00001-001.csv").mkdir()
+    write_log(tmp_path / "00002-001.csv", drive(5))
+    assert main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == ["00002-001.csv"]
+
+
+def test_logs_that_lost_their_settings_in_a_repair_are_named(drive, tmp_path: Path) -> None:
+    write_log(tmp_path / "00001-001.csv", drive(5))
+    (tmp_path / "00001-001.json").write_text(json.dumps({"settings_lost": True}), encoding="utf-8")
+    assert main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html")]) == 0
+    assert "Their settings were lost before a repair:</span> 00001-001.csv" in (tmp_path / "p.html").read_text("utf-8")
+
+
 def test_the_command_takes_one_file_and_tells_where_the_page_is(drive, tmp_path: Path,
                                                                 capsys: pytest.CaptureFixture[str]) -> None:
     write_log(tmp_path / "00001-001.csv", drive(5))

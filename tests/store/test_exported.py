@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,8 @@ from logger.store.exported import (
     mark_exported,
 )
 from logger.store.open_folder import OpenFolder
+
+from small_files import at_most_s
 
 
 def a_file(folder: Path, name: str, text: str = "text\n") -> Mark:
@@ -111,3 +114,18 @@ def test_a_damaged_identity_is_made_anew(tmp_path: Path, content: bytes) -> None
 def test_nothing_else_is_left_in_the_folder(tmp_path: Path) -> None:
     mark(tmp_path, {"00001-001.csv": a_file(tmp_path, "00001-001.csv")})
     assert {path.name for path in tmp_path.iterdir()} == {"00001-001.csv", MARKS_NAME, LOCK_NAME}
+
+
+@pytest.mark.parametrize("name", [LOCK_NAME, MARKS_NAME, IDENTITY_NAME])
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("nowhere", path)],
+                         ids=["pipe", "folder", "link to nothing"])
+def test_what_has_the_name_of_a_small_file_and_is_none_is_put_aside(
+        tmp_path: Path, name: str, make: Callable[[Path], None]) -> None:
+    make(tmp_path / name)
+    with at_most_s(5):
+        mark(tmp_path, {"00001-001.csv": a_file(tmp_path, "00001-001.csv")})
+        with OpenFolder.at(tmp_path) as opened:
+            known = logger_identity(opened)
+            assert logger_identity(opened) == known
+    assert exported_names(tmp_path) == {"00001-001.csv"}
+    assert (tmp_path / f"{name}.aside").lstat()

@@ -94,3 +94,17 @@ def test_a_damaged_sidecar_of_an_open_part_is_kept_beside(tmp_path: Path) -> Non
     assert (tmp_path / "00001-001.json.aside").read_bytes() == text
     assert "sensor" not in (read_sidecar(tmp_path / "00001-001.csv") or {})
     assert verify([tmp_path])[0].ok
+
+
+@pytest.mark.parametrize("text", [None, "{torn", "[]"], ids=["missing", "torn", "a list"])
+def test_a_log_that_is_repaired_without_its_settings_says_so(tmp_path: Path, text: str | None) -> None:
+    log = SegmentLog(tmp_path, 1, FACTS, 10**6)
+    log.append(window(1, utc=True))
+    log.sync()
+    sidecar = tmp_path / "00001-001.json"
+    sidecar.unlink() if text is None else sidecar.write_text(text)
+    repair(tmp_path)
+    assert (read_sidecar(tmp_path / "00001-001.csv") or {})["settings_lost"] is True
+    check, = verify([tmp_path / "00001-001.csv"])
+    assert check.ok
+    assert check.notes == ("sidecar: settings and clock were lost before a repair",)
