@@ -222,9 +222,13 @@ def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSumma
 def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
     notes = [_sensor_note(sidecar) for sidecar in _different(_inside(file.sidecar or {}, "sensor") for file in files)]
     missing = [file.name for file in files if file.sidecar is None]
+    lost = [file.name for file in files if _inside(file.sidecar or {}, "settings_lost") is True]
     damaged = sum(file.damaged_lines for file in files)
     if missing:
         notes.append(f'<span class="warn">Without their description (.json):</span> {escape(", ".join(missing[:20]))}')
+    if lost:
+        names = escape(", ".join(lost[:20]))
+        notes.append(f'<span class="warn">Their settings were lost before a repair:</span> {names}')
     if damaged:
         lines = "line was" if damaged == 1 else "lines were"
         notes.append(f'<span class="warn">{damaged} damaged {lines} left out.</span>')

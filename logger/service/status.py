@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from drivers.regular_file import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 
@@ -134,7 +135,7 @@ def write_status(path: Path, status: ServiceStatus) -> None:
 def read_status(path: Path) -> ServiceStatus | None:
     """Read the last snapshot; None where there is none. Raises BadInput for a file that is not one."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             fields = json.loads(file.read(LARGEST_BYTES))
         window = fields["last_window"]
         if window is not None:

@@ -11,7 +11,6 @@ in the user's cache. It is replaced in one step, so that a reader sees the old o
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from logger.errors import BadInput
 from logger.roads.calibration import METHOD, Line, Settings, SpeedCalibration
 from logger.shipped import shipped
 from logger.store.bounded import read_bounded
+from logger.store.checksum import json_sha256
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +54,7 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
     numbers = asdict(vehicle)
     del numbers["name"]
     gain = recorder_gain(_GAIN_PROBES_HZ).round(_GAIN_DIGITS).tolist() if recorder_gain else None
-    return _digest({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain})
+    return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain})
 
 
 def places(vehicle_path: Path) -> tuple[Path, ...]:
@@ -97,7 +97,7 @@ def _read(path: Path) -> dict[str, tuple[SpeedCalibration, ...]]:
     """All calibrations of a file; empty for a file that is not whole, of this format, and what it says it is."""
     try:
         content = json.loads(read_bounded(path, MAX_BYTES))
-        if content["format"] != FORMAT or content["sha256"] != _digest(content["calibrations"]):
+        if content["format"] != FORMAT or content["sha256"] != json_sha256(content["calibrations"]):
             return {}
         return {key: tuple(map(_speed, speeds)) for key, speeds in content["calibrations"].items()}
     except (BadInput, ValueError, TypeError, KeyError, AttributeError, RecursionError):
@@ -111,7 +111,7 @@ def _speed(stored: dict[str, Any]) -> SpeedCalibration:
 
 def _replace(path: Path, stored: dict[str, tuple[SpeedCalibration, ...]]) -> None:
     calibrations = {key: [asdict(speed) for speed in speeds] for key, speeds in stored.items()}
-    content = {"format": FORMAT, "sha256": _digest(calibrations), "calibrations": calibrations}
+    content = {"format": FORMAT, "sha256": json_sha256(calibrations), "calibrations": calibrations}
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with new.open("w", encoding="ascii") as file:
@@ -122,8 +122,3 @@ def _replace(path: Path, stored: dict[str, tuple[SpeedCalibration, ...]]) -> Non
     except OSError:
         new.unlink(missing_ok=True)
         raise
-
-
-def _digest(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode("ascii")).hexdigest()

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import secrets
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -27,6 +26,7 @@ from pathlib import Path
 from logger.errors import BadInput
 from logger.store import manifest
 from logger.store.exported import Mark, logger_identity, mark_exported, read_marks
+from logger.store.log_name import OwnFile
 from logger.store.manifest import Manifest, manifest_blocks, read_manifest
 from logger.store.open_folder import OpenFile, OpenFolder
 from logger.store.pairing import (
@@ -46,8 +46,6 @@ that is pulled has at most a ninth of its files to be read once more, which are 
 ROOM_FOR_MANIFEST_BYTES = 65_536
 BYTES_PER_ENTRY = 128
 
-_LOG = re.compile(r"(\d{5,})-(\d{3,})\.(csv|json)")
-_DUMP = re.compile(r"(\d{5,})(?:-(\d+))?\.dump(\.gz)?")
 _STICK_IS_LOST = {
     errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOTCONN,
     errno.ENOMEDIUM, errno.ESHUTDOWN,
@@ -144,11 +142,11 @@ def finished_files(card: OpenFolder, dumps: bool) -> list[str]:
     What is being written has a name that ends in ``.part``.
     """
     present = set(card.names())
-    logs = sorted((int(match[1]), int(match[2]), match[0]) for name in present if (match := _LOG.fullmatch(name)))
-    finished = [name for _, _, name in logs if name.rpartition(".")[0] + ".csv" in present]
-    recordings = sorted((int(match[1]), int(match[2] or 0), name)
-                        for name in present if (match := _DUMP.fullmatch(name)))
-    return finished + [name for _, _, name in recordings if dumps]
+    own = sorted((file.session, file.part, name, file.kind) for name in present
+                 if (file := OwnFile.of(name)) and not file.is_open)
+    logs = [name for *_, name, kind in own
+            if kind in (".csv", ".json") and str(Path(name).with_suffix(".csv")) in present]
+    return logs + [name for *_, name, kind in own if dumps and kind not in (".csv", ".json")]
 
 
 class _Export:

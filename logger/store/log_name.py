@@ -1,6 +1,7 @@
-"""The names of log files: ``<session>-<part>.csv.part`` while open, ``.csv`` when finished; the sidecar ``.json``.
+"""The names of a logger's files, and what they say.
 
-Recordings end in ``.part`` while they are open, too.
+``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
+``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too.
 """
 
 from __future__ import annotations
@@ -10,7 +11,41 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PART = ".part"
-_LOG_NAME = re.compile(r"(\d{5,})-(\d{3,})\.csv(\.part)?")
+# Nine digits are more sessions and parts than any logger has; a longer number was not given by one.
+_SESSION, _NUMBER = "[0-9]{5,9}", "[0-9]{3,9}"
+_LOG = re.compile(rf"({_SESSION})-({_NUMBER})(?:(\.csv)(\.part)?|(\.json))")
+_DUMP = re.compile(rf"({_SESSION})(?:-([0-9]{{1,9}}))?(\.dump(?:\.gz)?)(\.part)?")
+_NUMBERED = re.compile(rf"({_SESSION})[-.]")
+
+
+@dataclass(frozen=True)
+class OwnFile:
+    """What the name of a log, a sidecar or a recording says.
+
+    part       0 for a recording that has none
+    kind       ``.csv``, ``.json``, ``.dump`` or ``.dump.gz``
+    is_open    it is being written, or was when the power went
+    """
+
+    session: int
+    part: int
+    kind: str
+    is_open: bool
+
+    @classmethod
+    def of(cls, name: str) -> OwnFile | None:
+        """The name of a file, without its folder; None when it is none of a logger's."""
+        if match := _LOG.fullmatch(name):
+            return cls(int(match[1]), int(match[2]), match[3] or match[5], match[4] is not None)
+        if match := _DUMP.fullmatch(name):
+            return cls(int(match[1]), int(match[2] or 0), match[3], match[4] is not None)
+        return None
+
+
+def session_of(name: str) -> int | None:
+    """The session whose number a name begins with, whatever else it says; None when it has none."""
+    match = _NUMBERED.match(name)
+    return int(match[1]) if match else None
 
 
 @dataclass(frozen=True)
@@ -24,8 +59,8 @@ class LogName:
     @classmethod
     def of(cls, path: Path) -> LogName | None:
         """The name of a file; None when it is not that of a log."""
-        match = _LOG_NAME.fullmatch(path.name)
-        return cls(int(match[1]), int(match[2]), match[3] is None) if match else None
+        own = OwnFile.of(path.name)
+        return cls(own.session, own.part, not own.is_open) if own is not None and own.kind == ".csv" else None
 
 
 def open_path(finished: Path) -> Path:

@@ -54,13 +54,9 @@ def manifest_blocks(manifest: Manifest) -> Iterator[bytes]:
     return list_blocks(f"{_FIRST}{manifest.logger}", entries)
 
 
-def parse_manifest(data: bytes) -> Manifest:
-    """Read the text back. Raises ValueError, which says what was expected, for one that is not whole."""
-    return read_manifest([data])
-
-
 def read_manifest(blocks: Iterable[bytes]) -> Manifest:
-    """The same for a text that comes in blocks. Raises ValueError for more than ``MAX_FILES`` files too."""
+    """Read the text back, which comes in blocks. Raises ValueError, which says what was expected, for one that is not
+    whole or lists more than ``MAX_FILES`` files."""
     lines = list_lines(blocks)
     head = _HEAD.fullmatch(next(lines, ""))
     if head is None:

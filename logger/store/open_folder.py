@@ -21,6 +21,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 
+from drivers.regular_file import check_regular
+from logger.store.set_aside import ENDING, numbered
+
 BLOCK_BYTES = 1 << 18
 
 _TEMPORARY = re.compile(r"[0-9a-f]{16}\.ridelog-tmp")
@@ -33,11 +36,9 @@ class OpenFile:
     """A regular file, open for reading. ``stat`` is what it was when it was opened."""
 
     def __init__(self, folder: int, name: str) -> None:
-        self._descriptor = os.open(name, _READ, dir_fd=folder)
+        self._descriptor = check_regular(name, os.open(name, _READ, dir_fd=folder))
         try:
             self.stat = os.fstat(self._descriptor)
-            if not stat.S_ISREG(self.stat.st_mode):
-                raise OSError(errno.EINVAL, "not a regular file", name)
             # What is read is to come from the medium, not from what this machine remembers of it.
             os.posix_fadvise(self._descriptor, 0, 0, os.POSIX_FADV_DONTNEED)
         except OSError:
@@ -102,7 +103,15 @@ class OpenFolder:
 
     def open_lock_file(self, name: str) -> int:
         """Descriptor of a file to lock, made when it is not there; readable is enough, whoever owns it."""
-        return os.open(name, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644, dir_fd=self._descriptor)
+        self._make_way(name)
+        return os.open(name, _READ | os.O_CREAT, 0o644, dir_fd=self._descriptor)
+
+    def _make_way(self, name: str) -> None:
+        """Put aside what has the name of a file and is none: a link, a pipe, a folder."""
+        found = self.find(name)
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            free = next(aside.name for aside in numbered(Path(name + ENDING)) if self.find(aside.name) is None)
+            os.rename(name, free, src_dir_fd=self._descriptor, dst_dir_fd=self._descriptor)
 
     def each_name(self) -> Iterator[str]:
         """The names in it, one at a time: a stick may hold more of them than fit the memory. One such walk at once."""
@@ -196,9 +205,11 @@ class OpenFolder:
         self.sync()
 
     def replace(self, name: str, blocks: Iterable[bytes]) -> None:
-        """Write a file that is there whole, in place of the old one, or not at all."""
+        """Write a file that is there whole, in place of the old one, or not at all. What has its name and is no file
+        is put aside."""
         temporary, _ = self.write(blocks)
         try:
+            self._make_way(name)
             self.rename(temporary, name)
         except OSError:
             self.discard(temporary)

@@ -12,18 +12,17 @@ check value.
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Callable
 from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
+from logger.store.log_name import OwnFile
 from logger.store.set_aside import Warn, disk_words, is_file, set_aside_if_possible, warn_in_journal
 from logger.units import US_PER_S
 
 ENDING = ".dump.gz"
 RETRY_US = 60 * US_PER_S
-_OPEN_NAME = re.compile(r"\d{5,}(-\d{3,})?\.dump\.gz\.part")
 log = logging.getLogger(__name__)
 
 
@@ -131,7 +130,8 @@ def repair_recordings(directory: Path, files: FileSystem, warn: Warn = warn_in_j
 
     A file on which the disk fails is left as it is, and named.
     """
-    for part in sorted(path for path in directory.iterdir() if _OPEN_NAME.fullmatch(path.name)):
+    for part in sorted(path for path in directory.iterdir()
+                       if (own := OwnFile.of(path.name)) and own.is_open and own.kind == ENDING):
         try:
             size = intact_bytes(part, files)
             if size:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -13,7 +12,7 @@ from typing import Any
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.store.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
-from logger.store.log_name import LogName, finished_path, open_path, sidecar_path
+from logger.store.log_name import LogName, OwnFile, finished_path, open_path, sidecar_path
 from logger.store.segment_log import HEADER, format_row
 from logger.store.session_counter import COUNTER
 from logger.store.set_aside import (
@@ -27,6 +26,7 @@ from logger.store.set_aside import (
     warn_in_journal,
 )
 from logger.store.sidecar import (
+    SETTINGS_LOST,
     UNCHECKED,
     ClockMap,
     clock_of,
@@ -38,7 +38,6 @@ from logger.store.sidecar import (
 )
 from logger.store.whole_file import name_of_temporary, replace_file, write_temporary
 
-_OWN_NAME = re.compile(r"\d{5,}-\d{3,}\.(csv|csv\.part|json)")
 _BLOCK_ROWS = 256
 
 
@@ -96,7 +95,8 @@ def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
     put aside."""
     whole_name = name_of_temporary(path) or path.name
     is_temporary = whole_name != path.name
-    if not (_OWN_NAME.fullmatch(whole_name) or (is_temporary and COUNTER.fullmatch(whole_name))):
+    own = OwnFile.of(whole_name)
+    if not ((own is not None and own.kind in (".csv", ".json")) or (is_temporary and COUNTER.fullmatch(whole_name))):
         return
     why = "" if is_file(path) else "not a file"
     if is_temporary:
@@ -247,7 +247,7 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tal
 
 
 def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
-    """The sidecar, to be written anew. One that is damaged or cannot be read is put aside."""
+    """What a new sidecar of a log takes over from its old one. One that is damaged or cannot be read is put aside."""
     try:
         sidecar = load_sidecar(log, files)
     except ValueError as error:
@@ -255,11 +255,11 @@ def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
     except OSError as error:
         why = disk_words(error)
     else:
-        if sidecar is None or sidecar.is_checked:
-            return sidecar.content if sidecar else {}
-        return sidecar.content | {UNCHECKED: True}
+        if sidecar is None:
+            return {SETTINGS_LOST: True}
+        return sidecar.content if sidecar.is_checked else sidecar.content | {UNCHECKED: True}
     set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock", warn)
-    return {}
+    return {SETTINGS_LOST: True}
 
 
 def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: Tally,

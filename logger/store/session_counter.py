@@ -7,6 +7,7 @@ import zlib
 from pathlib import Path
 
 from drivers.disk import FileSystem
+from logger.store.log_name import session_of
 from logger.store.set_aside import (
     Warn,
     disk_words,
@@ -20,8 +21,7 @@ from logger.store.whole_file import replace_file
 
 COUNTER_NAME = "last-session"
 _COUNTER_BYTES = 64
-COUNTER = re.compile(COUNTER_NAME + r"(-\d+)?")
-_SESSION_NAME = re.compile(r"(\d{5,})[-.]")
+COUNTER = re.compile(COUNTER_NAME + r"(-[0-9]+)?")
 
 
 def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> int:
@@ -34,7 +34,7 @@ def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = 
     files = files or FileSystem()
     names = [path.name for path in directory.iterdir()]
     counted = [_read_counter(files, directory / name, warn) for name in names if COUNTER.fullmatch(name)]
-    number = max([0, *counted, *(int(match[1]) for name in names if (match := _SESSION_NAME.match(name)))]) + 1
+    number = max([0, *counted, *(session_of(name) or 0 for name in names)]) + 1
     _store_counter(files, directory / COUNTER_NAME, number, warn)
     return number
 

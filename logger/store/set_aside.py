@@ -21,7 +21,7 @@ Warn = Callable[[str], None]
 """Takes a sentence for the journal and for ``ridelog status``."""
 
 ENDING = ".aside"
-_ASIDE = re.compile(re.escape(ENDING) + r"(-\d+)?\Z")
+_ASIDE = re.compile(re.escape(ENDING) + r"(-[0-9]+)?\Z")
 READ_ONLY = "the disk has become read-only"
 log = logging.getLogger(__name__)
 

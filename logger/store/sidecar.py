@@ -24,6 +24,9 @@ SIDECAR_BYTES = 1_000_000
 UNCHECKED = "taken_over_unchecked"
 """In a sidecar that a repair has made of one without a checksum."""
 
+SETTINGS_LOST = "settings_lost"
+"""In a sidecar that a repair has made where there was none that could be read."""
+
 _FORMAT = 1
 _SEAL = frozenset({"format", "sha256"})
 LATEST_UTC_US = 4_102_444_800_000_000  # 2100-01-01

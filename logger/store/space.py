@@ -17,12 +17,12 @@ falls below a reserve, in this order and only as far as needed:
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.disk import FileSystem
+from logger.store.log_name import OwnFile
 from logger.store.pairing import NOT_PAIRED, Pairing
 from logger.store.recording import ENDING
 from logger.store.set_aside import READ_ONLY, file_size, is_file, is_taken
@@ -31,7 +31,6 @@ RESERVE_BYTES = 50_000_000
 STEP_BYTES = 5_000_000
 """When the reserve is down to this, dumps go; when logs were stopped they go on above it."""
 
-_FINISHED = re.compile(r"(\d{5,})-?(\d*)(\.csv|\.json|\.dump\.gz)")
 log = logging.getLogger(__name__)
 
 
@@ -119,15 +118,15 @@ class SpaceKeeper:
         exported = self._exported(self._directory)
         found = []
         for path in self._directory.iterdir():
-            name = _FINISHED.fullmatch(path.name)
-            if name is None or not is_file(path) or (name[3] == ".json" and not self._is_alone(path)):
+            own = OwnFile.of(path.name)
+            if own is None or own.is_open or not is_file(path) or (own.kind == ".json" and not self._is_alone(path)):
                 continue
-            is_dump = name[3] == ENDING
+            is_dump = own.kind == ENDING
             sidecar = path.with_suffix(".json")
-            paths = (path, sidecar) if name[3] == ".csv" and is_taken(sidecar) else (path,)
+            paths = (path, sidecar) if own.kind == ".csv" and is_taken(sidecar) else (path,)
             size_bytes = sum(file_size(each) or 0 for each in paths)
             is_exported = all(each.name in exported for each in paths)
-            found.append((int(name[1]), int(name[2] or 0), _Kept(paths, size_bytes, is_dump, is_exported)))
+            found.append((own.session, own.part, _Kept(paths, size_bytes, is_dump, is_exported)))
         return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]
 
     @staticmethod

@@ -17,6 +17,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from drivers.regular_file import open_regular
+
 FOLDER = Path("/run/ridelog-export")
 BLOCK_DEVICES = Path("/sys/class/block")
 LED_MEMORY = "led-trigger"
@@ -59,7 +61,7 @@ def write_note(path: Path, note: StickNote) -> None:
 def read_note(path: Path) -> StickNote | None:
     """A note; None where there is none that can be read. An empty one is that of a stick whose export waits."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             text = file.read(LARGEST_BYTES)
         note = StickNote(**json.loads(text)) if text else StickNote(stick_of(path), "waiting", True, WAITING)
     except (OSError, ValueError, TypeError, RecursionError):

@@ -19,6 +19,7 @@ from typing import Any
 
 from drivers.dump import ACCELEROMETERS, LINE_BYTES, intact_bytes, open_dump
 from drivers.errors import DumpError
+from drivers.regular_file import open_regular
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.store import manifest
@@ -28,7 +29,7 @@ from logger.store.log_name import LogName, finished_path, open_path
 from logger.store.manifest import is_of_export, read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.segment_log import Row, scan
-from logger.store.sidecar import load_sidecar, repairs_of
+from logger.store.sidecar import SETTINGS_LOST, load_sidecar, repairs_of
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
@@ -174,7 +175,7 @@ def _is_part(path: Path) -> bool:
 def _is_dump(path: Path) -> bool:
     if path.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)):
         return True
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.read(len(_DUMP_START)) == _DUMP_START
 
 
@@ -183,7 +184,7 @@ def _check_log(path: Path) -> _Findings:
     lines = 0
     sidecar = None if _is_part(path) else _load_sidecar(path, findings)
     findings.holes = repairs_of(sidecar).holes if sidecar else ()
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         for row in scan(file):
             lines += 1
             _take_row(findings, row, _is_part(path))
@@ -253,7 +254,9 @@ def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
         if LogName.of(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
         return None
-    if not sidecar.is_checked:
+    if sidecar.content.get(SETTINGS_LOST) is True:
+        findings.note("sidecar: settings and clock were lost before a repair")
+    elif not sidecar.is_checked:
         findings.note("sidecar: not checked: it was written without a checksum")
     return sidecar.content
 
@@ -304,7 +307,7 @@ def _has_begun(path: Path) -> bool:
     """Tell whether the first block of an open recording, or the first line of one that is not packed, is whole."""
     if path.name.endswith(".gz.part"):
         return intact_bytes(path) > 0
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.readline(LINE_BYTES + 1).endswith(b"\n")
 
 

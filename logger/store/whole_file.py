@@ -13,7 +13,7 @@ from pathlib import Path
 from drivers.disk import FileSystem
 from logger.store.set_aside import is_taken, numbered
 
-_TEMPORARY = re.compile(r"(.+)\.tmp(-\d+)?")
+_TEMPORARY = re.compile(r"(.+)\.tmp(-[0-9]+)?")
 
 
 def replace_file(files: FileSystem, path: Path, blocks: Iterable[bytes]) -> None:

@@ -16,7 +16,7 @@ from logger.errors import BadInput
 from logger.store import manifest, open_folder
 from logger.store.export import Progress, export, finished_files
 from logger.store.exported import MARKS_NAME, exported_names
-from logger.store.manifest import Manifest, format_manifest, parse_manifest
+from logger.store.manifest import Manifest, format_manifest, read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.verify import FileCheck, verify
 
@@ -99,7 +99,7 @@ def test_older_exports_of_files_that_the_card_no_longer_has_stay(logs: Path, sti
     (logs / "00005-001.csv").write_text("new\n")
     assert run(logs, stick).complete
     assert set(contents(own(logs, stick))) == {*NAMES, "00005-001.csv", manifest.NAME}
-    assert set(parse_manifest((own(logs, stick) / manifest.NAME).read_bytes()).files) == {*NAMES, "00005-001.csv"}
+    assert set(read_manifest([(own(logs, stick) / manifest.NAME).read_bytes()]).files) == {*NAMES, "00005-001.csv"}
 
 
 def test_a_log_that_learnt_its_utc_is_exported_again_and_the_old_one_kept(logs: Path, stick: Path) -> None:
@@ -120,7 +120,7 @@ def test_files_that_the_owner_took_off_the_stick_leave_its_manifest(logs: Path, 
         (own(logs, stick) / name).unlink()
         (logs / name).unlink()
     run(logs, stick)
-    assert set(parse_manifest((own(logs, stick) / manifest.NAME).read_bytes()).files) == set(NAMES[2:])
+    assert set(read_manifest([(own(logs, stick) / manifest.NAME).read_bytes()]).files) == set(NAMES[2:])
 
 
 def test_links_and_folders_on_the_card_are_not_exported(logs: Path, stick: Path, tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def test_nothing_else_is_left_in_the_folder(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [LOCK_NAME, MARKS_NAME, IDENTITY_NAME])
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("nowhere", path)],
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("nowhere")],
                          ids=["pipe", "folder", "link to nothing"])
 def test_what_has_the_name_of_a_small_file_and_is_none_is_put_aside(
         tmp_path: Path, name: str, make: Callable[[Path], None]) -> None:

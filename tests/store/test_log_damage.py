@@ -37,7 +37,8 @@ def test_the_place_of_damaged_rows_stands_in_the_sidecar_and_verify_tells_it(tmp
     assert sidecar["log"]["segments_lost"] == [[3, 3]]
     check, = verify([tmp_path])
     assert (check.ok, check.gaps) == (True, 0)
-    assert check.notes == ("line 4: segments 3 to 3 were damaged: a repair has left them out",)
+    assert check.notes == ("sidecar: settings and clock were lost before a repair",
+                           "line 4: segments 3 to 3 were damaged: a repair has left them out")
 
 
 def test_a_gap_without_damage_is_still_one(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from logger.store.manifest import NAME, Manifest, format_manifest, parse_manifest
+from logger.store.manifest import NAME, Manifest, format_manifest, read_manifest
 
 DIGESTS = st.binary(max_size=4).map(lambda data: hashlib.sha256(data).hexdigest())
 NAMES = st.from_regex(r"[0-9]{5}-[0-9]{3}\.(csv|json)|[0-9]{5}\.dump\.gz", fullmatch=True)
@@ -21,7 +21,7 @@ MANIFESTS = st.builds(Manifest, st.from_regex(r"[0-9a-f]{12}", fullmatch=True), 
 @settings(max_examples=100, deadline=None)
 @given(MANIFESTS)
 def test_what_was_written_is_read(manifest: Manifest) -> None:
-    assert parse_manifest(format_manifest(manifest)) == manifest
+    assert read_manifest([format_manifest(manifest)]) == manifest
 
 
 @settings(max_examples=200, deadline=None)
@@ -37,7 +37,7 @@ def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataOb
         "double": text[:place] + text[place:place + 1] + text[place:],
     }[change]
     try:
-        assert parse_manifest(damaged) == manifest
+        assert read_manifest([damaged]) == manifest
     except ValueError as error:
         assert "expected" in str(error) or "does not fit" in str(error)
 
@@ -46,13 +46,13 @@ def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataOb
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match=r"expected|does not fit"):
-        parse_manifest(data)
+        read_manifest([data])
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "/etc/passwd", ".hidden", "a b", "00001\\x", "-rf", "0" * 65])
 def test_a_list_cannot_name_anything_but_our_files(name: str) -> None:
     with pytest.raises(ValueError, match="line 2: expected"):
-        parse_manifest(format_manifest(Manifest("0" * 12, {name: "0" * 64})))
+        read_manifest([format_manifest(Manifest("0" * 12, {name: "0" * 64}))])
 
 
 @pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum here")

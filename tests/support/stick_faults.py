@@ -23,7 +23,7 @@ from logger.errors import BadInput, CheckFailed
 from logger.store import manifest, open_folder
 from logger.store.export import ExportResult, Progress, export
 from logger.store.exported import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
-from logger.store.manifest import parse_manifest
+from logger.store.manifest import read_manifest
 from logger.store.open_folder import OpenFolder
 from logger.store.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
 
@@ -146,7 +146,7 @@ def own(logs: Path, stick: Path) -> Path:
 
 def assert_all_there(logs: Path, stick: Path, names: tuple[str, ...] = NAMES) -> None:
     folder = own(logs, stick)
-    listed = parse_manifest((folder / manifest.NAME).read_bytes()).files
+    listed = read_manifest([(folder / manifest.NAME).read_bytes()]).files
     assert set(names) <= set(listed)
     for name in names:
         assert (folder / name).read_bytes() == (logs / name).read_bytes()
@@ -165,7 +165,7 @@ def assert_nothing_false(logs: Path, stick: Path, card: dict[str, bytes]) -> Non
     if not marked:
         return
     folder = own(logs, stick)
-    listed = parse_manifest((folder / manifest.NAME).read_bytes()).files
+    listed = read_manifest([(folder / manifest.NAME).read_bytes()]).files
     for name in marked:
         assert (folder / name).read_bytes() == card[name]
         assert listed[name] == hashlib.sha256(card[name]).hexdigest()
