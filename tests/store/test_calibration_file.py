@@ -61,7 +61,7 @@ def test_a_file_cut_or_changed_at_any_byte_is_as_good_as_none(tmp_path: Path) ->
 
 
 def content(calibrations: object, **changes: object) -> str:
-    digest = calibration_file._digest(calibrations)
+    digest = calibration_file.json_sha256(calibrations)
     return json.dumps({"format": 1, "sha256": digest, "calibrations": calibrations} | changes)
 
 
