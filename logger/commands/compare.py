@@ -88,7 +88,7 @@ def _tables(found: Comparison) -> list[str]:
     from logger.lab.beside import paired, short_names
     from logger.lab.marks import worst_places
 
-    lines = [f"{'Where':46}{'share of the rest':>13}{'error':>12}", f"{'':44}{'stands':>8}{'refit':>7}{'stands':>8}"
+    lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
                                                                     f"{'refit':>8}"]
     plain, refitted = found.plain.where, found.refitted.where
     for title, unit, one, other in (

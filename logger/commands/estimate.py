@@ -11,8 +11,8 @@ A distance may go back by up to 1 m, as one corrected by GPS does; it is then la
 plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to 100 Hz.
 
 The profile holds only the wavelengths that the readings tell: it is smoother than the road, and its own IRI too low. A
-drive with holes makes several: P.csv, P-2.csv, P-3.csv. An R2 depends on how much the windows differ: the limit's is
-told for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one all along.
+drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI:
+the limit's R2 is given for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     phase = parser.add_mutually_exclusive_group(required=True)
     phase.add_argument("--to", metavar="DIR", type=Path, help="the stick, or any other folder")
     phase.add_argument("--unmounted", metavar="DIR", type=Path, help="say in the note that this stick may be pulled")
-    phase.add_argument("--removed", action="store_true", help="take the note away")
+    phase.add_argument("--removed", action="store_true", help="the stick was pulled: ridelog status no longer shows it")
     parser.add_argument("--from", dest="logs", metavar="LOGDIR", type=Path, help="logs (default: the service's)")
     parser.add_argument("--dumps", action="store_true", help="also the recorded dumps")
     parser.add_argument("--mounted", action="store_true", help="only if DIR is a mount point")

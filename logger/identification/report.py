@@ -55,11 +55,11 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     if fit.at_bound:
         yield f"{', '.join(fit.at_bound)} ended at a bound, which is where it was stopped and not what was measured."
     if not white.passed:
-        yield (f"residuals are like their neighbours (p = {white.p_value:.2g}): there is more than this noise model "
-               "knows, and the standard errors are a guide only.")
+        yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
+               "errors are a guide only.")
     if not free_of_road.passed:
-        yield (f"residuals follow the road (p = {free_of_road.p_value:.2g}): the model misses something of the car, or "
-               "of the road, and the estimates lean to make up for it.")
+        yield (f"residuals follow the road (p = {free_of_road.p_value:.2g}): the model lacks something of the car or "
+               "of the road, and the estimates are biased by it.")
 
 
 def _p_value(test: Test) -> float | None:
@@ -138,9 +138,9 @@ def _correlations(fit: Fit) -> Iterator[str]:
 
 def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
     if white.degrees:
-        yield (f"Are residuals like their neighbours? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
-               + ("no, standard errors can be trusted." if white.passed else
-                  "yes, there is more than this noise model knows; the standard errors are a guide only."))
+        yield (f"Are residuals white (Ljung-Box)? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
+               + ("yes, standard errors can be trusted." if white.passed else
+                  "no, the noise model is incomplete; the standard errors are a guide only."))
     if not white.degrees and not free_of_road.degrees:
         yield "Nothing is left that could be tested."
     if free_of_road.degrees:

@@ -137,46 +137,47 @@ def headline(found: Comparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
     left, measured = (_rms(one) for one in (plain.beside.left, plain.beside.measured))
-    lines = [f"What the model leaves is {left:.3g} m/s2 of {measured:.3g} m/s2 measured (r.m.s.): error "
+    lines = [f"The residual (measured - model) is {left:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
              f"{plain.error:.3f}."]
-    refit = "with masses, springs, dampers and distances refitted within what they are usually off"
+    refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += " (and the numbers of its effects)"
     if refitted.error < _HELPS * plain.error:
         share = 1 - (refitted.error / plain.error) ** 2
-        lines.append(f"{refit.capitalize()}, the error is {refitted.error:.3f}: that takes {share:.0%} of the power "
-                     "left.")
+        lines.append(f"{refit.capitalize()}, the error is {refitted.error:.3f}: the refit removes {share:.0%} of the "
+                     "residual's power.")
     else:
         lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
     lines += wandering.told(found.moved_m)
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
-        lines.append(f"The refit moved {named}, farther than such numbers are usually off: something missing in the "
-                     "model pulls at them, and they should not be believed.")
+        lines.append(f"The refit moved {named}, more than {_FAR:g} standard deviations of their tolerance. An effect "
+                     "that the model lacks biases them: do not trust these values.")
     return lines
 
 
 def evidence(found: Comparison) -> list[str]:
     """What speaks for a missing effect, or against one."""
     if not found.tells:
-        return ["What is left is less than two right simulations of a car differ by: it tells nothing."]
+        return ["The residual is smaller than the difference between two correct simulations of one car: it is no "
+                "evidence."]
     if not found.marks_found:
-        return ["Nothing is left that differs from noise: no mark is found."]
+        return ["No test finds more than noise in the residual."]
     return [mark.sentence for mark in found.marks_found]
 
 
 def conclusion(found: Comparison) -> str:
     """What it comes to, and what to do next."""
     if found.missing and not any(mark.road for mark in found.marks_found):
-        return ("What is left is hardly more than noise, but only with numbers that this car does not have. Either its "
-                "file is wrong or an effect is missing that such numbers imitate. Next: ridelog diagnose with the same "
-                "arguments.")
+        return ("The residual is hardly more than noise, but only with numbers far from those of the vehicle's file. "
+                "Either the file is wrong, or such numbers imitate an effect that is missing. Next: ridelog diagnose "
+                "with the same arguments.")
     if found.missing:
-        return ("What is left is tied to the road and the car's motion, so it is more than noise. Next: ridelog "
+        return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
                 "diagnose with the same arguments says which physical effect would explain it.")
     if found.marks_found:
-        return ("What is left is not tied to the road: it looks like noise of its own colour, of the sensor or the "
-                "engine. Nothing here asks for another effect of the car.")
+        return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
+                "Nothing here asks for another effect of the car.")
     return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
 
 

@@ -118,7 +118,7 @@ def errors(found: Gained) -> list[tuple[str, float, str]]:
     added = found.added
     return [
         ("before", added.error_before, "as the file says, distances as recorded: where ridelog compare begins"),
-        ("", added.error_refitted, "the car's numbers and distances refitted within what they are usually off"),
+        ("", added.error_refitted, "the car's numbers and distances refitted within their tolerance"),
         ("after", added.error_after, f"with {' and '.join(found.names)}, all refitted in the same way"),
         ("", added.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
         ("of noise", found.floor, "about, from the sensor's noise alone"),
@@ -136,16 +136,11 @@ def judgement(found: Gained) -> list[str]:
         if at:
             lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
     if found.helps:
-        lines.append(f"It helps: noise alone would gain as much with a chance {_of(found.p_value)}.")
+        lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
     else:
-        lines.append(f"WARNING: it does not help. Noise alone would gain as much with a chance {_of(found.p_value)}; "
-                     "do not keep it on the strength of these runs.")
+        lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
+                     f"{chance(found.p_value)}; these runs are no reason to keep it.")
     return lines
-
-
-def _of(p_value: float) -> str:
-    told = chance(p_value)
-    return told if told.startswith("below") else f"of {told}"
 
 
 def bias(names: Sequence[str], moved: Sequence[Moved]) -> str:
@@ -162,9 +157,9 @@ def bias(names: Sequence[str], moved: Sequence[Moved]) -> str:
 
 
 MOVED_HEADS = ("Number", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Without and with: refitted as far as the runs ask for, in per cent from what was given, ± standard "
-              "error. Now: what the vehicle has, held near what was given. Shift: from without to with in standard "
-              "errors. A number that moved by more than two had been bent to make up for what was missing.")
+MOVED_HINT = ("Without, With: refitted freely, without and with the effect, as a difference from the given value, ± "
+              "standard error. Now: the value in the new file, held near the given one. Shift: from Without to With, "
+              "in standard errors; above two the number was biased because the effect was missing.")
 
 
 def moved_rows(moved: Sequence[Moved]) -> Iterator[tuple[str, str, str, str, str, str]]:

@@ -109,7 +109,7 @@ def _whiteness(beside: Beside) -> Mark:
     largest = int(np.abs(rho).argmax())
     return Mark("whiteness", float(rho[largest]), "1", (1 / sum(map(len, beside.left))) ** 0.5, test.p_value,
                 abs(rho[largest]) > 0.1, False,
-                f"What is left is not white noise: samples {(largest + 1) / beside.rate_hz * 1000:.0f} ms apart have a "
+                f"The residual is not white: samples {(largest + 1) / beside.rate_hz * 1000:.0f} ms apart have a "
                 f"correlation of {rho[largest]:.2f}.")
 
 
@@ -130,8 +130,8 @@ def _frequency(beside: Beside, where: Located) -> Mark:
     part = parts[best]
     width = (part.high - part.low) / whole
     return Mark("frequency", part.share, "1", None, min(chances[best], 1.0), part.share > 2 * width, False,
-                f"{_percent(part.share)} of the power of what is left sits {_band_words(part)}, where white noise "
-                f"would have {_percent(width)}; there the error is {part.error_told(2)}.")
+                f"{_percent(part.share)} of the residual's power lies {_band_words(part)}, where white noise would "
+                f"have {_percent(width)}; the error there is {part.error_told(2)}.")
 
 
 def _lean(beside: Beside) -> Mark:
@@ -141,7 +141,7 @@ def _lean(beside: Beside) -> Mark:
         return _nothing("lean", "1")
     mean, error, p_value = _mean_of_blocks([(one / scale) ** 3 for one in beside.left], beside, _LONG_BLOCK_S)
     return Mark("lean", mean, "1", error, p_value, abs(mean) > _LEAST_LEAN, True,
-                f"What is left has its sharp peaks {'upward' if mean > 0 else 'downward'} (skewness {mean:.1f}): "
+                f"The residual has its sharp peaks {'upward' if mean > 0 else 'downward'} (skewness {mean:.1f}): "
                 f"something pushes the body {'up' if mean > 0 else 'down'} in short blows.")
 
 
@@ -158,7 +158,7 @@ def _tone(beside: Beside) -> Mark:
         return _nothing("tone", "Hz")
     p_value, at_hz, name = min(tones)
     return Mark("tone", at_hz, "Hz", None, min(p_value, 1.0), True, False,
-                f"A single frequency stands out in what is left: {at_hz:.1f} Hz, in {name}. Something hums or rings "
+                f"A single frequency stands out in the residual: {at_hz:.1f} Hz, in {name}. Something hums or rings "
                 "there.")
 
 
@@ -172,8 +172,8 @@ def _follows_road(beside: Beside, coherence: Coherence) -> Mark:
               band) for band in beside.bands if band.from_hz < top]
     band = max(bands, key=lambda one: one[0])[1]
     return Mark("coherence", share, "1", None, p_value, share > _LEAST_SHARE, True,
-                f"At least {_percent(share)} of what is left follows the road (coherence), most of it "
-                f"{_AROUND[band.name]}: this part is no noise, and something linear could cause it.")
+                f"At least {_percent(share)} of the residual is coherent with the road, most of it "
+                f"{_AROUND[band.name]}. This part is not noise; a linear effect could cause it.")
 
 
 def _gain(beside: Beside) -> Mark:
@@ -265,19 +265,19 @@ def _by_rate(forces: ForceMap) -> Mark:
     curve = forces.by_rate
     bend = "yields at speed" if forces.progression.value < 0 else "stiffens with speed"
     return Mark("force by rate", _size(curve), "N", None, curve.p_value, curve.share > _LEAST_SHARE, True,
-                f"A force in the suspensions that goes with their speed, {_side(curve, f'like a damper that {bend}')}, "
-                f"would explain {_percent(curve.share)} of what is left: {_ends(curve, 1, 'm/s')}, beside what "
-                "a straight damper does.")
+                f"A force in the suspensions that depends on their velocity, "
+                f"{_side(curve, f'like a damper that {bend}')}, would explain {_percent(curve.share)} of the "
+                f"residual. In addition to linear dampers: {_ends(curve, 1, 'm/s')}.")
 
 
 def _by_travel(forces: ForceMap) -> Mark:
     curve = forces.by_travel
     bend = "softens" if forces.hardening.value < 0 else "hardens"
     return Mark("force by travel", _size(curve), "N", None, curve.p_value, curve.share > _LEAST_SHARE, True,
-                f"A force in the suspensions that goes with their travel, "
+                f"A force in the suspensions that depends on their travel, "
                 f"{_side(curve, f'like a spring that {bend} far from its rest')}, would explain "
-                f"{_percent(curve.share)} of what is left: {_ends(curve, 1000, 'mm')}, beside what a straight "
-                "spring does.")
+                f"{_percent(curve.share)} of the residual. In addition to linear springs: "
+                f"{_ends(curve, 1000, 'mm')}.")
 
 
 def _side(curve: Curve, both: str) -> str:
@@ -293,9 +293,9 @@ def _ends(curve: Curve, factor: float, unit: str) -> str:
     words = []
     for index, way in ((0, "compression"), (-1, "extension")):
         force, error = float(curve.force_n[index]), float(curve.error_n[index])
-        size = f"{abs(force):.0f} ± {error:.0f} N that {'pulls' if force > 0 else 'pushes'} body and wheel " \
+        size = f"{abs(force):.0f} ± {error:.0f} N {'pulling' if force > 0 else 'pushing'} body and wheel " \
                f"{'together' if force > 0 else 'apart'}"
-        words.append(f"{size if abs(force) > 2 * error else 'next to nothing'} at {abs(curve.at[index]) * factor:.2g} "
+        words.append(f"{size if abs(force) > 2 * error else 'about zero'} at {abs(curve.at[index]) * factor:.2g} "
                      f"{unit} of {way}")
     return " and ".join(words)
 
@@ -304,10 +304,10 @@ def _direction(forces: ForceMap, beside: Beside) -> Mark:
     term: Term = forces.asymmetry
     mean = float(np.mean(beside.car.structure.dampers))
     more, less = ("rebound", "bump") if term.value > 0 else ("bump", "rebound")
-    ratio = f", by {_percent(2 * abs(term.value) / mean)} of what the model's dampers do" if mean > 0 else ""
+    ratio = f", by {_percent(2 * abs(term.value) / mean)} of the model's damping" if mean > 0 else ""
     return Mark("direction", term.value, "N s/m", term.error, term.p_value, term.share > _LEAST_SHARE, True,
-                f"What is left depends on the direction: it looks as if the suspensions resisted {more} more than "
-                f"{less}{ratio} (it would explain {_percent(term.share)}).")
+                f"The residual depends on the direction: the suspensions seem to resist {more} more than {less}{ratio} "
+                f"(this would explain {_percent(term.share)}).")
 
 
 # --- the residual and the drive ---
@@ -320,7 +320,7 @@ def _excitation(beside: Beside, where: Located) -> Mark:
     grown = max(high.left_mps2, 1e-300) / max(low.left_mps2, 1e-300)
     large = len(where.amplitude) > 1 and (grown > _GROWN if rho > 0 else grown < 1 / _GROWN)
     return Mark("excitation", rho, "1", None, p_value, large, True,
-                f"What is left {'grows' if rho > 0 else 'shrinks'} as the road moves the car more: {low.left_mps2:.2g} "
+                f"The residual {'grows' if rho > 0 else 'shrinks'} as the road moves the car more: {low.left_mps2:.2g} "
                 f"m/s2 where the model has up to {low.high:.2g} m/s2, {high.left_mps2:.2g} where it has {high.low:.2g} "
                 "and more.")
 
@@ -345,8 +345,8 @@ def _speed(beside: Beside) -> Mark:
     factor = float(np.exp(coefficients[1] / 2))
     p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else _UNKNOWN
     return Mark("speed", factor, "1", factor * error / 2, p_value, abs(np.log(factor)) > _LEAST_LOG_FACTOR, False,
-                f"On stretches that move the car alike, what is left is {factor:.1f} times as large at {fast:.0f} m/s "
-                f"as at {slow:.0f} m/s.")
+                f"On stretches with the same motion of the car, the residual is {factor:.1f} times as large at "
+                f"{fast:.0f} m/s as at {slow:.0f} m/s.")
 
 
 def _place(beside: Beside, where: Located) -> Mark:
@@ -366,7 +366,7 @@ def _place(beside: Beside, where: Located) -> Mark:
                       for part in worst)
     ratio = max(part.left_mps2 for part in worst) / usual
     return Mark("place", ratio, "1", None, min(1.0, min(chances) * len(chances)), ratio > 2, False,
-                f"Some places are much worse than the usual one: {named}.")
+                f"At some places the residual is much larger than usual: {named}.")
 
 
 def worst_places(where: Located, count: int) -> list[Part]:

@@ -76,8 +76,8 @@ def ending(story: Story) -> list[str]:
     lines = []
     if story.added:
         lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f} to {steps[-1][1]:.3f}, "
-                     "before and after with the car's numbers and the distances refitted within what they are usually "
-                     f"off. As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
+                     "before and after with the car's numbers and the distances refitted within their tolerance. "
+                     f"As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
     if story.floor is not None:
         lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:
@@ -87,7 +87,7 @@ def ending(story: Story) -> list[str]:
     if story.refused or story.left:
         return [*lines, *with_what]
     if verdict.diagnosis.strained and not verdict.diagnosis.left_over:
-        lines.append("Numbers of the vehicle's file are off by more than was granted: see whether they can be right.")
+        lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
     elif verdict.diagnosis.unexplained:
         lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
     else:

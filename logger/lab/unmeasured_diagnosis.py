@@ -287,16 +287,16 @@ def summary(found: Found) -> list[str]:
     for one in found.missing:
         candidate = next(other for other in found.candidates if other.one.effect.name == one.effect.name)
         numbers = f": {numbers_of(one)}" if one.values else ""
-        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The chance that noise looks like "
-                     f"that, all candidates together: {chance(candidate.p_value)}.")
+        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
+                     f"looks like this, all candidates together: {chance(candidate.p_value)}.")
         if candidate.confused_with:
             lines.append(f"These drives cannot tell {one.effect.name} from {' or '.join(candidate.confused_with)}.")
     if not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
                for index, (words, error) in enumerate(found.steps)]
-    lines.append(f"Error of each drive over the road that the others tell: {', '.join(by_step)}. The sensor's noise "
-                 f"alone makes {found.floor_error:.3f}.")
+    lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
+                 f"noise alone makes {found.floor_error:.3f}.")
     if found.unexplained:
         lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
                      "missing, maybe one of the effects that only a measured road can show.")
@@ -312,7 +312,8 @@ def cannot_tell(found: Found) -> list[str]:
                      "measured would do the same.")
     lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
               for why in dict.fromkeys(found.untried.values())]
-    lines += [f"{name}: at its usual strength it would hide in these drives ({deviations:.1f} standard deviations)."
+    lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
+              "deviations."
               for name, deviations in found.hidden.items()]
     return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from logger.lab import wandering
-from logger.lab.blind import Blind, blind
+from logger.lab.blind import SEEN, Blind, blind
 from logger.lab.diagnosis import CHANCE, LEAST_OF_LEFT, Candidate, Diagnosis
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.lab.spread import with_spread
@@ -82,24 +82,24 @@ def summary(found: Verdict) -> list[str]:
     diagnosis = found.diagnosis
     lines = [_missing(found, one) for one in found.missing]
     if not lines and not diagnosis.unexplained:
-        lines.append("Nothing is missing: with its numbers refitted within what they are usually off, the model leaves "
+        lines.append("Nothing is missing: with the car's numbers refitted within their tolerance, the residual is "
                      "hardly more than the sensor's noise.")
     if diagnosis.left_over:
-        lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: what is left is "
-                     f"{1 + diagnosis.excess:.3g} times the sensor's noise in the run where it is most.")
+        lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: in the worst run "
+                     f"the residual is {1 + diagnosis.excess:.3g} times the sensor's noise.")
         if any(one.p_value < CHANCE and one.effect.name not in diagnosis.verdict for one in diagnosis.candidates):
             lines.append(f"Candidates that improve the fit by less than {LEAST_OF_LEFT:.0%} of what a full explanation "
-                         "would are not named: they may only stand in for what is missing.")
+                         "would are not named: they may only imitate what is missing.")
     if diagnosis.strained:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in diagnosis.strained.items())
-        lines.append(f"The runs ask for a car whose numbers are off by more than was granted: {off}. Either the "
-                     "vehicle's file is wrong there, or something else is missing that no candidate explains.")
+        lines.append(f"The fit needs numbers outside their tolerance: {off}. Either the vehicle's file is wrong "
+                     "there, or an effect is missing that no candidate explains.")
     lines += wandering.told(diagnosis.moved_m) + wandering.too_long(diagnosis.problem)
     lines.append(_errors(found))
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(diagnosis) if name not in diagnosis.verdict]
     if dropped:
-        lines.append(f"Taken on the way and dropped again, as the others explain it: {', '.join(dropped)}.")
+        lines.append(f"Added during the search and dropped again, because the others explain it: {', '.join(dropped)}.")
     return lines
 
 
@@ -111,10 +111,11 @@ def looks_like(found: Verdict) -> list[str]:
 def untested(found: Verdict) -> list[str]:
     """What these runs cannot tell of, and which drive would."""
     lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
-    lines += [f"{one.effect.name}: at its usual strength it would hide in these runs ({one.deviations:.1f} standard "
-              f"deviations). To see it: {one.effect.shown_by}." for one in found.blind[:_MOST_BLIND]]
+    lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
+              f"{one.deviations:.1f} standard deviations, and {SEEN:g} are needed. To see it: {one.effect.shown_by}."
+              for one in found.blind[:_MOST_BLIND]]
     if rest := [one.effect.name for one in found.blind[_MOST_BLIND:]]:
-        lines.append(f"Hidden too: {', '.join(rest)}.")
+        lines.append(f"These runs could also miss: {', '.join(rest)}.")
     return lines
 
 
@@ -123,9 +124,9 @@ def _missing(found: Verdict, one: Chosen) -> str:
     candidate = found.candidate(one.effect.name)
     says = "is missing"
     if found.diagnosis.unexplained:
-        says = "would explain part of what is missing, or stands in for something else"
+        says = "would explain part of what is missing, or imitates something else"
     return (f"{one.effect.name} {says} ({one.effect.title}){numbers}. "
-            f"The chance that noise looks like that, all candidates together: {chance(candidate.p_value)}.")
+            f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}.")
 
 
 def floor_where_judged(diagnosis: Diagnosis) -> float | None:

@@ -17,7 +17,7 @@ from logger.report.document import bullets, document, grid, paragraphs, section,
 from logger.studies.pictures import picture
 from logger.studies.study import Curves, Line
 
-STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within what they are usually off; as "
+STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")
 _AROUND_S = 1.5
 _HIGHEST_OF_RATE = 0.4

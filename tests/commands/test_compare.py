@@ -50,7 +50,7 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     told = capsys.readouterr().out
     lines = told.splitlines()
     assert lines[0] == "rav4-2009 on 2 runs, 24 s"
-    assert lines[2].startswith("What the model leaves is ")
+    assert lines[2].startswith("The residual (measured - model) is ")
     assert "Next: ridelog diagnose" in " ".join(told.split())
     assert all(len(line) <= 100 for line in lines)
     assert "wheel hop" in told and "run1, " in told

@@ -139,7 +139,7 @@ def test_what_speaks_against_an_estimate_is_told(runs: list[str], tmp_path: Path
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, *narrow, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["cannot_tell"]
     assert len(told) == 3
-    expected = (f"{MASS} ended at a bound", "like their neighbours", "follow the road")
+    expected = (f"{MASS} ended at a bound", "are not white", "follow the road")
     for words, found in zip(expected, told, strict=True):
         assert words in found
     assert identify(runs, MASS, *narrow) == 0

@@ -49,7 +49,7 @@ def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     assert not mistaken.missing
     assert not mistaken.far
     assert mistaken.moves["sprung_mass_kg"] == pytest.approx(1 / 1.04 - 1, abs=0.03)
-    assert evidence(mistaken) == ["Nothing is left that differs from noise: no mark is found."]
+    assert evidence(mistaken) == ["No test finds more than noise in the residual."]
     assert "Nothing here asks for another effect" in conclusion(mistaken)
 
 
