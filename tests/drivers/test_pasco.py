@@ -345,7 +345,7 @@ def test_samples_are_not_dated_while_more_are_lost_than_can_be_located():
 @pytest.mark.parametrize("rate_hz", [98.5, 99.2, 100, 104])
 @pytest.mark.parametrize(("every", "count"), [(100, 1), (50, 1), (100, 2), (25, 1)])
 def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, count):
-    """From 12 s on, but for the last second, they are dated as they were taken, to within a fifth of the period, or not at all."""
+    """From 12 s to a second before the end: dated as taken, to within a fifth of the period, or not at all."""
     truth_us, arrival_us = radio(rate_hz, 6000, 11, latency_us=1000, burst_max=1)
     kept = np.arange(6000) % every >= count
     clock = SampleClock(100, load_profile("lines").clock_tolerance)
