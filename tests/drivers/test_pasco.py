@@ -356,6 +356,18 @@ def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, cou
     assert clock.lost > 0
 
 
+@pytest.mark.parametrize("tolerance_ppm", [10, 50, 500])
+@pytest.mark.parametrize("off_ppm", [-50, -400, -5000, 30])
+def test_a_tight_tolerance_makes_no_losses(tolerance_ppm, off_ppm):
+    """A clock that is off by more than its profile grants loses nothing by it: ten minutes."""
+    truth_us, arrival_us = radio(100 * (1 + off_ppm * 1e-6), 60_000, 12, latency_us=4000, burst_max=1)
+    clock = SampleClock(100, tolerance_ppm * 1e-6)
+    error_us = timed(clock, arrival_us) - truth_us
+    assert clock.resyncs == 0
+    assert clock.lost <= 3 * (off_ppm == -5000)  # in the first ten seconds, until its rate is known
+    assert np.abs(error_us[2000:]).max() < 5000
+
+
 def test_a_device_that_was_late_from_the_start_is_caught_up_with():
     """Its first second arrives a second late: the times must come back to the truth and never run backwards. Before it
     is known how fast the samples come they are not dated."""
