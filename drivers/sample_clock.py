@@ -44,7 +44,7 @@ class SampleClock:
        its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of the
        least distance, at most by the tolerance of the clock. The period is the median of the slopes between the lowest
        arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
-       tolerance of the rate found.
+       tolerance of the rate found. One that was kept through all of them and is outside of it is the rate instead.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
        ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
        where that is more, samples were lost: the line moves by as many periods and leaves a hole. (A link that is late
@@ -79,6 +79,7 @@ class SampleClock:
     BLOCK_US = 1_280_000
     BLOCKS = 8
     PIECES = 16  # of a block: of 80 ms, so that between two losses, which are 0.2 s apart or more, lie some of them
+    SEEN_TOLERANCE = JITTER_US / (BLOCKS * BLOCK_US)  # 490 ppm: a tighter tolerance the arrivals cannot tell
     GAIN = 0.25
     SLOWEST = 0.95
     FASTEST = 10.0
@@ -89,7 +90,7 @@ class SampleClock:
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:
         self._nominal_us = 1e6 / rate_hz
-        self._nominal_tolerance = tolerance
+        self._nominal_tolerance = max(tolerance, self.SEEN_TOLERANCE)
         self._held: Times = np.empty(0, dtype=np.int64)
         self._last_us = -(2**62)
         self._points: list[_Point] = []
@@ -105,7 +106,7 @@ class SampleClock:
         self.refused_hz: float | None = None
         self.resyncs = 0
         self.lost = 0
-        self._expect(self._nominal_us, tolerance)
+        self._expect(self._nominal_us, self._nominal_tolerance)
         self._begin_block(0.0, self._period_us)
 
     @property
@@ -336,6 +337,10 @@ class SampleClock:
             slope_us = comb_us
         elif came_spread_us <= self._step_least_us:
             slope_us = came_us
+            off_us = [point.arrival_us - came_us * point.number for point in self._points]
+            is_whole = len(off_us) == self.BLOCKS and max(off_us) - min(off_us) <= self._step_least_us
+            if is_whole and not self._shortest_us <= came_us <= self._longest_us:
+                self._expect(came_us, self.OTHER_TOLERANCE)
         elif spread_us > self._step_least_us and len(self._points) == self.BLOCKS:
             if self._found_us != self._nominal_us and came_us < self._nominal_us:
                 self._steady_needed = self.STEADY

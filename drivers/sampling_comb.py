@@ -37,18 +37,19 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
     if count < 2:
         return None
     step_us = slope_us / count / STEPS_PER_CYCLE
-    shorter = np.arange(slope_us * (1 - lost_most), slope_us - STEPS_PER_CYCLE * step_us, step_us)
+    tried = int(slope_us * lost_most / step_us) - STEPS_PER_CYCLE
+    shorter = slope_us * (1 - lost_most) + step_us * np.arange(tried, dtype=np.float64)
     if len(shorter) == 0:
         return None
     lengths = resultant(instants_us, shorter)
     best = int(np.argmax(lengths))
     if lengths[best] < sqrt(log(max(1.0, len(shorter) / STEPS_PER_CYCLE) / CHANCE) / len(instants_us)):
         return None
-    near = slope_us + step_us * np.arange(-STEPS_PER_CYCLE, STEPS_PER_CYCLE + 1)
+    near = slope_us + step_us * np.arange(-STEPS_PER_CYCLE, STEPS_PER_CYCLE + 1, dtype=np.float64)
     if lengths[best] < CLEARER * resultant(instants_us, near).max():
         return None
     period_us = float(shorter[best])
-    multiples = period_us * np.arange(2, 1 + max(2, int(longest_gap_us / period_us)))
+    multiples = period_us * np.arange(2, 1 + max(2, int(longest_gap_us / period_us)), dtype=np.float64)
     if resultant(instants_us, multiples).max() >= lengths[best]:
         return None  # the comb of an adapter's timer or of what reads the line: of the sampler's own all teeth are seen
     return period_us
