@@ -86,7 +86,7 @@ def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(
 
 
 def rough_road(milliseconds: int, seed: int = 3) -> list[Sample]:
-    """Counts at +-2 g on a rough road, each millisecond: 1, 1 and 3 m/s2 of 0.5 to 15 Hz, noise of 0.1 m/s2 to 60 Hz."""
+    """Counts at +-2 g on a rough road, each millisecond: 1, 1 and 3 m/s2 of 0.5 to 15 Hz, and noise of 0.1 m/s2."""
     rng = np.random.default_rng(seed)
     frequency_hz = np.fft.rfftfreq(milliseconds, 1e-3)
 
