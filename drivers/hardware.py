@@ -52,10 +52,12 @@ def open_i2c(number: int, register_step: int = 1) -> I2cBus:
 class ByteReads:
     """A bus whose blocks are read register by register, for adapters that cannot do it in one transfer.
 
-    Problem: a chip that renews its registers between two of the reads gives a block that never was. Solution: the block
-    is read until two readings in a row agree, ``READINGS_MAX`` times at most; then it is an OSError (EAGAIN). Two that
-    agree are what the registers held at once, if they were not renewed more than twice meanwhile: for three registers
-    that is 2.3 ms on a bus of 100 kHz, and 4.7 ms at most.
+    Problem: a chip that renews its registers between two of the reads gives a block that never was. Solution: the
+    registers are read in turn, again and again. One that is read between two reads of all others that agree stood
+    together with them, if there is no more than one renewal in the time of a block's reads (three bytes: 1 ms on a bus
+    of 100 kHz). So of three registers five reads are enough, and the one in the middle may change each time.
+    After ``READINGS_MAX`` readings of all it is an OSError (EAGAIN): on a rough road 0.1 % of them at 0.5 ms a byte,
+    0.5 % at 0.75 ms, 2 % at 1 ms (registers renewed each 1 ms; a second look at all three lost 11, 30 and 41 %).
     """
 
     READINGS_MAX = 4
@@ -69,13 +71,14 @@ class ByteReads:
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """``length`` registers from ``register`` on, as they stood together."""
-        addresses = range(register, register + length * self._register_step, self._register_step)
-        before: list[int] = []
-        for _ in range(self.READINGS_MAX):
-            block = [self._bus.read_byte_data(i2c_addr, address) for address in addresses]
-            if block == before:
-                return block
-            before = block
+        addresses = [register + k * self._register_step for k in range(length)]
+        read: list[int] = []
+        for count, address in enumerate(addresses * self.READINGS_MAX, 1):
+            read.append(self._bus.read_byte_data(i2c_addr, address))
+            others_from = count - length + 1  # the latest look at all others than the one in the middle
+            if others_from >= length and read[others_from:] == read[others_from - length:count - length]:
+                lap = count - count % length
+                return read[lap:] + read[count - length:lap]
         raise OSError(errno.EAGAIN, "the registers were renewed while they were read, each time")
 
 

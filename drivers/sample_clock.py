@@ -11,11 +11,13 @@ are lost, the envelope makes a step up by whole periods, and stays; where the li
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from drivers.sampling_comb import sampling_period
 
 Times = npt.NDArray[np.int64]
 
@@ -42,16 +44,17 @@ class SampleClock:
        its arrival. When all arrivals of a block are above it, the line climbs in the next block by ``GAIN`` of the
        least distance, at most by the tolerance of the clock. The period is the median of the slopes between the lowest
        arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
-       tolerance of the rate found.
+       tolerance of the rate found. One that was kept through all of them and is outside of it is the rate instead.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
        ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
        where that is more, samples were lost: the line moves by as many periods and leaves a hole. (A link that is late
        by 30 ms at random has such a second now and then: once in 1,000 samples.) Arrivals that stay more than
        ``OFF_US`` late, or that come that much too early, make the clock settle anew.
-    5. Steadiness. Losses from the start on look like a slower clock. But they come by chance, and arrivals of a slow
-       clock lie on a line: where the lowest arrivals of the last blocks do not, neither as they came nor with the
-       losses that were noticed, the profile's own rate is taken, by which losses show; a device of another rate is
-       refused until it has kept one through ``STEADY`` findings in a row.
+    5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
+       those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
+       samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
+       neither, nor on a line with the losses that were noticed, the profile's own rate is taken; a device of another
+       rate is refused until it has kept one through ``STEADY`` findings in a row.
     6. Too many losses. Where steps come close together, a place between two is as likely as the true one, and the
        period can no longer be told from the losses. Once there were more than ``STEPS_MAX`` in a ``LOOK_AHEAD_US``, on
        average over the last ``BLOCKS`` blocks, and until there are half as many, the line is followed, but no sample
@@ -75,6 +78,8 @@ class SampleClock:
     HELD_MAX = 4096
     BLOCK_US = 1_280_000
     BLOCKS = 8
+    PIECES = 16  # of a block: of 80 ms, so that between two losses, which are 0.2 s apart or more, lie some of them
+    SEEN_TOLERANCE = JITTER_US / (BLOCKS * BLOCK_US)  # 490 ppm: a tighter tolerance the arrivals cannot tell
     GAIN = 0.25
     SLOWEST = 0.95
     FASTEST = 10.0
@@ -85,11 +90,11 @@ class SampleClock:
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:
         self._nominal_us = 1e6 / rate_hz
-        self._nominal_tolerance = tolerance
+        self._nominal_tolerance = max(tolerance, self.SEEN_TOLERANCE)
         self._held: Times = np.empty(0, dtype=np.int64)
         self._last_us = -(2**62)
         self._points: list[_Point] = []
-        self._lowest = _Point(0, 0, 0)
+        self._pieces: list[_Point] = []
         self._number = 0
         self._finding = True
         self._following = False
@@ -101,7 +106,7 @@ class SampleClock:
         self.refused_hz: float | None = None
         self.resyncs = 0
         self.lost = 0
-        self._expect(self._nominal_us, tolerance)
+        self._expect(self._nominal_us, self._nominal_tolerance)
         self._begin_block(0.0, self._period_us)
 
     @property
@@ -215,12 +220,15 @@ class SampleClock:
         slope_us, spread_us = _slope(points, with_lost=False)
         nominal_us = self._nominal_us
         is_steady = spread_us <= self._step_least_us
+        comb_us = self._comb(points, slope_us)
+        if comb_us is not None:
+            slope_us, is_steady = comb_us, True
         steady_needed, self._steady_needed = self._steady_needed - is_steady, 0
         self.refused_hz = None
         if abs(slope_us / nominal_us - 1) <= self._nominal_tolerance + self.FIND_ERROR:
             self._expect(nominal_us, self._nominal_tolerance)
             if is_steady:
-                self._period_us = min(max(slope_us, self._shortest_us), self._longest_us)
+                self._take_period(slope_us)
         elif nominal_us < slope_us <= nominal_us / self.SLOWEST and not is_steady:
             self._expect(nominal_us, self._nominal_tolerance)
         elif nominal_us / self.FASTEST <= slope_us <= nominal_us / self.SLOWEST and is_steady and steady_needed <= 0:
@@ -228,6 +236,21 @@ class SampleClock:
         else:
             self.refused_hz = 1e6 / slope_us
             self._steady_needed = steady_needed if is_steady and steady_needed > 0 else self.STEADY
+
+    def _comb(self, points: list[_Point], slope_us: float) -> float | None:
+        """The period [us] of a sampler of which samples are lost, where the arrivals show it. It has to be near the
+        profile's: 125 Hz with 1 in 25 lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike."""
+        if slope_us < self.SLOWEST * self._nominal_us:
+            return None
+        instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
+        count = points[-1].number - points[0].number
+        period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
+        if period_us is None or not self.SLOWEST <= period_us / self._nominal_us <= 1 / self.SLOWEST:
+            return None
+        return period_us
+
+    def _take_period(self, period_us: float) -> None:
+        self._period_us = min(max(period_us, self._shortest_us), self._longest_us)
 
     def _envelope(self, arrivals_us: Times) -> list[_Point]:
         """The lowest arrivals of some pieces of time."""
@@ -238,8 +261,8 @@ class SampleClock:
         last = np.flatnonzero(np.append(arrivals_us[1:] > arrivals_us[:-1], True))
         mean_us = (arrivals_us[last[-1]] - arrivals_us[last[0]]) / max(1, last[-1] - last[0])
         above_us = arrivals_us - mean_us * numbers
-        piece = ((arrivals_us - arrivals_us[0]) * (2 * self.BLOCKS) / (span_us + 1)).astype(np.int64)
-        lowest = [np.flatnonzero(piece == k) for k in range(2 * self.BLOCKS)]
+        piece = ((arrivals_us - arrivals_us[0]) * self.PIECES / (span_us + 1)).astype(np.int64)
+        lowest = [np.flatnonzero(piece == k) for k in range(self.PIECES)]
         found = [int(inside[np.argmin(above_us[inside])]) for inside in lowest if len(inside)]
         return [_Point(number, 0, int(arrivals_us[number])) for number in found]
 
@@ -254,6 +277,7 @@ class SampleClock:
         lowest = int(np.argmin(arrivals_us - run_us))
         start_us = float(arrivals_us[lowest] - run_us[lowest])
         self._points = [_Point(lowest, self.lost, int(arrivals_us[lowest]))]
+        self._pieces = []
         self._number = len(arrivals_us)
         self._following = True
         self._begin_block(start_us + self._period_us * len(arrivals_us), self._period_us)
@@ -264,16 +288,20 @@ class SampleClock:
         self._step_us = step_us
         self._index = 0
         self._pulled_us = 0.0
-        self._least_us = np.inf
+        self._lowest_of_pieces: dict[int, tuple[float, _Point]] = {}
 
     def _follow(self, arrivals_us: Times) -> Times:
         """Times of samples of this block that belong to the line."""
         line_us = self._line(len(arrivals_us))
         above_us = arrivals_us - line_us
-        lowest = int(np.argmin(above_us))
-        if above_us[lowest] < self._least_us:
-            self._least_us = float(above_us[lowest])
-            self._lowest = _Point(self._number + self._index + lowest, self.lost, int(arrivals_us[lowest]))
+        pieces = (self._index + np.arange(len(arrivals_us))) * self.PIECES // self._block
+        starts = np.flatnonzero(np.diff(pieces, prepend=-1))
+        for first, end in pairwise((*starts.tolist(), len(pieces))):
+            lowest = first + int(np.argmin(above_us[first:end]))
+            before_us, _ = self._lowest_of_pieces.get(int(pieces[first]), (np.inf, None))
+            if above_us[lowest] < before_us:
+                point = _Point(self._number + self._index + lowest, self.lost, int(arrivals_us[lowest]))
+                self._lowest_of_pieces[int(pieces[first])] = float(above_us[lowest]), point
         pulled_us: npt.NDArray[np.float64] = np.minimum.accumulate(np.minimum(above_us, self._pulled_us))
         self._pulled_us = float(pulled_us[-1])
         times = self._dated(line_us + pulled_us)
@@ -283,14 +311,17 @@ class SampleClock:
         return times
 
     def _next_block(self) -> None:
-        self._points = [*self._points, self._lowest][-self.BLOCKS :]
+        least_us, lowest = min(self._lowest_of_pieces.values())
+        self._points = [*self._points, lowest][-self.BLOCKS :]
+        pieces = [point for _, point in self._lowest_of_pieces.values()]
+        self._pieces = [*self._pieces, *pieces][-self.BLOCKS * self.PIECES :]
         self._number += self._index
         self._steps_by_block, self._steps = [*self._steps_by_block, self._steps][-self.BLOCKS :], 0
         most = self.STEPS_MAX * self.BLOCKS * self.BLOCK_US / self.LOOK_AHEAD_US
         self.too_many_lost = sum(self._steps_by_block) > (most / 2 if self.too_many_lost else most)
         if len(self._points) >= 3:
             self._look_at_the_rate()
-        climb_us = min(self.GAIN * max(self._least_us, 0.0) / self._block, self._climb_us_max)
+        climb_us = min(self.GAIN * max(least_us, 0.0) / self._block, self._climb_us_max)
         self._begin_block(self._base_us + self._step_us * self._index + self._pulled_us, self._period_us + climb_us)
 
     def _look_at_the_rate(self) -> None:
@@ -299,8 +330,17 @@ class SampleClock:
         slope_us, spread_us = _slope(self._points, with_lost=True)
         if came_us > self._nominal_us / self.SLOWEST:
             self._lose_line(find=True)
-        if came_spread_us <= self._step_least_us:
+        comb_us = self._comb(self._pieces, came_us)
+        if comb_us is not None:
+            if not self._shortest_us <= comb_us <= self._longest_us:
+                self._expect(comb_us, self.OTHER_TOLERANCE)
+            slope_us = comb_us
+        elif came_spread_us <= self._step_least_us:
             slope_us = came_us
+            off_us = [point.arrival_us - came_us * point.number for point in self._points]
+            is_whole = len(off_us) == self.BLOCKS and max(off_us) - min(off_us) <= self._step_least_us
+            if is_whole and not self._shortest_us <= came_us <= self._longest_us:
+                self._expect(came_us, self.OTHER_TOLERANCE)
         elif spread_us > self._step_least_us and len(self._points) == self.BLOCKS:
             if self._found_us != self._nominal_us and came_us < self._nominal_us:
                 self._steady_needed = self.STEADY
@@ -309,7 +349,7 @@ class SampleClock:
                 self._points = []
                 self._expect(self._nominal_us, self._nominal_tolerance)
                 return
-        self._period_us = min(max(slope_us, self._shortest_us), self._longest_us)
+        self._take_period(slope_us)
 
     def _dated(self, times_us: npt.NDArray[np.float64]) -> Times:
         """Whole microseconds, each at least one later than the one before; none while too many samples are lost."""

@@ -14,11 +14,14 @@ import numpy as np
 from drivers.sample_clock import SampleClock
 
 from figures import Figures
-from serial_drives import mean_iri, rows_at, same_rows
+from serial_drives import evenly_lost, mean_iri, rows_at, rows_without, same_rows
 
 CASES = ((100, 0.0), (96, 0.0), (98, 0.0), (104, 0.0), (120, 0.0), (150, 0.0), (200, 0.0), (400, 0.0), (800, 0.0),
          (80, 0.0), (100, 0.1), (100, 0.03), (100, 0.01), (100, 0.005), (100, 0.02), (150, 0.1),
          (150, 0.01), (200, 0.05), (200, 0.01), (400, 0.05))
+EVENLY_LOST = ((100, 100, 1), (100, 50, 1), (100, 100, 2), (100, 25, 1), (96, 100, 1), (98, 50, 1), (104, 50, 1),
+               (150, 50, 1), (150, 100, 2), (200, 100, 2), (400, 100, 2))
+UNSEEN = ("150 Hz, 2 in 100 lost", "200 Hz, 2 in 100 lost")  # at rates that are not the profile's: see the README
 MINUTES = 20
 ENOUGH_ROWS = 5  # of fewer the mean is chance
 
@@ -27,16 +30,18 @@ def main() -> int:
     """Print the figures; exit 1 when a goal is missed."""
     figures = Figures()
     usual = rows_at(100)[1]
-    for rate_hz, lost in CASES:
-        rows = rows_at(rate_hz, lost)[1]
+    drives = {f"{rate_hz} Hz, {100 * lost:g} % lost": rows_at(rate_hz, lost)[1] for rate_hz, lost in CASES}
+    for rate_hz, every, lines in EVENLY_LOST:
+        drives[f"{rate_hz} Hz, {lines} in {every} lost"] = rows_without(rate_hz, evenly_lost(rate_hz, every, lines))
+    for name, rows in drives.items():
         mean, count = mean_iri(rows)
         flagged = sum("gap" in row.flags for row in rows.records)
         pairs = same_rows(rows, usual)
         ratio = np.divide(*np.mean(pairs, axis=0)) if pairs else 1.0
-        print(f"  {rate_hz} Hz, {100 * lost:g} % lost: mean IRI {mean:.2f} of {count} rows without a flag, "
+        print(f"  {name}: mean IRI {mean:.2f} of {count} rows without a flag, "
               f"{100 * (ratio - 1):+.1f} % beside the same rows at 100 Hz; {flagged} rows flagged gap")
         if len(pairs) >= ENOUGH_ROWS:
-            figures.at_most(f"error at {rate_hz} Hz, {100 * lost:g} % lost", 100 * abs(ratio - 1), 3, "%")
+            figures.at_most(f"error at {name}", 100 * abs(ratio - 1), 5 if name in UNSEEN else 3, "%")
     for name, arrivals in _lines().items():
         for period_us in (10_000.0, 10_003.7, 9_998.1, 6_667.0, 2_500.0):
             clock = SampleClock(100, 0.02)

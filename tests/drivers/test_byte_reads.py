@@ -6,13 +6,14 @@ import errno
 import os
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 import smbus2
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.bma220 import REGISTER_STEP, Bma220, Bma220Settings
+from drivers.bma220 import REGISTER_STEP, Bma220, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 from drivers.replay import RecordedBus
@@ -82,6 +83,51 @@ def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(
         assert bus.data_reads <= 20 * 12
         if every >= 12:
             assert len(got) == 20
+
+
+def rough_road(milliseconds: int, seed: int = 3) -> list[Sample]:
+    """Counts at +-2 g on a rough road, each millisecond: 1, 1 and 3 m/s2 of 0.5 to 15 Hz, and noise of 0.1 m/s2."""
+    rng = np.random.default_rng(seed)
+    frequency_hz = np.fft.rfftfreq(milliseconds, 1e-3)
+
+    def band(rms: float, low_hz: float, high_hz: float) -> np.ndarray:
+        spectrum = rng.normal(size=(2, len(frequency_hz))).T @ (1, 1j)
+        signal = np.fft.irfft(spectrum * ((frequency_hz > low_hz) & (frequency_hz < high_hz)), milliseconds)
+        return np.asarray(signal / signal.std() * rms)
+
+    axes = [mean + band(rms, 0.5, 15) + band(0.1, 0.1, 60) for mean, rms in ((0, 1), (0, 1), (9.81, 3))]
+    counts = np.clip(np.round(np.array(axes) / mps2_per_count(2)), -32, 31).astype(int)
+    return [(int(x) * 4 % 256, int(y) * 4 % 256, int(z) * 4 % 256) for x, y, z in counts.T]
+
+
+@pytest.mark.parametrize(("byte_ms", "lost_share"), [(0.5, 0.005), (0.75, 0.01), (1.0, 0.04)])
+def test_few_readings_are_lost_on_a_rough_road(
+    monkeypatch: pytest.MonkeyPatch, byte_ms: float, lost_share: float
+) -> None:
+    """A chip that renews its registers 1000 times a second, read 100 times a second through a slow adapter."""
+    taken = rough_road(30_000)
+    chip = RecordedBus()
+    now_ms = 0.0
+
+    def read(i2c_addr: int, register: int) -> int:
+        nonlocal now_ms
+        if register not in (0x04, 0x06, 0x08):
+            return RecordedBus.read_byte_data(chip, i2c_addr, register)
+        now_ms += byte_ms
+        return taken[int(now_ms)][(register - 4) // 2]
+
+    monkeypatch.setattr(chip, "read_byte_data", read)
+    sensor = Bma220(opened(monkeypatch, BYTES, chip)(), Bma220Settings(), lambda seconds: None)  # type: ignore[arg-type]
+    sensor.start()
+    lost = 0
+    for number in range(2900):
+        now_ms = max(now_ms, 10.0 * number)
+        try:
+            sensor.read_raw()
+        except BadReply:
+            lost += 1
+    print(f"{100 * lost / 2900:.1f} % of the readings are lost at {byte_ms} ms a byte")
+    assert lost < lost_share * 2900
 
 
 def test_an_adapter_with_block_reads_is_used_as_before(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -342,6 +342,32 @@ def test_samples_are_not_dated_while_more_are_lost_than_can_be_located():
     assert np.abs(times_us - truth_us[kept])[second > 80].max() < 5000
 
 
+@pytest.mark.parametrize("rate_hz", [98.5, 99.2, 100, 104])
+@pytest.mark.parametrize(("every", "count"), [(100, 1), (50, 1), (100, 2), (25, 1)])
+def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, count):
+    """From 12 s to a second before the end: dated as taken, to within a fifth of the period, or not at all."""
+    truth_us, arrival_us = radio(rate_hz, 6000, 11, latency_us=1000, burst_max=1)
+    kept = np.arange(6000) % every >= count
+    clock = SampleClock(100, load_profile("lines").clock_tolerance)
+    error_us = timed(clock, arrival_us[kept]) - truth_us[kept]
+    settled = (truth_us[kept] > truth_us[0] + 12e6) & (truth_us[kept] < truth_us[-1] - 1.2e6)
+    dated = settled & (error_us > -(2**62))
+    assert not dated.any() or np.std(error_us[dated]) < 0.2 * 1e6 / rate_hz
+    assert clock.lost > 0
+
+
+@pytest.mark.parametrize("tolerance_ppm", [10, 50, 500])
+@pytest.mark.parametrize("off_ppm", [-50, -400, -5000, 30])
+def test_a_tight_tolerance_makes_no_losses(tolerance_ppm, off_ppm):
+    """A clock that is off by more than its profile grants loses nothing by it: ten minutes."""
+    truth_us, arrival_us = radio(100 * (1 + off_ppm * 1e-6), 60_000, 12, latency_us=4000, burst_max=1)
+    clock = SampleClock(100, tolerance_ppm * 1e-6)
+    error_us = timed(clock, arrival_us) - truth_us
+    assert clock.resyncs == 0
+    assert clock.lost <= 5 * (off_ppm == -5000)  # 0.5 % of the first ten seconds, until its rate is known
+    assert np.abs(error_us[2000:]).max() < 5000
+
+
 def test_a_device_that_was_late_from_the_start_is_caught_up_with():
     """Its first second arrives a second late: the times must come back to the truth and never run backwards. Before it
     is known how fast the samples come they are not dated."""

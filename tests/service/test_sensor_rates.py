@@ -11,7 +11,17 @@ from logger.commands.status import advice
 
 from replaying import rows_of
 from sensor_faults import Car
-from serial_drives import SPEED_MPS, drive_at, mean_iri, randomly_lost, rows_at, same_rows, without_lines
+from serial_drives import (
+    SPEED_MPS,
+    drive_at,
+    evenly_lost,
+    mean_iri,
+    randomly_lost,
+    rows_at,
+    rows_without,
+    same_rows,
+    without_lines,
+)
 
 WHOLE_ROWS = 185
 
@@ -39,6 +49,18 @@ def test_rows_with_many_lost_lines_are_right_or_flagged(rate_hz: int, share: flo
     assert len(pairs) < WHOLE_ROWS / 4
     found, expected = np.mean(pairs, axis=0) if len(pairs) >= 5 else (0, 0)
     assert found == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize(("rate_hz", "every", "count"), [
+    (100, 100, 1), (100, 50, 1), (100, 100, 2), (100, 25, 1), (98, 50, 1), (104, 50, 1)
+])
+def test_rows_with_lines_lost_at_even_intervals_are_right_or_flagged(rate_hz: int, every: int, count: int) -> None:
+    """They look like a slower sensor."""
+    rows = rows_without(rate_hz, evenly_lost(rate_hz, every, count))
+    pairs = same_rows(rows, rows_at(100)[1])
+    found, expected = np.mean(pairs, axis=0) if len(pairs) >= 5 else (0, 0)
+    assert found == pytest.approx(expected, rel=0.02)
+    assert sum("gap" in row.flags for row in rows.records) > 0.4 * len(rows.records)
 
 
 def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from functools import cache
 
 import numpy as np
@@ -27,7 +28,7 @@ def drive_at(rate_hz: int) -> Drive:
     return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
 
 
-def without_lines(events: list[Event], lost: set[int]) -> list[Event]:
+def without_lines(events: list[Event], lost: Set[int]) -> list[Event]:
     """The events as if some lines, counted from 0, had not been sent."""
     number = 0
     kept = []
@@ -50,11 +51,21 @@ def randomly_lost(rate_hz: int, share: float, seed: int = 1, begin_s: float = 0.
     return set(np.flatnonzero(drawn & (np.arange(rate_hz * SECONDS) >= begin_s * rate_hz)).tolist())
 
 
+def evenly_lost(rate_hz: int, every: int, count: int = 1) -> set[int]:
+    """Numbers of lines that are lost at even intervals: the first ``count`` of each ``every``."""
+    return {number for number in range(rate_hz * SECONDS) if number % every < count}
+
+
 @cache
 def rows_at(rate_hz: int, share: float = 0.0) -> tuple[Drive, Rows]:
     """The drive and its rows."""
+    return drive_at(rate_hz), rows_without(rate_hz, frozenset(randomly_lost(rate_hz, share)))
+
+
+def rows_without(rate_hz: int, lost: Set[int]) -> Rows:
+    """The drive's rows when these lines are lost."""
     drive = drive_at(rate_hz)
-    return drive, rows_of(drive.header, without_lines(drive.events, randomly_lost(rate_hz, share)))
+    return rows_of(drive.header, without_lines(drive.events, lost))
 
 
 def mean_iri(rows: Rows) -> tuple[float, int]:
