@@ -1,6 +1,9 @@
 """Who may import whom, read from the sources. Each rule was broken by hand once, to see it fail."""
 
 import ast
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -57,6 +60,26 @@ def test_what_runs_on_board_never_loads_what_belongs_to_the_desk() -> None:
     assert "logger.dsp.sections" in on_board
     assert not {module for module in on_board if "scipy" in {name.split(".")[0] for name in imports(module)}}
     assert not {module for module in on_board if module.split(".")[1] in {"report", "lab", "sysid", "studies", "demo"}}
+
+
+def test_a_service_that_logs_a_drive_has_loaded_nothing_of_the_desk(short_dump: Path, tmp_path: Path) -> None:
+    """In a process of its own: every module of the service, and a drive through the code that runs in the car."""
+    code = f"""
+import importlib, json, pkgutil, sys
+import logger.service
+from logger.commands.main import main
+for module in pkgutil.iter_modules(logger.service.__path__):
+    importlib.import_module("logger.service." + module.name)
+import logger.commands.run
+assert main(["replay", {str(short_dump)!r}, "--out", {str(tmp_path)!r}, "--json"]) == 0
+print(json.dumps(sorted(sys.modules)))
+"""
+    played = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = json.loads(played.stdout.splitlines()[-1])
+    assert "logger.service.start" in loaded
+    assert list(tmp_path.glob("*.csv"))
+    desk = ("logger.lab", "logger.identification", "logger.modal", "logger.studies", "scipy")
+    assert not [name for name in loaded if name.startswith(desk)]
 
 
 @pytest.mark.parametrize("module", TREES)
