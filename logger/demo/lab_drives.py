@@ -17,7 +17,6 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
-from logger.identification.parameters import changed, read
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
 from logger.roads.track import Track
@@ -27,6 +26,7 @@ from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
+from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.passage import Passage
 
 VEHICLE = "rav4-2009"
