@@ -39,7 +39,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.identification.axle_response import AxleResponse

@@ -23,9 +23,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
+from logger.files import read_bounded
 from logger.roads.calibration import METHOD, Line, Settings, SpeedCalibration
 from logger.shipped import shipped
-from logger.store.bounded import read_bounded
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
