@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
+from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalibration
 from logger.files import read_bounded
-from logger.roads.calibration import METHOD, Line, Settings, SpeedCalibration
 from logger.shipped import shipped
 from logger.vehicle.vehicle import Vehicle
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from logger.roads.calibration import PASSENGER_KG, Settings, calibrate, loaded
-from logger.roads.from_acceleration import rms_relation
+from logger.estimation.rms_calibration import PASSENGER_KG, Settings, calibrate, loaded
+from logger.estimation.rms_relation import rms_relation
 from logger.studies.drives import rav4
 from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
 from logger.units import MPH_MPS
