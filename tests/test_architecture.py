@@ -17,7 +17,7 @@ TREES = {
 }
 FLOORS = (
     "errors", "units", "records", "printable",
-    "dsp", "comfort", "vehicle", "roads", "estimation", "identification", "modal", "lab",
+    "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "identification", "modal", "lab",
     "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
@@ -25,8 +25,8 @@ NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "units", "records", "printable", "dsp", "comfort", "vehicle", "roads", "estimation", "files", "shipped",
-    "plugins", "store", "service", "commands",
+    "errors", "units", "records", "printable", "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "files",
+    "shipped", "plugins", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [

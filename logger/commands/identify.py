@@ -355,7 +355,7 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
     import numpy as np
 
     from logger.identification.record import Record
-    from logger.roads.track import Track
+    from logger.profiles.track import Track
     from logger.store.drive_file import DRIVE, PROFILE, Run, read_drive, read_run
 
     folder = path.is_dir()

@@ -17,9 +17,9 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import DRIVE, PROFILE, write_drive, write_profile
 from logger.store.effect_file import shipped_effects

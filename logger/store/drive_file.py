@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import naming, read_bounded
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.store.number_table import parse_columns
 from logger.store.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.profile_file import Profile, read_profile

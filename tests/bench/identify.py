@@ -27,8 +27,8 @@ from logger.identification.record import Record
 from logger.identification.road_input import RoadInput, expanded, free_input, is_input
 from logger.identification.shared_road import fit_roads
 from logger.identification.verdict import NotIdentifiable
+from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded

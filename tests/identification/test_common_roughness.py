@@ -13,9 +13,9 @@ from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.report import common_words
 from logger.identification.road_input import RoadInput, expanded, free_input
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.studies.drives import RATE_HZ, rav4, recorded
 from logger.vehicle.named_parameters import free
 

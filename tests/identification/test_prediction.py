@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.prediction import Record, VehicleModel
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded

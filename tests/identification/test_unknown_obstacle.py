@@ -25,8 +25,8 @@ from logger.identification.road_input import (
     run_and_name,
 )
 from logger.identification.verdict import WEAK, NotIdentifiable
+from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
