@@ -16,7 +16,7 @@ TREES = {
     for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
 }
 FLOORS = (
-    "errors", "units", "records", "printable",
+    "errors", "units", "records", "chart_data", "printable",
     "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "identification", "modal", "lab",
     "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
 )
