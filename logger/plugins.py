@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from logger.errors import BadInput, RidelogError
+from logger.files import read_bounded
 
 _MAX_BYTES = 256 * 1024
 
@@ -52,8 +53,6 @@ def offered_by(path: Path, offer: str) -> Any:
     Raises BadInput that names the file, and the line where there is one, for a file that cannot be read, is not Python,
     raises, or does not offer it.
     """
-    from logger.store.bounded import read_bounded
-
     source = read_bounded(path, _MAX_BYTES)
     module = ModuleType(f"ridelog_own_{path.stem}")
     module.__file__ = str(path)

@@ -1,6 +1,9 @@
 """Who may import whom, read from the sources. Each rule was broken by hand once, to see it fail."""
 
 import ast
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,12 +15,32 @@ TREES = {
     ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): ast.parse(path.read_text("utf-8"))
     for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
 }
-BELOW = {
-    "dsp", "roads", "comfort", "vehicle", "estimation", "identification", "modal", "lab",
-    "units", "records", "errors",
-}
+FLOORS = (
+    "errors", "units", "records", "chart_data", "printable",
+    "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "identification", "modal", "lab",
+    "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
+)
+"""Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
+NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
+"""Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
-ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + ["logger.commands.run"]
+CARRIED = {
+    "errors", "units", "records", "printable", "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "files",
+    "shipped", "plugins", "store", "service", "commands",
+}
+"""Floors that a car carries; every other floor is the desk's."""
+ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [
+    f"logger.commands.{name}" for name in ("main", "run", "status", "export", "verify", "capture", "install")
+]
+
+
+def floor_of(module: str) -> str:
+    """Folder or single module of ``logger`` that a name belongs to."""
+    return module.split(".")[1]
+
+
+MODULES = [name for name in TREES if name.startswith("logger.") and floor_of(name) != "__init__"]
+DESK = {floor_of(name) for name in MODULES} - CARRIED
 
 
 def imports(module: str) -> set[str]:
@@ -41,22 +64,61 @@ def closure(start: list[str]) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_arrows_point_one_way(module: str) -> None:
-    parts = module.split(".")
-    imported = imports(module)
-    if parts[0] == "drivers":
-        assert not {name for name in imported if name.split(".")[0] == "logger"}
-    elif parts[1] in BELOW:
-        above = {name for name in imported if name.startswith("logger.") and name.split(".")[1] not in BELOW}
-        assert not above | {name for name in imported if name.split(".")[0] in OUTSIDE}
+def test_every_folder_has_a_floor() -> None:
+    assert sorted(FLOORS) == sorted({floor_of(name) for name in MODULES})
+    assert set(FLOORS) > CARRIED
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_run_downwards(module: str) -> None:
+    below = FLOORS[: FLOORS.index(floor_of(module)) + 1]
+    ours = {name for name in imports(module) if name.startswith("logger.")}
+    assert not {name for name in ours if floor_of(name) not in below}
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if floor_of(name) in NUMERICAL])
+def test_numerical_folders_know_no_files_and_no_clocks(module: str) -> None:
+    assert not {name for name in imports(module) if name.split(".")[0] in OUTSIDE}
+
+
+@pytest.mark.parametrize("module", [name for name in TREES if name.startswith("drivers.")])
+def test_drivers_know_nothing_of_the_logger(module: str) -> None:
+    assert not {name for name in imports(module) if name.split(".")[0] == "logger"}
+
+
+def test_no_file_imports_itself_through_others() -> None:
+    loads = {module: imports(module) & set(TREES) - {module} for module in TREES}
+    while loose := {module for module, needs in loads.items() if not needs & set(loads)}:
+        loads = {module: needs for module, needs in loads.items() if module not in loose}
+    assert not loads
 
 
 def test_what_runs_on_board_never_loads_what_belongs_to_the_desk() -> None:
     on_board = closure(ON_BOARD)
     assert "logger.dsp.sections" in on_board
     assert not {module for module in on_board if "scipy" in {name.split(".")[0] for name in imports(module)}}
-    assert not {module for module in on_board if module.split(".")[1] in {"report", "lab", "sysid", "studies", "demo"}}
+    assert not {module for module in on_board if module.startswith("logger.") and floor_of(module) in DESK}
+
+
+def test_a_service_that_logs_a_drive_has_loaded_nothing_of_the_desk(short_dump: Path, tmp_path: Path) -> None:
+    """In a process of its own: every module of the service, and a drive through the code that runs in the car."""
+    code = f"""
+import importlib, json, pkgutil, sys
+import logger.service
+from logger.commands.main import main
+for module in pkgutil.iter_modules(logger.service.__path__):
+    importlib.import_module("logger.service." + module.name)
+import logger.commands.run
+assert main(["replay", {str(short_dump)!r}, "--out", {str(tmp_path)!r}, "--json"]) == 0
+print(json.dumps(sorted(sys.modules)))
+"""
+    played = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = json.loads(played.stdout.splitlines()[-1])
+    assert "logger.service.start" in loaded
+    assert list(tmp_path.glob("*.csv"))
+    assert {"lab", "identification", "modal", "studies"} <= DESK
+    desk = {"scipy"} | {f"logger.{folder}" for folder in DESK - {"report"}}  # a replay ends with a summary
+    assert not [name for name in loaded if ".".join(name.split(".")[:2]) in desk or name.split(".")[0] in desk]
 
 
 @pytest.mark.parametrize("module", TREES)

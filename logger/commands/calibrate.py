@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.roads.calibration import Array, Line, Settings, SpeedCalibration
+    from logger.estimation.rms_calibration import Array, Line, Settings, SpeedCalibration
     from logger.vehicle.vehicle import Vehicle
 
 _MOST_PASSENGERS = 60
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog calibrate``."""
-    from logger.roads.calibration import loaded
+    from logger.estimation.rms_calibration import loaded
     from logger.service.chain import recorder_gain
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
@@ -94,7 +94,7 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _settings(args: argparse.Namespace) -> Settings:
-    from logger.roads.calibration import Settings
+    from logger.estimation.rms_calibration import Settings
     from logger.units import WINDOW_M
 
     try:
@@ -129,7 +129,7 @@ class Load:
 
 def answer(ask: Question, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
     """The stored calibration of this vehicle, or a new one, which is then stored. Says on stderr which it is."""
-    from logger.roads.calibration import calibrate
+    from logger.estimation.rms_calibration import calibrate
     from logger.store.calibration_file import find, fingerprint, keep, places
 
     kept_in, key = places(ask.path), fingerprint(vehicle, ask.gain, ask.settings)
@@ -187,7 +187,7 @@ def screen(
 ) -> list[str]:
     """The lines a person sees."""
     from logger.comfort.iso2631 import COMFORT_WORDS
-    from logger.roads.calibration import LEVELS_IRI
+    from logger.estimation.rms_calibration import LEVELS_IRI
     from logger.units import MPH_MPS
 
     limit_mps2 = next(lowest for lowest, word in COMFORT_WORDS if word == _COMFORT_WORD)

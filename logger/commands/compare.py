@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from logger.commands.lab_model import add_tolerance, check_model, check_out, deviation_of, paragraphs
 from logger.commands.lab_runs import lab_runs
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.lab.beside import Part

@@ -11,7 +11,7 @@ from zipfile import ZipFile
 from logger.commands.lab import STORY, say, silent, take, walk
 from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs, require_compiler
 from logger.errors import BadInput
-from logger.store.naming import naming
+from logger.files import naming
 
 if TYPE_CHECKING:
     from logger.lab.story import Story

@@ -29,7 +29,7 @@ from logger.commands.lab_model import (
     wipe,
 )
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.lab.verdict import Verdict

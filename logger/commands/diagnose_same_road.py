@@ -63,7 +63,7 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
     import numpy as np
 
     from logger.lab.prediction import Run
-    from logger.roads.track import Track
+    from logger.profiles.track import Track
     from logger.store.drive_file import DRIVE, read_drive
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:

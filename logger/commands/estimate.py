@@ -28,13 +28,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.estimation.limit import Limits
     from logger.estimation.road_profile import RoadProfile
     from logger.estimation.whole_drive import Windows
-    from logger.roads.track import Array, Track
+    from logger.profiles.track import Array, Track
     from logger.store.drive_file import Drive
     from logger.vehicle.vehicle import Vehicle
 
@@ -242,7 +242,7 @@ def _driven(track: Track, vehicle: Vehicle) -> Array:
 
 def _write_road(path: Path, result: Result) -> list[Path]:
     """The parts of the profile, each a file of its own; none where the readings do not make one."""
-    from logger.roads.track import Track
+    from logger.profiles.track import Track
     from logger.store.drive_file import write_profile
 
     files: list[Path] = []

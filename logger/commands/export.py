@@ -17,9 +17,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
+from logger.files import read_bounded
 from logger.printable import printable
 from logger.service.config import Config, find_config, load_config, load_pairing
-from logger.store.bounded import read_bounded
 from logger.store.export import ExportResult, Progress, export
 from logger.store.pairing import OFF, PAIRED_NAME, Pairing
 from logger.store.set_aside import is_taken

@@ -39,19 +39,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.identification.axle_response import AxleResponse
     from logger.identification.crossing import Drive
     from logger.identification.fit import Fit
     from logger.identification.noise import Noise
-    from logger.identification.parameters import Free
     from logger.identification.prediction import VehicleModel
     from logger.identification.record import Record
     from logger.identification.road_input import RoadInput
     from logger.identification.shared_road import RoadFit
     from logger.identification.verdict import NotIdentifiable
+    from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
 
 NOISES = ("auto", "white", "ar", "road")
@@ -274,8 +274,8 @@ def _drives(args: argparse.Namespace) -> list[Drive]:
 def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
-    from logger.identification.parameters import free
     from logger.identification.road_input import EACH, expanded, free_input, is_input, run_and_name
+    from logger.vehicle.named_parameters import free
 
     runs = len(args.runs)
     wanted = [name.strip() for name in args.free.split(",") if name.strip()]
@@ -355,7 +355,7 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
     import numpy as np
 
     from logger.identification.record import Record
-    from logger.roads.track import Track
+    from logger.profiles.track import Track
     from logger.store.drive_file import DRIVE, PROFILE, Run, read_drive, read_run
 
     folder = path.is_dir()

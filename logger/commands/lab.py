@@ -23,7 +23,7 @@ from logger.commands.diagnose import diagnosed
 from logger.commands.diagnose import lines as diagnosis_lines
 from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.modal.mode import FoundMode, ModalResult

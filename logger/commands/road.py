@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import naming, write_text
+from logger.files import naming, write_text
 
 if TYPE_CHECKING:
     from logger.roads.gd_iri import Expected

@@ -28,7 +28,7 @@ from logger.commands.lab_model import check_out
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
-    from logger.roads.track import Array, Track
+    from logger.profiles.track import Array, Track
     from logger.vehicle.compose import Car
     from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
@@ -268,7 +268,7 @@ def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[
 def _road(args: argparse.Namespace) -> Track:
     import numpy as np
 
-    from logger.roads.track import Track
+    from logger.profiles.track import Track
     from logger.store.drive_file import track_of
     from logger.store.profile_file import read_profile
 
@@ -279,8 +279,8 @@ def _with_obstacles(track: Track, wanted: list[str]) -> Track:
     """The road with its obstacles; sampled more densely, with straight lines, where they would fall between samples."""
     import numpy as np
 
+    from logger.profiles.track import Track
     from logger.roads.obstacles import OBSTACLES
-    from logger.roads.track import Track
 
     if not wanted:
         return track

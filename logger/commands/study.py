@@ -19,10 +19,11 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.naming import write_text
+from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.studies.study import Cell, Curves, Field, Result, Study, Table
+    from logger.chart_data import Curves, Field
+    from logger.studies.study import Cell, Result, Study, Table
 
 QUICK_SHARE = 0.1
 _WIDTH = 118
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     study = study_of(args.name, known)
     result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, _tell if sys.stderr.isatty() else _say_nothing))
     if args.out is not None:
-        from logger.studies.page import page
+        from logger.report.study_page import page
 
         write_text(args.out, page(study, result))
     if args.json:
@@ -123,7 +124,7 @@ def as_json(study: Study, result: Result) -> dict[str, Any]:
 
 
 def _figure(one: Curves | Field) -> dict[str, Any]:
-    from logger.studies.study import Field
+    from logger.chart_data import Field
 
     told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):

@@ -17,16 +17,16 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
-from logger.identification.parameters import changed, read
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import DRIVE, PROFILE, write_drive, write_profile
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
+from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.passage import Passage
 
 VEHICLE = "rav4-2009"

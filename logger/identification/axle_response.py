@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import Free, changed, read
 from logger.identification.prediction import car_of, change_of, recorder_gain
+from logger.vehicle.named_parameters import Free, changed, read
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

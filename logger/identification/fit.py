@@ -24,7 +24,6 @@ import numpy.typing as npt
 
 from logger.identification.low_pass import LowPass
 from logger.identification.noise import LEAST_SHARE, Autoregressive, Noise, White, Whitening
-from logger.identification.parameters import Free
 from logger.identification.prediction import Differentiable, Model
 from logger.identification.verdict import (
     NOTHING_BY_DIFFERENCES,
@@ -35,6 +34,7 @@ from logger.identification.verdict import (
     structural,
     unexplained,
 )
+from logger.vehicle.named_parameters import Free
 
 Array = npt.NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import Free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.road_input import RoadInput
+from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

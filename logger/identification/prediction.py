@@ -23,7 +23,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import AXLES, BOTH, Free, changed, read
 from logger.identification.record import Record
 from logger.identification.road_in_time import RoadInTime
 from logger.identification.road_input import (
@@ -36,6 +35,7 @@ from logger.identification.road_input import (
 )
 from logger.roads.iso8608 import displacement_psd
 from logger.vehicle.models import structure_of
+from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
 from logger.vehicle.simulate import recorder_taps
 from logger.vehicle.structure import Structure, body_acceleration_response, body_point
 from logger.vehicle.vehicle import Vehicle
@@ -74,9 +74,9 @@ class Differentiable(Model, Protocol):
 class VehicleModel:
     """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle`` and ``road``.
 
-    A free number is the car's (``parameters.names``) or the road's (``road_input``). The car comes to the first sample
-    of a record at the speed it has there, over the road that the track has there. ValueError for a name that neither
-    has a number of, or that sets what another one sets.
+    A free number is the car's (``named_parameters.names``) or the road's (``road_input``). The car comes to the first
+    sample of a record at the speed it has there, over the road that the track has there. ValueError for a name that
+    neither has a number of, or that sets what another one sets.
     """
 
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record],

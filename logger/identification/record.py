@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.track import Track
+from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
 

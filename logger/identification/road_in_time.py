@@ -15,7 +15,7 @@ import numpy.typing as npt
 from logger.identification.obstacles import ObstaclePath
 from logger.identification.record import Record
 from logger.identification.road_input import SPEED_SCALE, RoadInput
-from logger.roads.track import TirePath
+from logger.profiles.track import TirePath
 from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.identification.obstacles import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, Step
-from logger.identification.parameters import WEAKEST, Free
+from logger.vehicle.named_parameters import WEAKEST, Free
 
 SPEED_SCALE, EACH = "speed_scale", "each"
 _RUN = re.compile(r"run([1-9][0-9]*)\.(.+)")

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.parameters import Free
 from logger.identification.report import NORMAL_95
 from logger.identification.shared_road import GD_N0, NOISE, OFFSET, RoadFit
+from logger.vehicle.named_parameters import Free
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
 _MENTIONED = 0.7

@@ -35,9 +35,9 @@ import numpy.typing as npt
 from logger.identification.crossing import Crossing, Drive, Grid, grid_under
 from logger.identification.low_pass import LowPass
 from logger.identification.noise import RoadNoise
-from logger.identification.parameters import WEAKEST, Free
 from logger.identification.verdict import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
+from logger.vehicle.named_parameters import WEAKEST, Free
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import CheckFailed
-from logger.identification.parameters import WEAKEST
+from logger.vehicle.named_parameters import WEAKEST
 
 Array = npt.NDArray[np.float64]
 

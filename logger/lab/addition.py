@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import read
 from logger.lab.fitting import Problem, Slopes, State
 from logger.lab.settling import settled
 from logger.lab.spread import with_spread
 from logger.lab.wandering import aligned_anew, lying, moved_m, relaid
 from logger.vehicle.effect import Chosen
+from logger.vehicle.named_parameters import read
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

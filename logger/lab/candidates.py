@@ -15,7 +15,6 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import read
 from logger.lab.fitting import (
     Move,
     Problem,
@@ -33,6 +32,7 @@ from logger.lab.prediction import Run
 from logger.lab.settling import WORTH_ALIGNING, aligned, settled
 from logger.lab.wandering import far
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
+from logger.vehicle.named_parameters import read
 
 Array = npt.NDArray[np.float64]
 

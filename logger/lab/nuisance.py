@@ -15,8 +15,8 @@ from math import comb
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.parameters import changed, read, sized
 from logger.lab.prediction import Run
+from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.vehicle.compose import Car, Response, recorded, respond
 from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import FINE_RATE_HZ

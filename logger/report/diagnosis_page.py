@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
+from logger.chart_data import Curves, Line
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.unexplained import Shape
 from logger.lab.verdict import Verdict, floor_where_judged, looks_like, summary, table, untested
-from logger.report.document import bullets, document, grid, paragraphs, section, tiles
+from logger.report.charts import Steps, chart, steps_figure
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.html import EMPTY, Html
 from logger.report.lab_page import forces_section, spectra_section
-from logger.report.steps_figure import Steps, steps_figure
-from logger.studies.pictures import picture
-from logger.studies.study import Curves, Line
 
 _LEAST_SHARE = 0.01
 
 
-def page(found: Verdict, vehicle: str) -> str:
+def page(found: Verdict, vehicle: str) -> Html:
     """The diagnosis as one HTML document."""
     title = f"{vehicle}: which effect is missing"
     runs = found.diagnosis.problem.runs.runs
     return document(title, [
-        f"<h1>{escape(title)}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in runs))}</p>',
+        heading(title, ", ".join(run.name for run in runs)),
         _tiles(found), paragraphs(summary(found)), shape_sections(found),
         section("How the error fell", _steps(found.diagnosis)), section("All candidates", _candidates(found)),
         section("What these runs cannot tell", bullets(untested(found))),
@@ -35,16 +34,16 @@ def sources(found: Verdict) -> list[str]:
     return [f"{one.effect.name}: {one.effect.source}" for one in found.missing]
 
 
-def shape_sections(found: Verdict) -> str:
+def shape_sections(found: Verdict) -> Html:
     """What no candidate explains: sentences and pictures; nothing where nothing is unexplained."""
     if found.shape is None:
-        return ""
+        return EMPTY
     return (section("What no effect explains", bullets(looks_like(found)))
             + section("Where it sits", _where(found.shape)) + spectra_section(found.shape.beside)
             + _forces(found.shape))
 
 
-def _forces(shape: Shape) -> str:
+def _forces(shape: Shape) -> Html:
     """The missing force; a sentence where no force in the suspensions would do."""
     forces = shape.marks.forces
     if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
@@ -54,7 +53,7 @@ def _forces(shape: Shape) -> str:
     return forces_section(forces)
 
 
-def _tiles(found: Verdict) -> str:
+def _tiles(found: Verdict) -> Html:
     diagnosis = found.diagnosis
     floor, missing = diagnosis.noise_floor_error, len(diagnosis.verdict)
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
@@ -68,31 +67,31 @@ def _tiles(found: Verdict) -> str:
     ])
 
 
-def _steps(diagnosis: Diagnosis) -> str:
+def _steps(diagnosis: Diagnosis) -> Html:
     drawn = falling(f"Error on {diagnosis.judged_on}", [(step.words, step.error) for step in diagnosis.steps],
                     floor_where_judged(diagnosis))
     rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(diagnosis.steps)]
     return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
 
 
-def falling(title: str, steps: Sequence[tuple[str, float]], floor: float | None) -> str:
+def falling(title: str, steps: Sequence[tuple[str, float]], floor: float | None) -> Html:
     """The error of each step as a falling curve, down to the noise."""
     return steps_figure(Steps(title, "error", tuple(steps), None if floor is None else (floor, "noise alone")))
 
 
-def _candidates(found: Verdict) -> str:
+def _candidates(found: Verdict) -> Html:
     return (grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
-            + '<p class="hint">Each tried alone on the model of its round, those of the verdict first, then the least '
-            f"likely to be chance. The error is on {found.diagnosis.judged_on}; the chance holds for all candidates "
-            "together.</p>")
+            + hint("Each tried alone on the model of its round, those of the verdict first, then the least likely to "
+                   f"be chance. The error is on {found.diagnosis.judged_on}; the chance holds for all candidates "
+                   "together."))
 
 
-def _where(shape: Shape) -> str:
+def _where(shape: Shape) -> Html:
     """By frequency, and along the way."""
     rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_told(2))
             for part in shape.where.frequency]
     drawn = grid(("Band", "Hz", "Share of what is left", "Error"), rows)
     if shape.turns is not None and shape.turns.found:
-        drawn += picture(Curves(f"What repeats along the way, in {shape.turns.run}", "times per metre",
+        drawn += chart(Curves(f"What repeats along the way, in {shape.turns.run}", "times per metre",
                                 "power over its mean", (Line("what is left", shape.turns.per_m, shape.turns.power),)))
     return drawn

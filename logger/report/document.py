@@ -1,55 +1,66 @@
-"""An HTML page that stands alone: one style, no script, no network."""
+"""An HTML page that stands alone: one style, no script, no network. Every text is escaped (``logger.report.html``)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from html import escape
 
+from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.style import STYLE
-from logger.studies.pictures import STYLE as PICTURE_STYLE
 
+_RIGHT = Html(" class=n")
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def document(title: str, parts: Iterable[str]) -> str:
-    """The page of a title, which is escaped here, and of parts, which are HTML."""
-    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
-            f'<meta name="viewport" content="width=device-width,initial-scale=1">'
-            f'<meta name="color-scheme" content="light dark"><title>{escape(title)}</title>'
-            f"<style>{STYLE}{PICTURE_STYLE}</style></head>\n<body><main>{''.join(parts)}</main></body></html>\n")
+def document(title: str, parts: Iterable[str]) -> Html:
+    """The page of a title and of parts; those that are not HTML are shown as they are written."""
+    return html('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+                '<meta http-equiv="Content-Security-Policy" content="{}">'
+                '<meta name="viewport" content="width=device-width,initial-scale=1">'
+                '<meta name="color-scheme" content="light dark"><title>{}</title><style>{}</style></head>\n'
+                "<body><main>{}</main></body></html>\n", Html(_POLICY), title, Html(STYLE), concatenated(parts))
 
 
-def tiles(shown: Iterable[tuple[str, str, str]]) -> str:
+def heading(title: str, under: str) -> Html:
+    """The title of a page, and a line under it."""
+    return html('<h1>{}</h1><p class="sub">{}</p>', title, under)
+
+
+def tiles(shown: Iterable[tuple[str, str, str]]) -> Html:
     """Large figures: name, value, unit or a small word behind it."""
-    return '<dl class="tiles">' + "".join(
-        f"<div><dt>{escape(name)}</dt><dd>{escape(value)} <small>{escape(unit)}</small></dd></div>"
-        for name, value, unit in shown) + "</dl>"
+    return html('<dl class="tiles">{}</dl>', concatenated(
+        html("<div><dt>{}</dt><dd>{} <small>{}</small></dd></div>", *tile) for tile in shown))
 
 
-def section(title: str, body: str) -> str:
-    """A part under a heading; nothing without a body, which is HTML."""
-    return f"<section><h2>{escape(title)}</h2>{body}</section>" if body else ""
+def section(title: str, body: str) -> Html:
+    """A part under a heading; nothing without a body."""
+    return html("<section><h2>{}</h2>{}</section>", title, body) if body else EMPTY
 
 
-def paragraphs(lines: Iterable[str]) -> str:
+def paragraphs(lines: Iterable[str]) -> Html:
     """Text."""
-    return "".join(f"<p>{escape(line)}</p>" for line in lines)
+    return concatenated(html("<p>{}</p>", line) for line in lines)
 
 
-def bullets(lines: Iterable[str]) -> str:
+def hint(text: str) -> Html:
+    """A remark in small letters."""
+    return html('<p class="hint">{}</p>', text)
+
+
+def bullets(lines: Iterable[str], style: str = "") -> Html:
     """A list of sentences; nothing where there are none."""
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f"<ul>{items}</ul>" if items else ""
+    items = concatenated(html("<li>{}</li>", line) for line in lines)
+    start = html('<ul class="{}">', style) if style else Html("<ul>")
+    return start + items + Html("</ul>") if items else EMPTY
 
 
-def grid(heads: Iterable[str], rows: Iterable[Iterable[str]], words: Iterable[int] = (0,)) -> str:
+def grid(heads: Iterable[str], rows: Iterable[Iterable[str]], words: Iterable[int] = (0,)) -> Html:
     """A table; columns of the numbers ``words`` stand left, the others right."""
     left = set(words)
 
-    def cells(row: Iterable[str], tag: str) -> str:
-        return "".join(f"<{tag}{'' if index in left else ' class=n'}>{escape(cell)}</{tag}>"
-                       for index, cell in enumerate(row))
+    def cells(row: Iterable[str], tag: str) -> Html:
+        return concatenated(html("<{0}{1}>{2}</{0}>", Html(tag), EMPTY if index in left else _RIGHT, cell)
+                      for index, cell in enumerate(row))
 
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f'<div class="scroll"><table><tr>{cells(heads, "th")}</tr>{body}</table></div>'
+    body = concatenated(html("<tr>{}</tr>", cells(row, "td")) for row in rows)
+    return html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', cells(heads, "th"), body)
+

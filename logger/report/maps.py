@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from html import escape
 from math import cos, hypot, radians
 
 import numpy as np
 
 from logger.records import WindowRecord
-from logger.report.figures import WIDTH, nice_step, numbered_mark
+from logger.report.charts import WIDTH, nice_step, numbered_mark
+from logger.report.html import Html, concatenated, html
 from logger.report.summary import EARTH_RADIUS_M, Place, ground_distance_m, length_m
 
 _MARGIN = 46
@@ -36,24 +36,24 @@ class Colouring:
     style_of: Callable[[WindowRecord], str]
 
 
-def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], places: Sequence[Place]) -> str:
+def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], places: Sequence[Place]) -> Html:
     """The SVG element of the way; a sentence where no row has a position."""
     pieces = [piece for piece in joined(records) if piece]
     if not pieces:
-        return '<p class="empty">No row has a position, so there is no map.</p>'
+        return Html('<p class="empty">No row has a position, so there is no map.</p>')
     projection = _Projection.around([record for piece in pieces for record in piece])
     drawn = [(piece, [projection.xy(record) for record in piece]) for piece in pieces]
-    parts = [f'<svg class="map" viewBox="0 0 {WIDTH} {projection.height:.0f}" role="img" aria-label="Map of the way">']
-    parts.append(f'<path class="casing" d="{"".join(_path(points) for _, points in drawn)}"/>')
+    parts = [html('<path class="casing" d="{}"/>', "".join(_path(points) for _, points in drawn))]
     for colouring in colourings:
-        lines = "".join(_coloured(piece, points, colouring) for piece, points in drawn)
-        parts.append(f'<g class="track {escape(colouring.name)}">{lines}</g>')
+        lines = concatenated(_coloured(piece, points, colouring) for piece, points in drawn)
+        parts.append(html('<g class="track {}">{}</g>', colouring.name, lines))
     parts.append(_end(projection.xy(pieces[-1][-1]), "end", "End"))
     parts.append(_end(projection.xy(pieces[0][0]), "start", "Start"))
     parts += [numbered_mark(*projection.xy(place), str(number)) for number, place in enumerate(places, start=1)
               if place.lat_deg is not None and place.lon_deg is not None]
-    parts += [_scale_bar(projection), _north(), "</svg>"]
-    return "".join(parts)
+    parts += [_scale_bar(projection), _north()]
+    return html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the way">{}</svg>', WIDTH,
+                projection.height, concatenated(parts))
 
 
 def joined(records: Sequence[WindowRecord]) -> list[list[WindowRecord]]:
@@ -115,7 +115,7 @@ class _Projection:
                 self.height / 2 - (north_m - self.middle_m[1]) * self.units_per_m)
 
 
-def _coloured(piece: Sequence[WindowRecord], points: Sequence[Point], colouring: Colouring) -> str:
+def _coloured(piece: Sequence[WindowRecord], points: Sequence[Point], colouring: Colouring) -> Html:
     """Lines of one style each. A row reaches from half-way to the row before to half-way to the next."""
     styles = [colouring.style_of(record) for record in piece]
     lines = []
@@ -128,9 +128,9 @@ def _coloured(piece: Sequence[WindowRecord], points: Sequence[Point], colouring:
             run.insert(0, _half_way(points[start - 1], points[start]))
         if index < len(piece):
             run.append(_half_way(points[index - 1], points[index]))
-        lines.append(f'<path class="{escape(styles[start])}" d="{_path(run)}"/>')
+        lines.append(html('<path class="{}" d="{}"/>', styles[start], _path(run)))
         start = index
-    return "".join(lines)
+    return concatenated(lines)
 
 
 def _half_way(one: Point, other: Point) -> Point:
@@ -164,26 +164,26 @@ def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
     return [(float(x), float(y)) for x, y in xy[keep]]
 
 
-def _end(at: Point, name: str, text: str) -> str:
+def _end(at: Point, name: str, text: str) -> Html:
     """A disc for the start, a square for the end, each with its word."""
     x, y = at
-    shape = (f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>' if name == "start" else
-             f'<rect x="{x - 6.5:.1f}" y="{y - 6.5:.1f}" width="13" height="13" rx="2"/>')
+    shape = (html('<circle cx="{:.1f}" cy="{:.1f}" r="7"/>', x, y) if name == "start" else
+             html('<rect x="{:.1f}" y="{:.1f}" width="13" height="13" rx="2"/>', x - 6.5, y - 6.5))
     right = x < WIDTH - 80
-    return (f'<g class="{name}">{shape}<text x="{x + (12 if right else -12):.1f}" y="{y + 4.5:.1f}" '
-            f'text-anchor="{"start" if right else "end"}">{text}</text></g>')
+    return html('<g class="{}">{}<text x="{:.1f}" y="{:.1f}" text-anchor="{}">{}</text></g>', name, shape,
+                x + (12 if right else -12), y + 4.5, "start" if right else "end", text)
 
 
-def _scale_bar(projection: _Projection) -> str:
+def _scale_bar(projection: _Projection) -> Html:
     length_m = nice_step(90 / projection.units_per_m)
     width = length_m * projection.units_per_m
     text = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
     y = projection.height - 14
-    return (f'<g class="scale"><path d="M16 {y - 5:.1f}v5h{width:.1f}v-5"/>'
-            f'<text x="{16 + width / 2:.1f}" y="{y - 6:.1f}" text-anchor="middle">{text}</text></g>')
+    return html('<g class="scale"><path d="M16 {:.1f}v5h{:.1f}v-5"/><text x="{:.1f}" y="{:.1f}" '
+                'text-anchor="middle">{}</text></g>', y - 5, width, 16 + width / 2, y - 6, text)
 
 
-def _north() -> str:
+def _north() -> Html:
     x = WIDTH - 24
-    return (f'<g class="scale"><path d="M{x} 40V16m-5 8l5-8l5 8"/>'
-            f'<text x="{x}" y="54" text-anchor="middle">N</text></g>')
+    return html('<g class="scale"><path d="M{0} 40V16m-5 8l5-8l5 8"/><text x="{0}" y="54" text-anchor="middle">N</text>'
+                "</g>", x)

@@ -10,15 +10,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import accumulate
 from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.records import WindowRecord
-from logger.report.figures import Level, Plot, line_figure
+from logger.report.charts import Level, Plot, line_figure
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.maps import Colouring, track_map
-from logger.report.style import STYLE
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
@@ -45,6 +45,7 @@ MAX_TABLE_ROWS = 5000
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
 
+_A_W = Html("a<sub>w</sub> [m/s²]")
 _COMFORT_SHORT = {"fairly_uncomfortable": "fairly", "very_uncomfortable": "very", "extremely_uncomfortable": "extreme"}
 
 FLAG_MEANINGS: Mapping[str, str] = {
@@ -74,33 +75,26 @@ class LoggedFile:
     sidecar: Mapping[str, Any] | None
 
 
-def page(files: Sequence[LoggedFile]) -> str:
+def page(files: Sequence[LoggedFile]) -> Html:
     """The page of some log files, in order of their writing, as one HTML document."""
     records = [record for file in files for record in file.records]
     summary = summarise(records)
     drives = split_drives(records)
-    parts = [
+    return document(f"Road roughness, {date_words(summary)}", [
         _head(summary, files),
         _tiles(summary),
         _map_section(records, summary),
         _shares_section(summary),
         _places_section(summary.roughest),
-        _drives_section(drives) if len(drives) > 1 else "",
+        _drives_section(drives) if len(drives) > 1 else EMPTY,
         _plots_section(drives, summary),
         _notes_section(summary, files),
         _settings_section(files),
         _rows_section(records),
-    ]
-    title = escape(f"Road roughness, {date_words(summary)}")
-    policy = "default-src 'none'; style-src 'unsafe-inline'"
-    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
-            f'<meta name="viewport" content="width=device-width,initial-scale=1">'
-            f'<meta name="color-scheme" content="light dark"><title>{title}</title><style>{STYLE}</style></head>\n'
-            f'<body><main>{"".join(parts)}</main></body></html>\n')
+    ])
 
 
-def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
+def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
     sidecar = next((file.sidecar for file in files if file.sidecar), {})
     vehicle = _inside(sidecar, "vehicle", "name")
     version = _inside(sidecar, "ridelog_version")
@@ -108,98 +102,82 @@ def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
     words += [f"vehicle {vehicle}"] if vehicle else []
     words += [f"ridelog {version}"] if version else []
     what = "Road roughness of a drive" if summary.drives == 1 else f"Road roughness of {summary.drives} drives"
-    return f'<h1>{what}</h1><p class="sub">{escape(" · ".join(words))}</p>'
+    return heading(what, " · ".join(words))
 
 
-def _tiles(summary: DriveSummary) -> str:
-    tiles = [
+def _tiles(summary: DriveSummary) -> Html:
+    return tiles([
         ("Distance", distance_words(summary.distance_m), ""),
         ("Time", span_words(summary.duration_s), ""),
         ("Mean speed", _number(summary.mean_speed_mps, 0, 3.6), "km/h"),
         ("Mean roughness (IRI)", _number(summary.mean_iri_m_per_km, 1), "m/km"),
-        ("Comfort inside (a<sub>w</sub>)", _number(summary.a_w_mps2, 2), "m/s²"),
-    ]
-    return '<dl class="tiles">' + "".join(
-        f"<div><dt>{name}</dt><dd>{escape(value)} <small>{unit}</small></dd></div>" for name, value, unit in tiles
-    ) + "</dl>"
+        (Html("Comfort inside (a<sub>w</sub>)"), _number(summary.a_w_mps2, 2), "m/s²"),
+    ])
 
 
-def _map_section(records: Sequence[WindowRecord], summary: DriveSummary) -> str:
+def _map_section(records: Sequence[WindowRecord], summary: DriveSummary) -> Html:
     by_iri = Colouring("by-iri", lambda record: "s" + _rank(record.iri_class, tuple(IRI_CLASSES)))
     by_comfort = Colouring("by-comfort", lambda record: "s" + _rank(record.comfort, COMFORT_NAMES))
-    return (
-        '<section><h2>Map</h2><input class="pick" type="radio" name="pick" id="pick-iri" checked>'
+    return section("Map", html(
+        '<input class="pick" type="radio" name="pick" id="pick-iri" checked>'
         '<input class="pick" type="radio" name="pick" id="pick-comfort"><div class="switch">'
-        '<label for="pick-iri">Roughness</label><label for="pick-comfort">Comfort</label></div><div>'
-        f"{track_map(records, (by_iri, by_comfort), summary.roughest)}"
-        f'{_legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words)}'
-        f'{_legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words)}'
-        "</div></section>")
+        '<label for="pick-iri">Roughness</label><label for="pick-comfort">Comfort</label></div><div>{}{}{}</div>',
+        track_map(records, (by_iri, by_comfort), summary.roughest),
+        _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
+        _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words)))
 
 
-def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> str:
-    entries = "".join(f'<li><i class="f{_rank(share.name, names)}"></i>{escape(words_of(share.name))}</li>'
-                      for share in shares)
-    return f'<ul class="legend {name}">{entries}</ul>'
+def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
+    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', _rank(share.name, names), words_of(share.name))
+                     for share in shares)
+    return html('<ul class="legend {}">{}</ul>', name, entries)
 
 
-def _shares_section(summary: DriveSummary) -> str:
-    return ('<section class="columns">'
-            f'<div><h2>Road by IRI class</h2>{_shares(summary.iri_classes, tuple(IRI_CLASSES), class_words)}</div>'
-            f'<div><h2>Road by comfort</h2>{_shares(summary.comfort, COMFORT_NAMES, comfort_words)}</div></section>')
+def _shares_section(summary: DriveSummary) -> Html:
+    return html('<section class="columns"><div><h2>Road by IRI class</h2>{}</div><div><h2>Road by comfort</h2>{}</div>'
+                "</section>", _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
+                _shares(summary.comfort, COMFORT_NAMES, comfort_words))
 
 
-def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> str:
+def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
     if not shares:
-        return '<p class="empty">No distance was measured.</p>'
-    rows = "".join(
-        f'<tr><td>{escape(words_of(share.name))}</td><td class="bar"><span class="f{_rank(share.name, names)}" '
-        f'style="width:{share.share:.1%}"></span></td><td class="n">{share.share:.1%}</td>'
-        f'<td class="n">{distance_words(share.distance_m)}</td></tr>' for share in shares)
-    return f"<table>{rows}</table>"
+        return Html('<p class="empty">No distance was measured.</p>')
+    return html("<table>{}</table>", concatenated(
+        html('<tr><td>{0}</td><td class="bar"><span class="f{1}" style="width:{2:.1%}"></span></td>'
+             '<td class="n">{2:.1%}</td><td class="n">{3}</td></tr>', words_of(share.name),
+             _rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
 
 
-def _places_section(places: Sequence[Place]) -> str:
-    if not places:
-        return ""
-    rows = "".join(
-        f"<tr><td>{number}</td><td>{_geo(place)}</td><td class=n>{distance_words(place.along_m)}</td>"
-        f"<td>{_clock(place.utc_us)}</td><td class=n>{escape(iri_words(place))}</td>"
-        f"<td class=n>{_number(place.speed_mps, 0, 3.6)}</td><td class=n>{_number(place.a_w_mps2, 2)}</td>"
-        f"<td>{escape(comfort_words(place.comfort))}</td><td>{escape(' '.join(place.flags))}</td></tr>"
-        for number, place in enumerate(places, start=1))
-    return (
-        '<section><h2>Roughest places</h2><div class="scroll"><table><tr><th>#</th><th>Coordinates</th>'
-        "<th class=n>Along the way</th><th>Time (UTC)</th><th class=n>IRI [m/km]</th><th class=n>Speed [km/h]</th>"
-        f"<th class=n>a<sub>w</sub> [m/s²]</th><th>Comfort</th><th>Flags</th></tr>{rows}</table></div>"
-        '<p class="hint">Each the worst window within 50 m, with its standard error. A single window of some metres '
-        "is an estimate: visit a place before judging it.</p></section>")
+def _places_section(places: Sequence[Place]) -> Html:
+    rows = [(str(number), _geo(place), distance_words(place.along_m), _clock(place.utc_us), iri_words(place),
+             _number(place.speed_mps, 0, 3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
+             " ".join(place.flags)) for number, place in enumerate(places, start=1)]
+    if not rows:
+        return EMPTY
+    heads = ("#", "Coordinates", "Along the way", "Time (UTC)", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort", "Flags")
+    return section("Roughest places", grid(heads, rows, words=(0, 1, 3, 7, 8)) + hint(
+        "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
+        "visit a place before judging it."))
 
 
-def _geo(place: Place) -> str:
+def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    return f'<a href="geo:{place.lat_deg:.6f},{place.lon_deg:.6f}">{place_words(place)}</a>'
+    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg, place_words(place))
 
 
-def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> str:
-    rows = ""
-    for number, drive in enumerate(drives, start=1):
-        one = summarise(drive)
-        rows += (f"<tr><td>{number}</td><td>{escape(date_words(one))}</td>"
-                 f"<td class=n>{distance_words(one.distance_m)}</td><td class=n>{span_words(one.duration_s)}</td>"
-                 f"<td class=n>{_number(one.mean_iri_m_per_km, 1)}</td>"
-                 f"<td class=n>{_number(one.a_w_mps2, 2)}</td></tr>")
-    return ('<section><h2>Drives</h2><div class="scroll"><table><tr><th>#</th><th>When</th><th class=n>Distance</th>'
-            "<th class=n>Time</th><th class=n>Mean IRI [m/km]</th><th class=n>a<sub>w</sub> [m/s²]</th></tr>"
-            f"{rows}</table></div></section>")
+def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
+    rows = [(str(number), date_words(one), distance_words(one.distance_m), span_words(one.duration_s),
+             _number(one.mean_iri_m_per_km, 1), _number(one.a_w_mps2, 2))
+            for number, one in enumerate(map(summarise, drives), start=1)]
+    return section("Drives", grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
 
 
-def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSummary) -> str:
+def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSummary) -> Html:
     by_drive = [[record for record in drive if record.distance_end_m is not None] for drive in drives]
     measured = [record for drive in by_drive for record in drive]
     if not measured:
-        return ""
+        return EMPTY
     at_m = along_m(measured)
     breaks = list(accumulate(len(drive) for drive in by_drive))
     class_levels = [Level(limit, letter) for letter in IRI_CLASSES
@@ -214,69 +192,71 @@ def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSumma
         Plot("Speed", "km/h", at_m, [None if record.speed_mps is None else record.speed_mps * 3.6
                                      for record in measured], breaks=breaks),
     )
-    return ('<section><h2>Along the way</h2>' + "".join(line_figure(plot) for plot in plots)
-            + '<p class="hint">The shaded band is the estimate plus and minus one standard error; dotted lines are the '
-              "lower limits of the IRI classes, and of discomfort: fairly, very, extreme.</p></section>")
+    return section("Along the way", concatenated(map(line_figure, plots)) + hint(
+        "The shaded band is the estimate plus and minus one standard error; dotted lines are the lower limits of the "
+        "IRI classes, and of discomfort: fairly, very, extreme."))
 
 
-def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> str:
+def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
     notes = [_sensor_note(sidecar) for sidecar in _different(_inside(file.sidecar or {}, "sensor") for file in files)]
     missing = [file.name for file in files if file.sidecar is None]
     lost = [file.name for file in files if _inside(file.sidecar or {}, "settings_lost") is True]
     damaged = sum(file.damaged_lines for file in files)
     if missing:
-        notes.append(f'<span class="warn">Without their description (.json):</span> {escape(", ".join(missing[:20]))}')
+        notes.append(_warning("Without their description (.json):") + f" {', '.join(missing[:20])}")
     if lost:
-        names = escape(", ".join(lost[:20]))
-        notes.append(f'<span class="warn">Their settings were lost before a repair:</span> {names}')
+        notes.append(_warning("Their settings were lost before a repair:") + f" {', '.join(lost[:20])}")
     if damaged:
-        lines = "line was" if damaged == 1 else "lines were"
-        notes.append(f'<span class="warn">{damaged} damaged {lines} left out.</span>')
+        notes.append(_warning(f"{damaged} damaged {'line was' if damaged == 1 else 'lines were'} left out."))
     if summary.blind_s > 0:
         notes.append(f"{span_words(summary.blind_s)} without any speed are in no distance, no map and no plot.")
-    notes += [f"iri_m_per_km: {escape(str(meaning))}"
+    notes += [f"iri_m_per_km: {meaning}"
               for meaning in _different(_inside(file.sidecar or {}, "iri_m_per_km") for file in files)]
     notes.append(f"{summary.windows} windows from {len(files)} log file{'s' * (len(files) != 1)}")
-    flags = "".join(f"<tr><td>{escape(flag)}</td><td class=n>{count}</td><td class=n>{count / summary.windows:.1%}</td>"
-                    f"<td>{escape(FLAG_MEANINGS.get(flag, ''))}</td></tr>" for flag, count in summary.flags.items())
-    table = (f'<div class="scroll"><table><tr><th>Flag</th><th class=n>Windows</th><th class=n>Share</th><th>Meaning'
-             f"</th></tr>{flags}</table></div>" if flags else "<p>No window carries a flag.</p>")
-    items = "".join(f"<li>{note}</li>" for note in notes)
-    return f'<section><h2>How far to trust it</h2>{table}<ul class="notes">{items}</ul></section>'
+    rows = [(flag, str(count), f"{count / summary.windows:.1%}", FLAG_MEANINGS.get(flag, ""))
+            for flag, count in summary.flags.items()]
+    flags = (grid(("Flag", "Windows", "Share", "Meaning"), rows, words=(0, 3)) if rows
+             else paragraphs(["No window carries a flag."]))
+    return section("How far to trust it", flags + bullets(notes, style="notes"))
+
+
+def _warning(text: str) -> Html:
+    return html('<span class="warn">{}</span>', text)
 
 
 def _sensor_note(sensor: Any) -> str:
-    """A sentence on the accelerometer, as HTML."""
+    """A sentence on the accelerometer."""
     if not isinstance(sensor, Mapping):
-        return f"Sensor: {escape(str(sensor))}"
+        return f"Sensor: {sensor}"
     name = " ".join(str(sensor[key]) for key in ("driver", "profile", "profile_version") if key in sensor)
     if sensor.get("verified") is True:
-        return f"Sensor: {escape(name)}"
-    return (f'Sensor: {escape(name)}. <span class="warn">What its bytes mean is not verified on hardware: do not rely '
-            "on any value here.</span>")
+        return f"Sensor: {name}"
+    return f"Sensor: {name}. " + _warning("What its bytes mean is not verified on hardware: do not rely on any value "
+                                          "here.")
 
 
-def _settings_section(files: Sequence[LoggedFile]) -> str:
+def _settings_section(files: Sequence[LoggedFile]) -> Html:
     different = _different(
         {key: value for key, value in file.sidecar.items() if key not in ("log", "clock_map")}
         for file in files if file.sidecar)
     if not different:
-        return ""
+        return EMPTY
     texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:_MAX_SIDECARS]]
-    blocks = "".join(f"<pre>{escape(text[:_MAX_SIDECAR_CHARS])}</pre>" for text in texts)
-    return f"<details><summary>Settings, vehicle and versions</summary>{blocks}</details>"
+    blocks = concatenated(html("<pre>{}</pre>", text[:_MAX_SIDECAR_CHARS]) for text in texts)
+    return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 
-def _rows_section(records: Sequence[WindowRecord]) -> str:
+def _rows_section(records: Sequence[WindowRecord]) -> Html:
     """Every row, as a table that opens on demand. End tags that HTML lets one leave out are left out: it is long."""
     names = ("row", "time UTC", "from [m]", "lat", "lon", "km/h", "IRI", "±", "a_w", "MTVV", "VDV", "crest", "class",
              "comfort", "flags")
-    head = "".join(f"<th>{name}" for name in names)
-    rows = "".join("<tr>" + "".join(f"<td>{cell}" for cell in _cells(record)) for record in records[:MAX_TABLE_ROWS])
+    head = concatenated(html("<th>{}", name) for name in names)
+    rows = concatenated(concatenated([Html("<tr>"), *(html("<td>{}", cell) for cell in _cells(record))])
+                  for record in records[:MAX_TABLE_ROWS])
     rest = len(records) - MAX_TABLE_ROWS
-    more = f'<p class="hint">{rest} more rows are in the log files.</p>' if rest > 0 else ""
-    return (f'<details class="rows"><summary>All windows ({len(records)})</summary><div class="scroll">'
-            f"<table><tr>{head}{rows}</table></div>{more}</details>")
+    more = hint(f"{rest} more rows are in the log files.") if rest > 0 else EMPTY
+    return html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><tr>{}{}</table>'
+                "</div>{}</details>", len(records), head, rows, more)
 
 
 def _cells(record: WindowRecord) -> tuple[str, ...]:
@@ -284,8 +264,8 @@ def _cells(record: WindowRecord) -> tuple[str, ...]:
         str(record.segment), _clock(record.utc_us), _number(record.distance_start_m, 0), _number(record.lat_deg, 5),
         _number(record.lon_deg, 5), _number(record.speed_mps, 0, 3.6), _number(record.iri_m_per_km, 2),
         _number(record.iri_std_m_per_km, 2), _number(record.a_w_mps2, 3), _number(record.mtvv_mps2, 2),
-        _number(record.vdv_mps175, 2), _number(record.crest_factor, 1), escape(record.iri_class),
-        escape(comfort_words(record.comfort)), escape(" ".join(record.flags)))
+        _number(record.vdv_mps175, 2), _number(record.crest_factor, 1), record.iri_class,
+        comfort_words(record.comfort), " ".join(record.flags))
 
 
 def _rank(name: str, names: tuple[str, ...]) -> str:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.lab.beside import Beside, frequencies, segments, short_names
 from logger.lab.compare import evidence, headline
 from logger.lab.gained import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
 from logger.lab.marks import worst_places
 from logger.lab.story import Round, Story, ending
 from logger.lab.verdict import summary, untested
+from logger.report.charts import chart
 from logger.report.diagnosis_page import falling, shape_sections
-from logger.report.document import bullets, document, grid, paragraphs, section, tiles
-from logger.studies.pictures import picture
-from logger.studies.study import Curves, Line
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.html import EMPTY, Html, concatenated
 
 STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")
@@ -24,16 +23,16 @@ _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
 
 
-def page(story: Story) -> str:
+def page(story: Story) -> Html:
     """The story as one HTML document."""
     title = f"{story.first.vehicle}: from the first comparison to the last effect"
     runs = story.first.plain.beside.runs
     last = story.verdicts[-1]
     return document(title, [
-        f"<h1>{escape(title)}</h1>", f'<p class="sub">{escape(", ".join(run.name for run in runs))}</p>',
+        heading(title, ", ".join(run.name for run in runs)),
         _tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
         section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
-        section("What was missing", "".join(paragraphs(summary(one)) for one in story.verdicts)),
+        section("What was missing", concatenated(paragraphs(summary(one)) for one in story.verdicts)),
         *map(_added, story.rounds),
         section("Before and after", _spectra(story) + _place(story)) if story.rounds else "",
         section("What the car's numbers had been taken for", _moved(story)),
@@ -45,7 +44,7 @@ def page(story: Story) -> str:
     ])
 
 
-def _tiles(story: Story) -> str:
+def _tiles(story: Story) -> Html:
     return tiles([
         ("Error as the file says", f"{story.steps[0][1]:.3f}", "as recorded"),
         ("Error at last", f"{story.steps[-1][1]:.3f}", "refitted"),
@@ -54,27 +53,26 @@ def _tiles(story: Story) -> str:
     ])
 
 
-def _steps(story: Story) -> str:
+def _steps(story: Story) -> Html:
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(story.steps)]
     return (falling("Error of each model, on all samples", story.steps, story.floor)
-            + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + f'<p class="hint">{escape(STEPS_HINT)}</p>')
+            + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + hint(STEPS_HINT))
 
 
-def _added(one: Round) -> str:
+def _added(one: Round) -> Html:
     effects = [f"It leaves: {new.effect.signature}." for new in one.gained.new]
     rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.gained)]
     return section(f"Added: {' and '.join(one.gained.names)}", paragraphs(
         [*judgement(one.gained), *effects, f"Written to {one.file}."]) + grid(("Error", "", "of"), rows, words=(0, 2)))
 
 
-def _moved(story: Story) -> str:
+def _moved(story: Story) -> Html:
     if not story.moved:
-        return ""
-    return (grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5))
-            + f'<p class="hint">{escape(MOVED_HINT)}</p>')
+        return EMPTY
+    return grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5)) + hint(MOVED_HINT)
 
 
-def _spectra(story: Story) -> str:
+def _spectra(story: Story) -> Html:
     """What was left before and after, by frequency."""
     before, after = story.first.refitted.beside, story.last.refitted.beside
     f_hz = frequencies(before)
@@ -84,11 +82,11 @@ def _spectra(story: Story) -> str:
         power = np.mean(np.abs(segments(beside, beside.measured if measured else beside.left)) ** 2, axis=0) / f_hz[1]
         return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
 
-    return picture(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", (
+    return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", (
         line("measured", before, True), line("left at first", before, False), line("left at last", after, False))))
 
 
-def _place(story: Story) -> str:
+def _place(story: Story) -> Html:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
     worst = worst_places(before.where, 1)[0]
@@ -104,5 +102,5 @@ def _place(story: Story) -> str:
     name = short_names(beside.runs)[run.name]
     lines = (Line("measured", time_s, beside.measured[index][part]),
              Line("left at first", time_s, left[part]), Line("left at last", time_s, after.beside.left[index][part]))
-    return picture(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
+    return chart(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
                           "acceleration [m/s2]", lines))

@@ -64,6 +64,8 @@ figcaption .unit{font-weight:400}
 .grid{stroke:var(--faint);stroke-width:1}
 .level{stroke:var(--line);stroke-dasharray:2 4}
 .line{fill:none;stroke:var(--ink);stroke-width:1;stroke-linejoin:round;stroke-linecap:round}
+.thick{fill:none;stroke-width:2;stroke-linejoin:round}.spread{stroke:none;fill:var(--c1);fill-opacity:.3}
+.cell{fill:var(--c0)}
 .band{fill:var(--c1);fill-opacity:.55}
 .columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,1fr));gap:0 48px}
 .scroll{overflow-x:auto}

@@ -29,6 +29,9 @@ STANDARD_WAVINESS = 2.0
 # Geometric mean degree of roughness of each class [cm3] (ISO 8608; Table 2.2 of Blum 2015).
 CLASS_GD_N0_CM3 = dict(zip("ABCDEFGH", (16.0 * 4.0**index for index in range(8)), strict=True))
 
+# Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
+_CLASS_LIMITS_IRI = ((3.05, "B"), (6.09, "C"), (12.19, "D"), (24.37, "E"), (48.74, "F"), (97.48, "G"), (194.96, "H"))
+
 IRI_PER_ROOT_GD = 0.5386
 
 
@@ -47,6 +50,15 @@ def road_class(gd_n0_cm3: float) -> str:
     letter = "A"
     for rougher, geometric_mean in CLASS_GD_N0_CM3.items():
         if gd_n0_cm3 >= geometric_mean / 2:
+            letter = rougher
+    return letter
+
+
+def iri_class(iri_m_per_km: float) -> str:
+    """ISO 8608 letter of a road with this IRI [m/km], after Table 4.3; a limit belongs to the rougher class."""
+    letter = "A"
+    for limit, rougher in _CLASS_LIMITS_IRI:
+        if iri_m_per_km >= limit:
             letter = rougher
     return letter
 

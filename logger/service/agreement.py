@@ -28,7 +28,7 @@ import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
 from logger.records import WindowRecord
-from logger.roads.from_acceleration import iri_class
+from logger.roads.iso8608 import iri_class
 from logger.service.pipeline import longest_wait_us
 from logger.store.rotation import LogName
 from logger.store.segment_log import read_log

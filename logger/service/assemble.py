@@ -17,9 +17,9 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
+from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor import Sensor
 from logger.estimation.stream import RoadEstimator
-from logger.roads.from_acceleration import rms_relation
 from logger.service.chain import Axis, SignalChain, recorder_gain
 from logger.service.config import AXES, AccelerometerConfig, Config
 from logger.service.core import AccelerationDecoder

@@ -16,9 +16,10 @@ import numpy as np
 from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
+from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.stream import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
-from logger.roads.from_acceleration import RmsRelation, iri_class
+from logger.roads.iso8608 import iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain
 from logger.service.odometer import Odometer
 from logger.service.roughness import RoughnessQueue, Waiting

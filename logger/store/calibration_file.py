@@ -22,9 +22,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.roads.calibration import METHOD, Line, Settings, SpeedCalibration
+from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalibration
+from logger.files import read_bounded
 from logger.shipped import shipped
-from logger.store.bounded import read_bounded
 from logger.store.checksum import json_sha256
 from logger.vehicle.vehicle import Vehicle
 

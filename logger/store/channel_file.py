@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.store.bounded import read_bounded
+from logger.files import read_bounded
 from logger.store.number_table import parse_columns
 from logger.store.record_file import MAX_BYTES, TIME, even_rate_hz
 

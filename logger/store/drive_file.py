@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.roads.track import Track
-from logger.store.bounded import read_bounded
-from logger.store.naming import naming
+from logger.files import naming, read_bounded
+from logger.profiles.track import Track
 from logger.store.number_table import parse_columns
 from logger.store.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.profile_file import Profile, read_profile

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.store.bounded import read_bounded
+from logger.files import read_bounded
 from logger.store.number_table import refuse_long_lines, shown
 from logger.units import FOOT_M
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.store.bounded import read_bounded
+from logger.files import read_bounded
 from logger.store.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
 from logger.store.number_table import parse_columns
 

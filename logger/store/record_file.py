@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.store.bounded import read_bounded
+from logger.files import read_bounded
 from logger.store.number_table import parse_columns
 
 Array = npt.NDArray[np.float64]

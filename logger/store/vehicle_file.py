@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import yaml
 
 from logger.errors import BadInput
-from logger.identification.parameters import changed, read, sized
-from logger.store.naming import write_text
+from logger.files import write_text
 from logger.store.yaml_lines import Node, load_mapping
+from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
 if TYPE_CHECKING:

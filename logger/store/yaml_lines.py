@@ -19,7 +19,7 @@ import yaml
 from drivers.errors import shortened
 from drivers.plain_yaml import NotPlainError, compose_plain
 from logger.errors import BadInput
-from logger.store.bounded import read_bounded
+from logger.files import read_bounded
 
 MAX_BYTES = 256 * 1024
 

@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.record import Record
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import gd_n0_from_iri, generate
 from logger.roads.obstacles import step
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from logger.identification.fit import Fit, Options, fit
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacles import Bump
-from logger.identification.parameters import free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.road_input import SPEED_SCALE, RoadInput, free_input, is_input
 from logger.studies.drives import RATE_HZ, rav4
+from logger.vehicle.named_parameters import free
 
 MASS = "sprung_mass_kg"
 FRONT, REAR = "front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m"

@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from logger.chart_data import Chart
 from logger.errors import BadInput
 from logger.plugins import catalogue
 
@@ -80,52 +81,13 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
-    """Points (n,) of a picture, joined unless they are ``dots``; ``errors`` (n,): standard errors, drawn as a band."""
-
-    name: str
-    x: Array
-    y: Array
-    errors: Array | None = None
-    dots: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """A picture of lines; ``level``: a value that has a name, drawn across."""
-
-    title: str
-    x_name: str
-    y_name: str
-    lines: tuple[Line, ...]
-    level: tuple[float, str] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """A picture of values (len(y), len(x)) over a grid, as shades from 0 to ``top``; what lies above is drawn as it."""
-
-    title: str
-    x_name: str
-    y_name: str
-    x: Array
-    y: Array
-    values: Array
-    value_name: str
-    top: float
-
-
-Picture = Curves | Field
-
-
 @dataclass(frozen=True)
 class Result:
     """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures."""
 
     tables: tuple[Table, ...]
     verdict: str
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[Chart, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure
 

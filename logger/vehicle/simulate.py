@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.vehicle.state_space import driven_outputs, straight_step
 from logger.vehicle.structure import Output, Structure
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, Settings, SpeedCalibration, calibrate, loaded
+from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
-from logger.roads.calibration import LEVELS_IRI, SPEEDS_MPS, Settings, SpeedCalibration, calibrate, loaded
-from logger.roads.from_acceleration import rms_relation
 from logger.roads.gd_iri import iri_per_root_gd
 from logger.service.chain import recorder_gain
 from logger.shipped import vehicle_file, vehicle_names

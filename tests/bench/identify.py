@@ -22,18 +22,18 @@ from logger.identification.crossing import Drive
 from logger.identification.fit import Fit, Options, fit
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacles import Bump
-from logger.identification.parameters import changed, free, names
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.road_input import RoadInput, expanded, free_input, is_input
 from logger.identification.shared_road import fit_roads
 from logger.identification.verdict import NotIdentifiable
+from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
 from logger.vehicle.models import structure_of
+from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 

@@ -14,8 +14,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import write_drive, write_profile
 from logger.store.effect_file import shipped_effects

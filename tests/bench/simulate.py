@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.obstacles import pothole, step
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle

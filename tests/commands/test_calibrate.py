@@ -10,8 +10,8 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.roads import calibration
-from logger.roads.calibration import SPEEDS_MPS
+from logger.estimation import rms_calibration
+from logger.estimation.rms_calibration import SPEEDS_MPS
 from logger.service.chain import recorder_gain
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
@@ -47,11 +47,11 @@ def forbid_computing(monkeypatch: pytest.MonkeyPatch) -> None:
     def computed(*_: object) -> None:
         raise AssertionError("computed again")
 
-    monkeypatch.setattr(calibration, "calibrate", computed)
+    monkeypatch.setattr(rms_calibration, "calibrate", computed)
 
 
 def test_json_is_the_contract_and_the_service_s_relation(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from logger.roads.from_acceleration import rms_relation
+    from logger.estimation.rms_relation import rms_relation
 
     result = Call(capsys, car, "--json").json()
     assert list(result)[:2] == ["vehicle", "speeds"]

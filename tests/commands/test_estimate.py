@@ -14,9 +14,9 @@ import pytest
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.estimation.road_profile import band_passed
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import iri
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import write_profile
 from logger.store.profile_file import read_profile

@@ -15,7 +15,7 @@ from logger.commands.lab_model import check_out
 from logger.commands.lab_runs import lab_runs
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import read_run, write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle

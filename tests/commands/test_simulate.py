@@ -12,9 +12,9 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.drive_file import Run, read_run, write_profile
 from logger.store.effect_file import shipped_effects

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from logger.estimation.sensor import Sensor
 from logger.estimation.stream import LAG_S, RoadEstimator, RoadPiece, WindowEstimate
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of

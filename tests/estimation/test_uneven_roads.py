@@ -7,10 +7,10 @@ import pytest
 
 from logger.estimation.sensor import Sensor
 from logger.estimation.stream import RoadEstimator, WindowEstimate
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.iri import rectified_slope, window_iri
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from statistics import median
 
 from logger.report.document import document, grid, paragraphs, section
+from logger.report.html import Html, html
 
 from cases import WRONG_FOR_S, WRONG_MPS
 from effects import EFFECTS
@@ -307,8 +307,9 @@ def page(records: Sequence[Record], asked: int) -> str:
     first, *rest = parts(records)
     matrix = Matrix.of(records)
     return document(TITLE, [
-        f"<h1>{escape(TITLE)}</h1>", paragraphs(map(_plain, opening(records, asked))), _on_page(first),
-        section("Confusion matrix", paragraphs(map(_plain, _MATRIX_LINES)) + f"<figure>{matrix.figure}</figure>"),
+        html("<h1>{}</h1>", TITLE), paragraphs(map(_plain, opening(records, asked))), _on_page(first),
+        section("Confusion matrix",
+                paragraphs(map(_plain, _MATRIX_LINES)) + html("<figure>{}</figure>", Html(matrix.figure))),
         *map(_on_page, rest)])
 
 

@@ -9,15 +9,15 @@ from logger.identification.common_roughness import CommonRoughness, may_have_com
 from logger.identification.fit import Options, fit
 from logger.identification.noise import RoadNoise
 from logger.identification.obstacles import Bump
-from logger.identification.parameters import free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.report import common_words
 from logger.identification.road_input import RoadInput, expanded, free_input
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.studies.drives import RATE_HZ, rav4, recorded
+from logger.vehicle.named_parameters import free
 
 CAR, MASS, SPACING_M = rav4(), "sprung_mass_kg", 0.05
 FLAT = Track(1.0, np.zeros(2))

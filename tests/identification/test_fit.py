@@ -10,12 +10,12 @@ from scipy.signal import lfilter
 
 from logger.identification.fit import Fit, Options, fit, normalised_error, spread_starts
 from logger.identification.noise import Autoregressive, RoadNoise, White
-from logger.identification.parameters import Free, changed, free
 from logger.identification.prediction import VehicleModel
 from logger.identification.verdict import UNEXPLAINED, NotIdentifiable
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
+from logger.vehicle.named_parameters import Free, changed, free
 
 from bump_drives import bump_record, road_record
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from logger.identification.obstacles import Bump, Obstacle, ObstaclePath, Step
-from logger.roads.track import Track
+from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
 

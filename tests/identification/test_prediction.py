@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.parameters import changed, free, names
 from logger.identification.prediction import Record, VehicleModel
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
+from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from bump_drives import bump_record, road_record

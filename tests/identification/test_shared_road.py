@@ -10,14 +10,14 @@ import pytest
 
 from logger.identification.axle_response import AxleResponse
 from logger.identification.crossing import Crossing, Drive, grid_under
-from logger.identification.parameters import changed, free
 from logger.identification.shared_road import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
 from logger.identification.verdict import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
+from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
+from logger.vehicle.named_parameters import changed, free
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 Array = npt.NDArray[np.float64]

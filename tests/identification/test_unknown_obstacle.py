@@ -12,7 +12,6 @@ from logger.identification.fit import Fit, Options, fit
 from logger.identification.locate import located
 from logger.identification.noise import White
 from logger.identification.obstacles import Bump, Step
-from logger.identification.parameters import free
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record
 from logger.identification.road_input import (
@@ -26,11 +25,12 @@ from logger.identification.road_input import (
     run_and_name,
 )
 from logger.identification.verdict import WEAK, NotIdentifiable
+from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
+from logger.vehicle.named_parameters import free
 from logger.vehicle.vehicle import Vehicle
 
 from bump_drives import bump_record

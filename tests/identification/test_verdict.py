@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from logger.identification.fit import Options, fit
-from logger.identification.parameters import changed, free, names
 from logger.identification.prediction import Record, VehicleModel
 from logger.identification.verdict import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from bump_drives import bump_record, road_record

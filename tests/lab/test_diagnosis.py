@@ -11,7 +11,7 @@ from logger.lab.noise import UNEXPLAINED, Noise
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import Cells
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.identification.parameters import read
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
 from logger.lab.fitting import Problem, located, moves_of, steps_apart, steps_of
@@ -20,6 +19,7 @@ from logger.store.drive_file import read_run
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.named_parameters import read
 from logger.vehicle.vehicle import Vehicle
 
 EXAMINATION = Path(__file__).parents[1] / "examination"

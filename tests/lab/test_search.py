@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.parameters import changed, read
 from logger.lab import candidates, diagnosis
 from logger.lab.addition import add
 from logger.lab.candidates import Base, misalignment, screened
@@ -19,6 +18,7 @@ from logger.lab.verdict import as_json, told
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.vehicle import Vehicle
 
 from compared import CAR, a_run, measuring

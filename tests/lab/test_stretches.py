@@ -7,7 +7,7 @@ from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
 from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance, unseen_in
-from logger.roads.track import Track
+from logger.profiles.track import Track
 
 from compared import CAR, a_run, measuring
 

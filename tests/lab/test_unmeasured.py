@@ -17,8 +17,8 @@ from logger.lab.prediction import Run
 from logger.lab.unmeasured import NotOneRoad, SameRoad, State, trials
 from logger.lab.unmeasured import fitted as fit
 from logger.lab.unmeasured_diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
+from logger.profiles.track import Track
 from logger.roads.iso8608 import CM3_M3, generate
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle

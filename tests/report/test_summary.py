@@ -14,7 +14,7 @@ from logger.report.summary import (
     summarise,
     summary_json,
 )
-from logger.roads.from_acceleration import iri_class
+from logger.roads.iso8608 import iri_class
 
 
 def test_lengths_weigh_and_not_rows(drive) -> None:

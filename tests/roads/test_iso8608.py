@@ -110,3 +110,9 @@ def test_generated_roads_have_the_iri_asked_for(iri_m_per_km: float) -> None:
     """Fig 4.18: exact IRI against the one the road was made for; 1.5 % covers the printed coefficient and chance."""
     road = iso8608.generate(iso8608.gd_n0_from_iri(iri_m_per_km), 20_000, 0.25 / 5, 2)
     assert iri(road, 0.25 / 5) == pytest.approx(iri_m_per_km, rel=0.015)
+
+
+def test_classes_of_table_4_3() -> None:
+    expected = {0.0: "A", 3.04: "A", 3.05: "B", 6.08: "B", 6.09: "C", 12.18: "C", 12.19: "D", 24.36: "D", 24.37: "E",
+                48.74: "F", 97.48: "G", 194.96: "H", 1e6: "H"}
+    assert {iri: iso8608.iri_class(iri) for iri in expected} == expected

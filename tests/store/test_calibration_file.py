@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.roads import calibration
-from logger.roads.calibration import Line, Settings, SpeedCalibration
+from logger.estimation import rms_calibration
+from logger.estimation.rms_calibration import Line, Settings, SpeedCalibration
 from logger.shipped import shipped, vehicle_file
 from logger.store import calibration_file
 from logger.store.calibration_file import KEPT, MAX_BYTES, find, fingerprint, keep, places
@@ -117,7 +117,7 @@ def test_a_fingerprint_of_every_number(monkeypatch: pytest.MonkeyPatch) -> None:
         fingerprint(RAV4, half, Settings(roads=121)),
         fingerprint(RAV4, half, Settings((10.0,))),
     ]
-    monkeypatch.setattr(calibration_file, "METHOD", calibration.METHOD + 1)
+    monkeypatch.setattr(calibration_file, "METHOD", rms_calibration.METHOD + 1)
     keys.append(fingerprint(RAV4, half, Settings()))
     assert len(set(keys)) == len(keys)
     monkeypatch.undo()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from logger.errors import BadInput
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.store.drive_file import read_run, read_speeds, write_drive, write_profile
 
 HEADER = "t_s,accel_z_mps2,speed_mps,distance_m"

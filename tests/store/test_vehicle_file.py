@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
-from logger.identification.parameters import changed
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import Model, Step, read_model, read_vehicle, write_model, write_vehicle
@@ -18,6 +17,7 @@ from logger.store.yaml_lines import MAX_BYTES, parse_mapping
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import MODELS, structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.named_parameters import changed
 from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle
 
 TEXT = vehicle_file("rav4-2009").read_text("utf-8")

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from logger.errors import BadInput
-from logger.studies.page import page
+from logger.report.study_page import page
 from logger.studies.study import Effort, studies, study_of
 
 STUDIES = studies()

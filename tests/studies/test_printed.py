@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from logger.chart_data import Field
 from logger.modal import five_storey
 from logger.studies.dissertation import (
     table_4_3,
@@ -17,7 +18,7 @@ from logger.studies.dissertation import (
     table_6_3,
 )
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of, until, without_profile
-from logger.studies.study import Effort, Field, studies
+from logger.studies.study import Effort, studies
 
 STUDIES = studies()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from logger.identification.record import Record
+from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
-from logger.roads.track import Track
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, Conditions, bump, record_of, recorded
 from logger.vehicle.vehicle import Vehicle
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from logger.lab.beside import Beside
 from logger.lab.prediction import Run, Runs
-from logger.roads.track import Track
+from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose

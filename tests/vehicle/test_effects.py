@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
+from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.effect_file import check_on, shipped_effects
 from logger.store.vehicle_file import read_vehicle

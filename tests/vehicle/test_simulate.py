@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.obstacles import pothole, step
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
-from logger.roads.track import Track
 from logger.shipped import vehicle_file
 from logger.store.effect_file import own_effect, shipped_effects
 from logger.store.vehicle_file import read_vehicle

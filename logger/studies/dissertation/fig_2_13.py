@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.roads.wavelength import slope_gain
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 PRINTED_PEAKS_CPM = (0.065, 0.42)
 _BETWEEN_CPM = 0.2

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of, until
 from logger.studies.fitting import MASS, TRUTH, fitted
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 WINDOWS_M = tuple(float(end) for end in range(5, 101, 5))
 _BUMP_AT_M = 1.0

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 from logger.units import STANDARD_GRAVITY_MPS2
 
 HEIGHTS_M = (0.1016, 0.1270, 0.1524, 0.1778, 0.2032)

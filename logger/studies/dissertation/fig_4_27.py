@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from logger.chart_data import Field
 from logger.identification.obstacles import Bump
 from logger.identification.record import Record
 from logger.identification.road_input import RoadInput
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump
-from logger.studies.study import Column, Effort, Field, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 HEIGHTS_M = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())
 WIDTHS_M = tuple(round(0.3048 * feet, 3) for feet in np.arange(6, 11.01, 0.5).tolist())

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.identification.obstacles import Step
 from logger.identification.record import Record
 from logger.identification.road_input import RoadInput
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, fitted
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 HEIGHTS_M = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
 _STEP_AT_M, _SECONDS = 20.0, 6.0

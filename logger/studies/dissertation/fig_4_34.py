@@ -4,10 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.studies.drives import BRIDGE_MPS, RATE_HZ, STEP_M, Array, Conditions, bridge, record_of
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 PRINTED_PEAK_MPS2 = 1.5
 SECTIONS_M = (1.0, 10.0)

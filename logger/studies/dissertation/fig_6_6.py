@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from logger.roads.calibration import PASSENGER_KG, Settings, calibrate, loaded
-from logger.roads.from_acceleration import rms_relation
+from logger.chart_data import Curves, Line
+from logger.estimation.rms_calibration import PASSENGER_KG, Settings, calibrate, loaded
+from logger.estimation.rms_relation import rms_relation
 from logger.studies.drives import rav4
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 from logger.units import MPH_MPS
 
 SPEEDS_MPH = tuple(range(10, 71, 10))

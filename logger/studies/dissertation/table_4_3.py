@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD, generate
-from logger.studies.study import Column, Curves, Effort, Line, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table
 
 PRINTED = (("A", 32.0, 3.05), ("B", 128.0, 6.09), ("C", 512.0, 12.19), ("D", 2048.0, 24.37))
 _ROADS, _LENGTH_M, _SPACING_M = 60, 1000.0, 0.05

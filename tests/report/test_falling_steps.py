@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from logger.report.steps_figure import Steps, steps_figure
+from logger.report.charts import Steps, steps_figure
 
 
 def test_points_fall_with_their_values_to_the_level() -> None:

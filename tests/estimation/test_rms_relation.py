@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.roads import iso8608
-from logger.roads.from_acceleration import RmsRelation, iri_class, rms_relation
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle import half_car
@@ -70,9 +70,3 @@ def test_relation_is_quick_and_covers_3_to_45_mps() -> None:
     coarse = relation.iri(np.ones(len(fine.speeds_mps)), fine.speeds_mps)
     assert coarse == pytest.approx(fine.iri_per_accel_rms, rel=0.012)
     assert rms_relation(GOLDEN_CAR).iri(1.0, 20.0) > 0
-
-
-def test_classes_of_table_4_3() -> None:
-    expected = {0.0: "A", 3.04: "A", 3.05: "B", 6.08: "B", 6.09: "C", 12.18: "C", 12.19: "D", 24.36: "D", 24.37: "E",
-                48.74: "F", 97.48: "G", 194.96: "H", 1e6: "H"}
-    assert {iri: iri_class(iri) for iri in expected} == expected

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 
-from logger.roads.track import TirePath, Track
+from logger.profiles.track import TirePath, Track
 
 START_M = 3.0
 ROADS = st.tuples(

@@ -12,7 +12,7 @@ ISO 8608; with IRI = 0.5386 Gd(n0)^0.5 (Eq 4.39) that is the ratio.
 
 The ratio is right on the average of a long road of that shape. One window of 7.62 m is a short look: at 31 m/s it lasts
 a quarter of a second, less than one swing of the body, and the estimate scatters by a fifth to a third about the exact
-IRI. ``logger.estimation`` does better.
+IRI. ``estimation.stream`` does better.
 """
 
 from __future__ import annotations
@@ -34,9 +34,6 @@ Array = npt.NDArray[np.float64]
 SPEEDS_MPS = (*np.arange(3.0, 6.0, 0.25).tolist(), *np.arange(6.0, 46.0).tolist())
 
 _WAVE_NUMBERS = 400  # log-spaced; 5000 of them change no ratio by more than 0.01 %
-
-# Lower limits of IRI [m/km] of classes B to E (Table 4.3), then doubling as the degree of roughness quadruples.
-_CLASS_LIMITS = ((3.05, "B"), (6.09, "C"), (12.19, "D"), (24.37, "E"), (48.74, "F"), (97.48, "G"), (194.96, "H"))
 
 
 @dataclass(frozen=True)
@@ -83,12 +80,3 @@ def rms_relation(
     trapezoid[[0, -1]] *= 0.5
     accel_rms = np.sqrt(gain**2 @ (iso8608.displacement_psd(wave_number, 1.0) * trapezoid))
     return RmsRelation(speeds, iso8608.iri_from_gd_n0(1.0) / accel_rms)
-
-
-def iri_class(iri_m_per_km: float) -> str:
-    """ISO 8608 letter of a road with this IRI [m/km], after Table 4.3; a limit belongs to the rougher class."""
-    letter = "A"
-    for limit, rougher in _CLASS_LIMITS:
-        if iri_m_per_km >= limit:
-            letter = rougher
-    return letter

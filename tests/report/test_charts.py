@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.report.figures import MAX_POINTS, Level, Plot, line_figure, nice_step, nice_ticks
+from logger.report.charts import MAX_POINTS, Level, Plot, line_figure, nice_step, nice_ticks
 
 
 def paths(figure: str, name: str) -> list[list[tuple[float, float]]]:
@@ -64,7 +64,7 @@ def test_any_plot_is_well_formed(plot: Plot) -> None:
 
 @given(st.floats(1e-6, 1e9), st.integers(3, 10))
 def test_ticks_are_round_and_within(end: float, about: int) -> None:
-    ticks = nice_ticks(end, about)
+    ticks = nice_ticks(0.0, end, about)
     assert ticks[0] == 0.0
     assert ticks[-1] <= end * (1 + 1e-9)
     assert 1 < len(ticks) <= about + 1

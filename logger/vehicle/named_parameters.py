@@ -1,4 +1,4 @@
-"""The numbers of a vehicle that a fit may change, by the names that its file gives them.
+"""The numbers of a vehicle by the names that its file gives them, and those of them that a fit may change.
 
 Problem: a vehicle is a frozen record with parts in it, a fit moves a list of numbers, and a person names some of them.
 Solution: a name is the path to a number in the vehicle's file, with dots: ``sprung_mass_kg``,

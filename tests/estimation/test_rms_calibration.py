@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 
 from logger.dsp.weightings.wk import WEIGHTING
+from logger.estimation.rms_calibration import SPEEDS_MPS, Settings, SpeedCalibration, calibrate, fit, loaded
+from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
-from logger.roads.calibration import SPEEDS_MPS, Settings, SpeedCalibration, calibrate, fit, loaded
-from logger.roads.from_acceleration import rms_relation
 from logger.roads.gd_iri import iri_per_root_gd
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file

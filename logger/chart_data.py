@@ -1,0 +1,49 @@
+"""What a chart shows, as arrays: lines over an axis, or shades over a grid. ``logger.report.charts`` draws it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Points (n,) of a chart, joined unless they are ``dots``; ``errors`` (n,): standard errors, drawn as a band."""
+
+    name: str
+    x: Array
+    y: Array
+    errors: Array | None = None
+    dots: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """A chart of lines; ``level``: a value that has a name, drawn across."""
+
+    title: str
+    x_name: str
+    y_name: str
+    lines: tuple[Line, ...]
+    level: tuple[float, str] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A chart of values (len(y), len(x)) over a grid, as shades from 0 to ``top``; what lies above is drawn as it."""
+
+    title: str
+    x_name: str
+    y_name: str
+    x: Array
+    y: Array
+    values: Array
+    value_name: str
+    top: float
+
+
+Chart = Curves | Field

@@ -1,0 +1,1 @@
+"""Roads as tires meet them."""

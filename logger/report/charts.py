@@ -1,0 +1,362 @@
+"""Charts as SVG text, all in one style: values along the way, lines over an axis, shades over a grid, falling steps.
+
+A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
+are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, floor, log10
+from textwrap import wrap
+
+import numpy as np
+
+from logger.chart_data import Array, Chart, Curves, Field, Line
+from logger.report.html import EMPTY, Html, concatenated, html
+
+WIDTH = 1000
+MAX_POINTS = 4000
+"""More points than this are drawn as means of neighbours: a screen has no more columns."""
+_NAME_ROOM = 11
+_COLOURS = 8
+_ABOUT = 6
+_KEY_PX = 20
+_LINE_PX, _LETTER_PX, _MOST_LINES = 15, 7.0, 3
+
+Value = float | None
+Point = tuple[float, float]
+
+
+# --- what all charts share ---
+
+
+@dataclass(frozen=True)
+class _Box:
+    """The ground of a chart and the margins around what is drawn on it [px]."""
+
+    height: int
+    left: int
+    right: int
+    top: int
+    bottom: int
+
+    @property
+    def right_px(self) -> int:
+        return WIDTH - self.right
+
+    @property
+    def bottom_px(self) -> int:
+        return self.height - self.bottom
+
+
+_ALONG = _Box(height=190, left=46, right=60, top=14, bottom=34)
+_CHART = _Box(height=420, left=64, right=170, top=20, bottom=44)
+_STEPS = _Box(height=300, left=64, right=110, top=26, bottom=62)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The place of values in a box: from the low to the high end of both axes."""
+
+    box: _Box
+    x_low: float
+    x_high: float
+    y_low: float
+    y_high: float
+
+    def x(self, value: float) -> float:
+        box = self.box
+        return box.left + (box.right_px - box.left) * (value - self.x_low) / (self.x_high - self.x_low)
+
+    def y(self, value: float) -> float:
+        """Values beyond the frame are drawn on its edge."""
+        share = min(max((value - self.y_low) / (self.y_high - self.y_low), 0.0), 1.0)
+        return self.box.top + (self.box.bottom_px - self.box.top) * (1 - share)
+
+    def points(self, points: Iterable[Point]) -> list[str]:
+        """Points of a path."""
+        return [f"{self.x(x):.1f} {self.y(y):.1f}" for x, y in points]
+
+    def across(self, style: str, value: float) -> Html:
+        """A line from the left to the right edge at a value."""
+        return html('<path class="{}" d="M{} {:.1f}H{}"/>', style, self.box.left, self.y(value), self.box.right_px)
+
+    def beside(self, value: float, name: str) -> Html:
+        """A name at the right of a value."""
+        return _words(self.box.right_px + 6, self.y(value) + 4, name)
+
+    def rows(self, about: int) -> Html:
+        """Faint lines across, with their values at the left."""
+        return concatenated(self.across("grid", tick) + _words(self.box.left - 8, self.y(tick) + 4, f"{tick:g}", "end")
+                      for tick in nice_ticks(self.y_low, self.y_high, about))
+
+    def columns(self, about: int, unit: float = 1.0) -> Html:
+        """Values below, so many ``unit`` being 1."""
+        return concatenated(_words(self.x(tick * unit), self.box.bottom_px + 18, f"{tick:g}", "middle")
+                      for tick in nice_ticks(self.x_low / unit, self.x_high / unit, about))
+
+
+def _words(x: float, y: float, text: str, anchor: str = "start") -> Html:
+    where = html(' text-anchor="{}"', anchor) if anchor != "start" else EMPTY
+    return html('<text class="tick" x="{:.1f}" y="{:.1f}"{}>{}</text>', x, y, where, text)
+
+
+def _figure(box: _Box, title: str, drawn: Iterable[Html], caption: Html = EMPTY) -> Html:
+    """The figure element; ``caption``: more words after the title."""
+    svg = html('<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', WIDTH, box.height, title,
+               concatenated(drawn))
+    return html("<figure><figcaption>{}{}</figcaption>{}</figure>", title, caption, svg)
+
+
+def numbered_mark(x: float, y: float, text: str) -> Html:
+    """A small disc with a number, at a place of a picture."""
+    return html('<g class="mark"><circle cx="{:.1f}" cy="{:.1f}" r="8"/><text x="{:.1f}" y="{:.1f}" '
+                'text-anchor="middle">{}</text></g>', x, y, x, y + 3.7, text)
+
+
+def nice_ticks(low: float, high: float, about: int) -> list[float]:
+    """Round numbers from ``low`` to ``high``, above it, in about so many steps of 1, 2 or 5 times a power of ten."""
+    step = nice_step((high - low) / about)
+    return [float(f"{index * step:.12g}") for index in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]
+
+
+def nice_step(least: float) -> float:
+    """The smallest of 1, 2, 5, 10 ... times a power of ten that is not below ``least`` (positive)."""
+    power = 10.0 ** floor(log10(least))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
+
+
+# --- values along the way ---
+
+
+@dataclass(frozen=True)
+class Level:
+    """A faint line across a plot at a value that has a name."""
+
+    value: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Plot:
+    """What is drawn: one line over the distance, perhaps with a band of its standard error.
+
+    along_m    (n,) distance [m], rising
+    values     (n,) None where not known; the line is broken there
+    errors     (n,) standard errors; empty: no band
+    breaks     indices at which a new line begins (a new drive)
+    marks      (distance [m], value, text) of numbered points
+    """
+
+    title: str
+    unit: str
+    along_m: Sequence[float]
+    values: Sequence[Value]
+    errors: Sequence[Value] = ()
+    levels: Sequence[Level] = ()
+    breaks: Sequence[int] = ()
+    marks: Sequence[tuple[float, float, str]] = ()
+
+
+def line_figure(plot: Plot) -> Html:
+    """The figure element of a plot along the way."""
+    along_m, values, errors, group = _thinned(plot)
+    top = max((value for value in values if value is not None), default=1.0) * 1.05 or 1.0
+    frame = _Frame(_ALONG, 0.0, max(plot.along_m, default=1.0) or 1.0, 0.0, max(top, nice_ticks(0.0, top, 5)[-1]))
+    runs = _runs(values, {index // group for index in plot.breaks})
+    parts = [frame.rows(5), frame.columns(8, unit=1000.0), *_levels(frame, plot.levels),
+             _words(_ALONG.right_px, _ALONG.height - 2, "distance [km]", "end")]
+    if errors:
+        parts.append(html('<path class="band" d="{}"/>', _band(frame, along_m, values, errors, runs)))
+    lines = "".join(_path(frame.points((along_m[i], values[i] or 0.0) for i in run)) for run in runs)
+    parts.append(html('<path class="line" d="{}"/>', lines))
+    parts += [numbered_mark(frame.x(at_m), frame.y(value), text) for at_m, value, text in plot.marks]
+    caption = html(' <span class="unit">[{}]</span>', plot.unit)
+    if group > 1:
+        caption += html(' <span class="unit">each point the mean of {} windows</span>', group)
+    return _figure(_ALONG, plot.title, parts, caption)
+
+
+def _levels(frame: _Frame, levels: Sequence[Level]) -> list[Html]:
+    """The lines of the levels; a name where the one above it leaves room."""
+    parts = []
+    named_y = 0.0
+    for level in sorted(levels, key=lambda level: -level.value):
+        y = frame.y(level.value)
+        if level.value >= frame.y_high:
+            continue
+        parts.append(frame.across("level", level.value))
+        if y - named_y >= _NAME_ROOM:
+            named_y = y
+            parts.append(frame.beside(level.value, level.name))
+    return parts
+
+
+def _thinned(plot: Plot) -> tuple[list[float], list[Value], list[Value], int]:
+    """The points to draw, and how many rows one of them stands for."""
+    group = ceil(len(plot.values) / MAX_POINTS) or 1
+    starts = range(0, len(plot.values), group)
+    along_m = [_mean(plot.along_m[start:start + group]) or 0.0 for start in starts]
+    values = [_mean(plot.values[start:start + group]) for start in starts]
+    errors = [_mean(plot.errors[start:start + group]) for start in starts] if plot.errors else []
+    return along_m, values, errors, group
+
+
+def _mean(values: Iterable[Value]) -> Value:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _runs(values: Sequence[Value], breaks: set[int]) -> list[range]:
+    """Stretches of known values without a break in them."""
+    runs: list[range] = []
+    start: int | None = None
+    for index, value in enumerate(values):
+        if start is not None and (value is None or index in breaks):
+            runs.append(range(start, index))
+            start = None
+        if start is None and value is not None:
+            start = index
+    if start is not None:
+        runs.append(range(start, len(values)))
+    return runs
+
+
+def _band(frame: _Frame, along_m: Sequence[float], values: Sequence[Value], errors: Sequence[Value],
+          runs: Sequence[range]) -> str:
+    """Value plus and minus its standard error, as closed shapes."""
+    def edge(run: Iterable[int], sign: int) -> list[str]:
+        return frame.points((along_m[i], (values[i] or 0.0) + sign * (errors[i] or 0.0)) for i in run)
+
+    return "".join(_path([*edge(run, 1), *edge(reversed(run), -1)]) + "z" for run in runs)
+
+
+def _path(points: Sequence[str]) -> str:
+    """One line through points. A single point becomes a dot, by the round end of a line without length."""
+    return "M" + (" ".join(points) if len(points) > 1 else f"{points[0]}h0")
+
+
+# --- lines over an axis, shades over a grid ---
+
+
+def chart(one: Chart) -> Html:
+    """The figure element of a chart."""
+    return _figure(_CHART, one.title, _field(one) if isinstance(one, Field) else _curves(one))
+
+
+def _curves(one: Curves) -> list[Html]:
+    ys = [line.y for line in one.lines]
+    ys += [line.y + sign * line.errors for line in one.lines if line.errors is not None for sign in (-1, 1)]
+    ys += [np.array([one.level[0]])] if one.level else []
+    frame = _Frame(_CHART, *_ends(np.concatenate([line.x for line in one.lines])), *_ends(np.concatenate(ys)))
+    parts = _axes(frame, one.x_name, one.y_name)
+    if one.level:
+        parts += [frame.across("level", one.level[0]), frame.beside(*one.level)]
+    for number, line in enumerate(one.lines):
+        parts += _line(frame, line, number % _COLOURS)
+    return parts + _key([line.name for line in one.lines], below_px=frame.y(one.level[0]) if one.level else None)
+
+
+def _line(frame: _Frame, line: Line, colour: int) -> list[Html]:
+    parts = []
+    if line.errors is not None:
+        edges = [*zip(line.x, line.y + line.errors, strict=True),
+                 *reversed(list(zip(line.x, line.y - line.errors, strict=True)))]
+        parts.append(html('<path class="spread" d="M{}z"/>', " ".join(frame.points(edges))))
+    points = list(zip(line.x, line.y, strict=True))
+    if line.dots:
+        return parts + [_dot(frame.x(x), frame.y(y), 4, colour) for x, y in points]
+    return [*parts, html('<path class="thick s{}" d="M{}"/>', colour, " ".join(frame.points(points)))]
+
+
+def _dot(x: float, y: float, radius: int, colour: int) -> Html:
+    return html('<circle class="dot" cx="{:.1f}" cy="{:.1f}" r="{}" style="fill:var(--c{})"/>', x, y, radius, colour)
+
+
+def _key(names: list[str], below_px: float | None) -> list[Html]:
+    """What the lines are, at the right; out of the way of a level's name."""
+    at_the_top = below_px is None or below_px >= _CHART.height / 2
+    top = _CHART.top + 10 if at_the_top else _CHART.bottom_px - _KEY_PX * len(names)
+    x = _CHART.right_px + 6
+    return [html('<path class="thick s{}" d="M{} {}h14"/>', number % _COLOURS, x, top + _KEY_PX * number)
+            + _words(x + 20, top + _KEY_PX * number + 4, name) for number, name in enumerate(names)]
+
+
+def _field(one: Field) -> list[Html]:
+    x_edges, y_edges = _edges(one.x), _edges(one.y)
+    frame = _Frame(_CHART, float(x_edges[0]), float(x_edges[-1]), float(y_edges[0]), float(y_edges[-1]))
+    parts = []
+    for (low, high), row in zip(pairwise(y_edges), one.values, strict=True):
+        for (left, right), value in zip(pairwise(x_edges), row, strict=True):
+            share = 1.0 if not np.isfinite(value) else min(max(float(value) / one.top, 0.0), 1.0)
+            parts.append(_cell(frame.x(left), frame.y(high), frame.x(right) - frame.x(left),
+                               frame.y(low) - frame.y(high), 1 - share))
+    parts += _axes(frame, one.x_name, one.y_name)
+    x = _CHART.right_px + 10
+    for number in range(_ABOUT):
+        share = number / (_ABOUT - 1)
+        y = _CHART.top + 30 + _KEY_PX * number
+        parts.append(_cell(x, y - 9, 14, 14, 1 - share)
+                     + _words(x + 20, y + 2, f"{share * one.top:g}{' and more' if share == 1 else ''}"))
+    return [*parts, _words(x, _CHART.top + 6, one.value_name)]
+
+
+def _cell(x: float, y: float, width: float, height: float, opacity: float) -> Html:
+    return html('<rect class="cell" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill-opacity="{:.2f}"/>',
+                x, y, width, height, opacity)
+
+
+def _edges(centres: Array) -> Array:
+    """Edges (n + 1,) of cells around increasing centres (n,), n > 1."""
+    between = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - between[0]], between, [2 * centres[-1] - between[-1]]])
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def _axes(frame: _Frame, x_name: str, y_name: str) -> list[Html]:
+    box = frame.box
+    return [frame.rows(_ABOUT), frame.columns(_ABOUT), _words(box.right_px, box.height - 6, x_name, "end"),
+            _words(box.left, box.top - 6, y_name)]
+
+
+# --- falling steps ---
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What is drawn: words and a value (0 or more) per step, at least one; ``level``: a value that has a name, drawn
+    across."""
+
+    title: str
+    unit: str
+    values: tuple[tuple[str, float], ...]
+    level: tuple[float, str] | None = None
+
+
+def steps_figure(one: Steps) -> Html:
+    """The figure element of a number that falls from step to step: a point and words for each."""
+    top = 1.1 * (max([value for _, value in one.values] + ([one.level[0]] if one.level else [])) or 1.0)
+    count = len(one.values)
+    frame = _Frame(_STEPS, 0.0, count, 0.0, max(top, nice_ticks(0.0, top, 5)[-1]))
+    parts = [frame.rows(5)]
+    if one.level is not None:
+        parts.append(html('<path class="thick s3" d="M{} {:.1f}H{}" stroke-dasharray="6 5"/>', _STEPS.left,
+                          frame.y(one.level[0]), _STEPS.right_px) + frame.beside(*one.level))
+    points = [(index + 0.5, value) for index, (_, value) in enumerate(one.values)]
+    if count > 1:
+        parts.append(html('<path class="thick s0" d="M{}"/>', " ".join(frame.points(points))))
+    letters = max(8, int((_STEPS.right_px - _STEPS.left) / count / _LETTER_PX))
+    for (at, value), (words, _) in zip(points, one.values, strict=True):
+        x, y = frame.x(at), frame.y(value)
+        parts += [_dot(x, y, 5, 0), _words(x, y - 10, f"{value:.3f}", "middle")]
+        parts += [_words(x, _STEPS.bottom_px + 18 + _LINE_PX * number, line, "middle")
+                  for number, line in enumerate(wrap(words, letters)[:_MOST_LINES])]
+    return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)])

@@ -1,0 +1,51 @@
+"""HTML that escapes by default: a text is shown, never obeyed, whichever way it gets into a page."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import logger.report
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.html import Html, concatenated, escaped, html
+
+EVIL = "<script>\"'&"
+SAFE = "&lt;script&gt;&quot;&#x27;&amp;"
+MODULES = sorted(Path(logger.report.__path__[0]).glob("*.py"))
+
+
+def test_text_is_escaped_and_html_is_not() -> None:
+    assert html("<p>{}</p>", EVIL) == f"<p>{SAFE}</p>"
+    assert html("<p>{}</p>", html("<b>{}</b>", EVIL)) == f"<p><b>{SAFE}</b></p>"
+    assert Html("<b>") + EVIL == f"<b>{SAFE}"
+    assert EVIL + Html("<b>") == f"{SAFE}<b>"
+    assert concatenated([EVIL, Html("<b>")]) == f"{SAFE}<b>"
+    assert html("{0:.1f} {1:.0%} {name}", 0.25, 0.5, name=EVIL) == f"0.2 50% {SAFE}"
+    assert isinstance(EVIL + Html("<b>") + EVIL, Html) and isinstance(escaped(EVIL), Html)
+
+
+@pytest.mark.parametrize("made", [
+    paragraphs([EVIL]), bullets([EVIL]), hint(EVIL), heading(EVIL, EVIL), section(EVIL, EVIL), grid([EVIL], [[EVIL]]),
+    tiles([(EVIL, EVIL, EVIL)]), document(EVIL, [EVIL])])
+def test_no_part_of_a_page_obeys_a_text(made: Html) -> None:
+    assert "<script" not in made
+    assert SAFE in made
+
+
+@given(st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=40))
+def test_what_is_shown_is_the_text(text: str) -> None:
+    assert (ElementTree.fromstring(html('<p a="{0}">{0}</p>', text)).text or "") == text
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: path.stem)
+def test_templates_are_literals_and_only_one_module_escapes(module: Path) -> None:
+    tree = ast.parse(module.read_text("utf-8"))
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    assert all(isinstance(call.args[0], ast.Constant) for call in calls if call.func.id == "html")  # type: ignore
+    by_hand = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "html"]
+    assert not by_hand or module.stem == "html"
