@@ -14,7 +14,6 @@ from logger.report.summary import summarise, summary_json
 from logger.store.log_folder import inside_of
 from logger.store.log_name import LogName, finished_path
 from logger.store.segment_log import read_log
-from logger.store.set_aside import is_file
 from logger.store.sidecar import read_sidecar
 
 
@@ -72,7 +71,7 @@ def find_logs(place: Path) -> list[Path]:
     found: dict[tuple[Path, int, int], Path] = {}
     for path in sorted(inside_of(place)):
         name = LogName.of(path)
-        if name is None or not is_file(path):
+        if name is None or path.is_dir():
             continue
         if name.finished or (path.parent, name.session, name.part) not in found:
             found[path.parent, name.session, name.part] = path
