@@ -129,7 +129,7 @@ def test_links_and_folders_on_the_card_are_not_exported(logs: Path, stick: Path,
     (logs / "00007-001.csv").mkdir()
     result = run(logs, stick)
     assert {failure.name: failure.reason for failure in result.failures} == {
-        "00006-001.csv": "card: Too many levels of symbolic links", "00007-001.csv": "card: not a regular file"}
+        "00006-001.csv": "card: Too many levels of symbolic links", "00007-001.csv": "card: Is a directory"}
     assert_all_there(logs, stick)
 
 
