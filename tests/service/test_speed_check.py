@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from receivers import town_drive
 
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
@@ -16,7 +17,6 @@ from logger.commands.status import advice, screen
 from logger.service.speed_check import SpeedCheck
 from logger.service.timebase import TimedFix
 
-from receivers import town_drive
 from replaying import rows_of
 from sensor_faults import NOON, Car, checked, epoch
 

@@ -15,9 +15,11 @@ HELD_BELOW_MPS = 1.2  # static navigation: places are held while the car creeps
 
 def town_drive(seconds: int, seed: int, factor: float = 1.0, usual_mps: float = 14.0,
                outlier_s: int | None = None) -> Iterator[TimedFix]:
-    """A fix a second: stretches at about ``usual_mps`` with turns, lights and queues; speed noise of 0.1 m/s; places that
-    wander by 4 m over a minute, by 15 m over 20 s for two minutes of each twenty; held in queues. ``factor``: of the speed
-    that the receiver says; ``outlier_s``: its place is 300 m off in this second."""
+    """A fix a second: stretches at about ``usual_mps`` with turns, lights and queues; speed noise of 0.1 m/s.
+
+    Places wander by 4 m over a minute, and by 15 m over 20 s for two minutes of each twenty; in queues they are held.
+    ``factor``: of the speed that the receiver says; ``outlier_s``: its place is 300 m off in this second.
+    """
     rng = np.random.default_rng(seed)
     wanted_mps = _wanted_mps(seconds, usual_mps, rng)
     speed_mps, course = 0.0, 0.0
