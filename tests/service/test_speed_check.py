@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import timedelta
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
+from receivers import town_drive
 
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
 from logger.commands.status import advice, screen
+from logger.service.speed_check import SpeedCheck
+from logger.service.timebase import TimedFix
 
 from replaying import rows_of
 from sensor_faults import NOON, Car, checked, epoch
@@ -61,6 +65,32 @@ def test_a_parked_car_whose_place_wanders_is_believed(tmp_path: Path) -> None:
     status = car.drive(120)
     assert status.gps.state == "ok"
     assert "speed_doubtful" not in car.flags()
+
+
+def doubted(drive: Iterator[TimedFix]) -> tuple[float, list[float]]:
+    """Seconds driven until the receiver is doubted first, and the seconds at which it is."""
+    check, driven_s, first_s = SpeedCheck(), 0, float("inf")
+    times_us = []
+    for timed in drive:
+        check.take(timed)
+        times_us.append(timed.t_us)
+        driven_s += (timed.fix.speed_mps or 0.0) > 2.0
+        first_s = min(first_s, driven_s) if check.doubt else first_s
+    during = check.during(np.array(times_us))
+    return first_s, [t_us / 1e6 for t_us, is_doubtful in zip(times_us, during, strict=True) if is_doubtful]
+
+
+@pytest.mark.parametrize(("factor", "found_s"), [(0.6, 40), (0.7, 60), (0.8, 120), (1.2, 150), (1.3, 90), (2.0, 30)])
+def test_a_wrong_factor_of_the_speed_is_found_in_a_town(factor: float, found_s: float) -> None:
+    assert np.median([doubted(town_drive(1200, seed, factor))[0] for seed in range(9)]) < found_s
+
+
+def test_a_good_receiver_is_not_doubted_in_queues_and_among_houses() -> None:
+    assert sum(len(doubted(town_drive(3600, seed))[1]) for seed in range(40, 44)) == 0
+
+
+def test_a_single_place_far_off_costs_nothing() -> None:
+    assert [doubted(town_drive(900, seed, outlier_s=600))[1] for seed in range(50, 60)] == [[]] * 10
 
 
 def test_the_demo_raises_no_doubt() -> None:
