@@ -27,6 +27,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -57,12 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
                              "also says where the sensor sits")
-    parser.add_argument("--noise", type=float, default=NOISE_MPS2, metavar="MPS2",
-                        help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it "
-                             "blurs the steps, what is found on the way corrects it")
-    parser.add_argument("--step", type=float, default=STEP_MPS2, metavar="MPS2",
-                        help="step that readings are rounded to [m/s2] (default: 0, none)")
-    parser.add_argument("--window", type=float, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
+    add_number(parser, "--noise", 1e-4, 100.0, "m/s2", default=NOISE_MPS2, metavar="MPS2",
+               help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it blurs the "
+                    "steps, what is found on the way corrects it")
+    add_number(parser, "--step", 0.0, 100.0, "m/s2", default=STEP_MPS2, metavar="MPS2",
+               help="step that readings are rounded to [m/s2] (default: 0, none)")
+    add_number(parser, "--window", 1.0, 1000.0, "m", metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -75,11 +76,6 @@ def run(args: argparse.Namespace) -> int:
     from logger.units import WINDOW_M
 
     window_m = WINDOW_M if args.window is None else args.window
-    for name, value, low, high, unit in (("--noise", args.noise, 1e-4, 100.0, "m/s2"),
-                                         ("--step", args.step, 0.0, 100.0, "m/s2"),
-                                         ("--window", window_m, 1.0, 1000.0, "m")):
-        if not low <= value <= high:
-            raise BadInput(f"{name} {value:g}: expected {low:g} to {high:g} {unit}")
     vehicle_yaml = vehicle_path(args.vehicle)
     vehicle = read_vehicle(vehicle_yaml)
     _check_files(args, vehicle_yaml)

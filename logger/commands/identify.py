@@ -38,6 +38,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -83,13 +84,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--same-road", action="store_true",
                         help="the road was not measured; all runs are over the same one; their places may be "
                              "off by 10 m, their distances by 1 per cent")
-    parser.add_argument("--waviness", type=float, metavar="W",
-                        help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
+    add_number(parser, "--waviness", _FLATTEST, _STEEPEST, metavar="W",
+               help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
                         help="where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat")
-    parser.add_argument("--tries", type=int, default=0, metavar="N", help="so many further starts, spread around")
+    add_number(parser, "--tries", 0, _MOST_TRIES, kind=int, default=0, metavar="N",
+               help="so many further starts, spread around")
     parser.add_argument("--noise", choices=NOISES, default="auto",
                         help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
                              "the profile does not contain, through the car); auto: the likeliest (default)")
@@ -248,8 +250,6 @@ def _road_options(args: argparse.Namespace) -> Any:
     if args.same_road and len(args.runs) < 2:
         raise BadInput("--same-road: expected two runs or more")
     waviness = _WAVINESS if args.waviness is None else args.waviness
-    if not _FLATTEST <= waviness <= _STEEPEST:
-        raise BadInput(f"--waviness {waviness:g}: expected {_FLATTEST:g} to {_STEEPEST:g}")
     names = [name.strip() for name in args.free.split(",")]
     args.free = ",".join(name for name in names if name != _FREE_WAVINESS)
     return Options(waviness=waviness, free_waviness=_FREE_WAVINESS in names, place_off_m=_PLACES_OFF_M,
@@ -390,8 +390,6 @@ def _options(args: argparse.Namespace, model: VehicleModel) -> Any:
         if len(measured) <= reach:
             raise BadInput(f"{path}: expected more than {reach} samples for --low-pass {args.low_pass:g}, found "
                            f"{len(measured)} after the first {args.skip:g} s")
-    if not 0 <= args.tries <= _MOST_TRIES:
-        raise BadInput(f"--tries {args.tries}: expected 0 to {_MOST_TRIES}")
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return Options(rate_hz=rate_hz, low_pass_hz=args.low_pass, robust=args.robust,
                    noise=list(kinds.values()) if args.noise == "auto" else [kinds[args.noise]],
