@@ -17,7 +17,8 @@ TREES = {
 }
 FLOORS = (
     "errors", "units", "records", "chart_data", "printable",
-    "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "identification", "modal", "lab",
+    "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
+    "lab",
     "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -39,15 +40,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     parser.add_argument("--window", type=float, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
-    parser.add_argument("--low-pass", type=float, metavar="HZ",
-                        help="low_pass_hz of the recorder's settings (default: none; what every recorder does, to "
-                             "leave out gravity and what 100 Hz cannot hold, is always in)")
-    parser.add_argument("--passengers", type=int, default=0, metavar="N",
-                        help="people of 75 kg more in the car, at its centre of gravity; a half car gets half of their "
-                             "mass, a quarter car a quarter")
-    parser.add_argument("--sprung-mass-factor", type=float, default=1.0, metavar="X",
-                        help="so many times the body's mass, springs and inertias staying as they are (default: 1)")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="another number, other roads (default: 1)")
+    add_number(parser, "--low-pass", *_LOW_PASSES_HZ, metavar="HZ",
+               help="low_pass_hz of the recorder's settings (default: none; what every recorder does, to leave out "
+                    "gravity and what 100 Hz cannot hold, is always in)")
+    add_number(parser, "--passengers", 0, _MOST_PASSENGERS, kind=int, default=0, metavar="N",
+               help="people of 75 kg more in the car, at its centre of gravity; a half car gets half of their mass, a "
+                    "quarter car a quarter")
+    add_number(parser, "--sprung-mass-factor", *_MASS_FACTORS, default=1.0, metavar="X",
+               help="so many times the body's mass, springs and inertias staying as they are (default: 1)")
+    add_number(parser, "--seed", 0, 2**63, kind=int, default=1, metavar="N",
+               help="another number, other roads (default: 1)")
     parser.add_argument("--recompute", action="store_true", help="do not look for a stored result")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures of each speed as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -60,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
 
-    _check(args)
     path = vehicle_path(args.vehicle)
     vehicle = read_vehicle(path)
     if args.out is not None and args.out.exists() and args.out.samefile(path):
@@ -79,18 +80,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         print("\n".join(screen(vehicle, ask.settings, plain, with_people)))
     return EXIT_DONE
-
-
-def _check(args: argparse.Namespace) -> None:
-    """Raise BadInput for a number that is out of its range."""
-    for name, value, low, high in (
-        ("--passengers", args.passengers, 0, _MOST_PASSENGERS),
-        ("--sprung-mass-factor", args.sprung_mass_factor, *_MASS_FACTORS),
-        ("--low-pass", args.low_pass, *_LOW_PASSES_HZ),
-        ("--seed", args.seed, 0, 2**63),
-    ):
-        if value is not None and not low <= value <= high:
-            raise BadInput(f"{name} {value:g}: expected {low:g} to {high:g}")
 
 
 def _settings(args: argparse.Namespace) -> Settings:

@@ -23,30 +23,20 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.estimation.limit import Limits
-    from logger.estimation.road_profile import RoadProfile
-    from logger.estimation.whole_drive import Windows
-    from logger.profiles.track import Array, Track
-    from logger.store.drive_file import Drive
+    from logger.estimation.assessment import Assessment
+    from logger.estimation.sensor import Sensor
     from logger.vehicle.vehicle import Vehicle
 
 NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
-MIX_IRI = tuple(range(1, 11))
-BACK_M = 1.0
-_SLOWEST_RATE_HZ = 80.0
-_SPEED_CLASS_MPS = 5.0
-_NEARLY = 1e-6
 _FAR_ABOVE = 1.5
-_WAYS_DIFFER = 0.1
-_LEAST_WAY_M = 10.0  # over less, a distance from GPS may well differ from the integral of the speed
 _MOVING_MPS = 1.0
 _G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 
@@ -57,12 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
                              "also says where the sensor sits")
-    parser.add_argument("--noise", type=float, default=NOISE_MPS2, metavar="MPS2",
-                        help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it "
-                             "blurs the steps, what is found on the way corrects it")
-    parser.add_argument("--step", type=float, default=STEP_MPS2, metavar="MPS2",
-                        help="step that readings are rounded to [m/s2] (default: 0, none)")
-    parser.add_argument("--window", type=float, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
+    add_number(parser, "--noise", 1e-4, 100.0, "m/s2", default=NOISE_MPS2, metavar="MPS2",
+               help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it blurs the "
+                    "steps, what is found on the way corrects it")
+    add_number(parser, "--step", 0.0, 100.0, "m/s2", default=STEP_MPS2, metavar="MPS2",
+               help="step that readings are rounded to [m/s2] (default: 0, none)")
+    add_number(parser, "--window", 1.0, 1000.0, "m", metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -70,24 +60,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
+    from logger.estimation.sensor import Sensor
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
     from logger.units import WINDOW_M
 
     window_m = WINDOW_M if args.window is None else args.window
-    for name, value, low, high, unit in (("--noise", args.noise, 1e-4, 100.0, "m/s2"),
-                                         ("--step", args.step, 0.0, 100.0, "m/s2"),
-                                         ("--window", window_m, 1.0, 1000.0, "m")):
-        if not low <= value <= high:
-            raise BadInput(f"{name} {value:g}: expected {low:g} to {high:g} {unit}")
     vehicle_yaml = vehicle_path(args.vehicle)
     vehicle = read_vehicle(vehicle_yaml)
     _check_files(args, vehicle_yaml)
-    result = estimate(args.run, vehicle, args.noise, args.step, window_m)
-    files = [] if args.profile_out is None else _write_road(args.profile_out, result)
+    found = _assessed(args.run, vehicle, Sensor(args.noise, args.step), window_m)
+    files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
-        write_text(args.out, "".join(_csv(result)), "ascii")
-    print(json.dumps(as_json(result, files), allow_nan=False) if args.json else "\n".join(screen(result, files)))
+        write_text(args.out, "".join(_csv(found)), "ascii")
+    told = as_json(args.run, found, files)
+    print(json.dumps(told, allow_nan=False) if args.json else "\n".join(screen(found, told)))
     if args.profile_out is not None and not files:
         print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "
               "longest of them", file=sys.stderr if args.json else sys.stdout)
@@ -114,139 +101,30 @@ def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
                        f"{clash[0]}")
 
 
-# --- the drive ---
-
-
-@dataclass(frozen=True)
-class Estimable:
-    """A drive ready for the estimator, arrays (n,): samples at ``rate_hz``, distances that do not decrease.
-
-    relaid_m    the farthest that a distance was moved to make them so [m]; 0 where they are the file's
-    """
-
-    rate_hz: float
-    accel_z_mps2: Array
-    distance_m: Array
-    relaid_m: float
-
-
-def read_estimable(run: Path) -> Estimable:
-    """The drive of a run's folder, or of a file. BadInput ("file:line: expected ..., found ...") for what it cannot be.
-    """
-    import numpy as np
-
-    from logger.estimation.whole_drive import laid_anew
-    from logger.store.drive_file import DRIVE, MAX_SPEED_MPS, read_drive
+def _assessed(run: Path, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:
+    """The road of a run. BadInput ("file:line: expected ..., found ...") for files that are not what they should be."""
+    from logger.estimation.assessment import Unusable, assess, estimable
+    from logger.store.drive_file import DRIVE, MAX_SPEED_MPS, PROFILE, read_drive, track_of
+    from logger.store.profile_file import read_profile
 
     drive = read_drive(run / DRIVE if run.is_dir() else run)
-    if drive.rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
-        raise BadInput(f"{drive.path}: expected at least {_SLOWEST_RATE_HZ:g} samples a second, "
-                       f"found {drive.rate_hz:.4g}")
-    _check_way(drive.distance_m, MAX_SPEED_MPS / drive.rate_hz, str(drive.path))
-    _check_speed(drive)
-    if (np.diff(drive.distance_m) >= 0).all():
-        return Estimable(drive.rate_hz, drive.accel_z_mps2, drive.distance_m, 0.0)
-    relaid = laid_anew(drive.distance_m, drive.speed_mps, drive.rate_hz)
-    return Estimable(drive.rate_hz, drive.accel_z_mps2, relaid, float(np.abs(relaid - drive.distance_m).max()))
-
-
-def _check_way(distance_m: Array, longest_m: float, file: str) -> None:
-    """Refuse a distance that jumps, or goes back farther than a correction would take it."""
-    import numpy as np
-
-    back = distance_m < np.maximum.accumulate(distance_m) - BACK_M
-    jump = np.diff(distance_m, prepend=distance_m[0]) > longest_m + BACK_M
-    if (wrong := back | jump).any():
-        row = int(np.argmax(wrong))
-        limit = (f"at most {BACK_M:g} m before the farthest yet, {distance_m[:row].max():.10g} m" if back[row]
-                 else f"at most {longest_m + BACK_M:.4g} m after {distance_m[row - 1]:.10g} m")
-        raise BadInput(f"{file}:{row + 2}: expected a distance {limit}, found {distance_m[row]:.10g}")
-
-
-def _check_speed(drive: Drive) -> None:
-    """Refuse a speed that does not go with the distance, such as one in km/h."""
-    import numpy as np
-
-    speed = np.abs(drive.speed_mps)
-    way_m = float(drive.distance_m[-1] - drive.distance_m[0])
-    integral_m = float(np.sum(speed[1:] + speed[:-1])) / 2 / drive.rate_hz
-    larger_m = max(way_m, integral_m)
-    if larger_m > _LEAST_WAY_M and abs(way_m - integral_m) > _WAYS_DIFFER * larger_m:
-        factor = f"{integral_m / way_m:.3g}" if way_m > 0 else "infinitely many"
-        raise BadInput(f"{drive.path}: expected speed_mps and distance_m to agree within {_WAYS_DIFFER:.0%}, found "
-                       f"{integral_m:.4g} m by speed_mps, {factor} times the {way_m:.4g} m of distance_m (km/h would "
-                       "give 3.6)")
-
-
-# --- what is found ---
-
-
-@dataclass(frozen=True)
-class Result:
-    """All there is to tell of a run.
-
-    exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
-    compared                whether there is a profile to compare with
-    least_error_m_per_km    (w,) r.m.s. error of the best possible values
-    """
-
-    run: Path
-    vehicle: Vehicle
-    drive: Estimable
-    noise_mps2: float
-    step_mps2: float
-    window_m: float
-    windows: Windows
-    exact_m_per_km: Array
-    compared: bool
-    least_error_m_per_km: Array
-    limits: Limits
-    road: RoadProfile | None
-
-
-def estimate(run: Path, vehicle: Vehicle, noise_mps2: float, step_mps2: float, window_m: float) -> Result:
-    """Read a run, estimate its road, compare it. BadInput for files that are not what they should be."""
-    import numpy as np
-
-    from logger.estimation.limit import Limits
-    from logger.estimation.sensor import Sensor
-    from logger.estimation.whole_drive import estimated, exact_iri, least_errors, local_level, on_grid
-    from logger.store.drive_file import PROFILE, track_of
-    from logger.store.profile_file import read_profile
-    from logger.vehicle.models import structure_of
-    from logger.vehicle.structure import body_point
-
-    structure = structure_of(vehicle)
-    output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    drive = read_estimable(run)
+    try:
+        ready = estimable(drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, drive.distance_m, MAX_SPEED_MPS)
+    except Unusable as error:
+        line = "" if error.sample is None else f":{error.sample + 2}"
+        raise BadInput(f"{drive.path}{line}: {error}") from None
     profile = run / PROFILE
     track = track_of(read_profile(profile)) if run.is_dir() and profile.exists() else None
-    sensor, readings, distance_m = on_grid(
-        Sensor(noise_mps2, step_mps2), drive.rate_hz, drive.accel_z_mps2, drive.distance_m)
-    windows, road = estimated(structure, output, sensor, window_m, readings, distance_m)
-    exact = np.full(len(windows.iri_m_per_km), np.nan)
-    if track is not None:
-        exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
-    limits = Limits(structure, output, sensor, window_m)
-    level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
-    return Result(run, vehicle, drive, noise_mps2, step_mps2, window_m, windows, exact, track is not None,
-                  least_errors(limits, windows.speed_mps, level), limits, road)
+    return assess(ready, vehicle, sensor, window_m, track)
 
 
-def _driven(track: Track, vehicle: Vehicle) -> Array:
-    """The elevations that the sensor is compared with: of two tracks their mean for a full car, else the left one."""
-    if track.elevation_m.ndim == 1:
-        return track.elevation_m
-    return track.elevation_m.mean(axis=1) if vehicle.model == "full_car" else track.elevation_m[:, 0]
-
-
-def _write_road(path: Path, result: Result) -> list[Path]:
+def _write_road(path: Path, found: Assessment) -> list[Path]:
     """The parts of the profile, each a file of its own; none where the readings do not make one."""
     from logger.profiles.track import Track
     from logger.store.drive_file import write_profile
 
     files: list[Path] = []
-    for number, part in enumerate(result.road.parts if result.road else (), start=1):
+    for number, part in enumerate(found.road.parts if found.road else (), start=1):
         file = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
         write_profile(file, Track(part.spacing_m, part.elevation_m, part.start_m))
         files.append(file)
@@ -256,89 +134,44 @@ def _write_road(path: Path, result: Result) -> list[Path]:
 # --- for programs ---
 
 
-def as_json(result: Result, files: list[Path]) -> dict[str, Any]:
+def as_json(run: Path, found: Assessment, files: list[Path]) -> dict[str, Any]:
     """Settings, the run as a whole, per class of speed, per window; null for what is not known."""
-    drive, windows = result.drive, result.windows
-    everything = windows.speed_mps > 0
-    road = result.road
+    from logger.estimation.assessment import SPEED_CLASS_MPS, figures, speed_classes
+
+    drive, windows, road = found.drive, found.windows, found.road
     return {
-        "run": str(result.run), "vehicle": result.vehicle.name, "rate_hz": drive.rate_hz,
-        "noise_mps2": result.noise_mps2, "step_mps2": result.step_mps2, "window_m": result.window_m,
+        "run": str(run), "vehicle": found.vehicle.name, "rate_hz": drive.rate_hz,
+        "noise_mps2": found.sensor.noise_rms_mps2, "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
-        "distance_relaid_m": drive.relaid_m, "compared": result.compared,
-        **_summary(result, everything),
+        "distance_relaid_m": drive.relaid_m, "compared": found.compared,
+        **figures(found, windows.speed_mps > 0),
         "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
         "shortest_wavelength_m": road.shortest_m if road else None,
         "longest_wavelength_m": road.longest_m if road else None,
         "profile_files": [str(file) for file in files],
-        "speeds": [{"from_mps": low, "to_mps": low + _SPEED_CLASS_MPS, **_summary(result, which)}
-                   for low, which in _speed_classes(windows)],
-        "windows": list(_rows(result)),
+        "speeds": [{"from_mps": low, "to_mps": low + SPEED_CLASS_MPS, **figures(found, which)}
+                   for low, which in speed_classes(windows)],
+        "windows": list(_rows(found)),
     }
 
 
-def _speed_classes(windows: Windows) -> Iterator[tuple[float, Any]]:
-    import numpy as np
-
-    number = np.floor(windows.speed_mps / _SPEED_CLASS_MPS + _NEARLY).astype(int)
-    for one in np.unique(number).tolist():
-        yield one * _SPEED_CLASS_MPS, number == one
-
-
-def _summary(result: Result, which: Any) -> dict[str, Any]:
-    """Figures of the windows that are marked (w,)."""
-    import numpy as np
-
-    from logger.estimation.limit import pooled_r2
-    from logger.estimation.road_spectrum import RoadSpectrum
-    from logger.estimation.whole_drive import score
-
-    windows = result.windows
-    answered = which & np.isfinite(windows.iri_m_per_km)
-    summary: dict[str, Any] = {"window_count": int(which.sum()), "answered_count": int(answered.sum())}
-    if not answered.any():
-        return summary
-    iri, least = windows.iri_m_per_km[answered], result.least_error_m_per_km[answered]
-    speed_mps, mean = float(windows.speed_mps[answered].mean()), float(iri.mean())
-    summary |= {
-        "speed_mps": speed_mps, "iri_m_per_km": mean, "iri_min_m_per_km": float(iri.min()),
-        "iri_max_m_per_km": float(iri.max()), "iri_std_m_per_km": _rms(windows.iri_std_m_per_km[answered]),
-        "limit": {
-            "std_m_per_km": _rms(least),
-            "r2_this_road": result.limits.at(speed_mps, RoadSpectrum.of_iri(mean)).r2,
-            "r2_iri_1_to_10": pooled_r2([result.limits.at(speed_mps, RoadSpectrum.of_iri(iri)) for iri in MIX_IRI]),
-        },
-    }
-    found = score(windows, result.exact_m_per_km, which)
-    if found is not None:
-        known = answered & np.isfinite(result.exact_m_per_km)
-        squares = np.mean(result.least_error_m_per_km[known] ** 2)
-        limit_r2 = float(1 - squares / np.var(result.exact_m_per_km[known]))
-        summary["comparison"] = {**asdict(found), "limit_r2": limit_r2}
-    return summary
-
-
-def _rms(values: Array) -> float:
-    return float((values**2).mean()) ** 0.5
-
-
-def _rows(result: Result) -> Iterator[dict[str, Any]]:
+def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
     from math import isfinite
 
-    windows = result.windows
+    windows = found.windows
     columns = {
         "distance_start_m": windows.edges_m[:-1], "distance_end_m": windows.edges_m[1:],
         "speed_mps": windows.speed_mps, "iri_m_per_km": windows.iri_m_per_km,
         "iri_std_m_per_km": windows.iri_std_m_per_km, "told": windows.told,
-        "limit_std_m_per_km": result.least_error_m_per_km,
-    } | ({"iri_exact_m_per_km": result.exact_m_per_km} if result.compared else {})
+        "limit_std_m_per_km": found.least_error_m_per_km,
+    } | ({"iri_exact_m_per_km": found.exact_m_per_km} if found.compared else {})
     for *values, flags in zip(*(column.tolist() for column in columns.values()), windows.flags, strict=True):
         row = {name: value if isfinite(value) else None for name, value in zip(columns, values, strict=True)}
         yield row | {"flags": sorted(flags)}
 
 
-def _csv(result: Result) -> Iterator[str]:
-    for number, row in enumerate(_rows(result)):
+def _csv(found: Assessment) -> Iterator[str]:
+    for number, row in enumerate(_rows(found)):
         if number == 0:
             yield ",".join(row) + "\n"
         *values, flags = row.values()
@@ -348,13 +181,14 @@ def _csv(result: Result) -> Iterator[str]:
 # --- for a person ---
 
 
-def screen(result: Result, files: list[Path]) -> list[str]:
-    """The lines a person sees."""
-    told = as_json(result, files)
+def screen(found: Assessment, told: dict[str, Any]) -> list[str]:
+    """The lines a person sees; ``told``: the same as JSON."""
+    from logger.estimation.assessment import MIX_IRI
+
     way_m = told["distance_end_m"] - told["distance_start_m"]
     lines = [
-        f"{result.run}: {way_m:.0f} m in a {told['vehicle']}, "
-        f"{len(result.drive.distance_m) / told['rate_hz']:.0f} s at {told['rate_hz']:.5g} Hz; windows of "
+        f"{told['run']}: {way_m:.0f} m in a {told['vehicle']}, "
+        f"{len(found.drive.distance_m) / told['rate_hz']:.0f} s at {told['rate_hz']:.5g} Hz; windows of "
         f"{told['window_m']:.4g} m",
         f"Taken for granted: noise of {told['noise_mps2']:g} m/s2 in a reading (--noise), "
         + (f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"),
@@ -362,7 +196,7 @@ def screen(result: Result, files: list[Path]) -> list[str]:
     if told["distance_relaid_m"]:
         lines.append("The distance went back here and there: laid anew by the speed, "
                      f"{told['distance_relaid_m']:.2f} m off at most.")
-    if hint := _unit_hint(result):
+    if hint := _unit_hint(found):
         lines.append(hint)
     if not told["answered_count"]:
         return [*lines, f"No IRI: {_unanswered(told) or 'not one whole window was driven'}"]
@@ -374,28 +208,29 @@ def screen(result: Result, files: list[Path]) -> list[str]:
         f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
         f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {told['speed_mps']:.0f} m/s.",
-        "Wavelengths told: " + _range_words(result),
+        "Wavelengths told: " + _range_words(found),
     ]
     if (factor := told["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
         lines.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
                      "percent, and there may be more in the readings than vehicle and noise explain.")
     lines += ["", *_table(told)]
-    return lines + [f"Profile: {file}" for file in files]
+    return lines + [f"Profile: {file}" for file in told["profile_files"]]
 
 
-def _unit_hint(result: Result) -> str:
+def _unit_hint(found: Assessment) -> str:
     """What makes one doubt that the readings on the way are in m/s2; empty if nothing does."""
     import numpy as np
 
-    drive = result.drive
+    drive = found.drive
     moving = np.diff(drive.distance_m, prepend=drive.distance_m[0]) * drive.rate_hz > _MOVING_MPS
     if not moving.any():
         return ""
     mean, rms = float(drive.accel_z_mps2[moving].mean()), float(drive.accel_z_mps2[moving].std())
     if abs(abs(mean) - 1) < _G_NEAR and rms < _G_CALM_MPS2:
         return f"Acceleration in g? On the way it is {mean:.2f} on the mean and {rms:.3g} r.m.s. about it."
-    if rms < result.noise_mps2:
-        return (f"Acceleration in g? On the way it is {rms:.3g} r.m.s., less than the noise of {result.noise_mps2:g} "
+    if rms < found.sensor.noise_rms_mps2:
+        return (f"Acceleration in g? On the way it is {rms:.3g} r.m.s., less than the noise of "
+                f"{found.sensor.noise_rms_mps2:g} "
                 "(--noise).")
     return ""
 
@@ -404,10 +239,10 @@ def _unanswered(told: dict[str, Any]) -> str:
     return ", ".join(f"{count} {flags.replace('|', ' and ')}" for flags, count in told["unanswered"].items())
 
 
-def _range_words(result: Result) -> str:
+def _range_words(found: Assessment) -> str:
     from logger.estimation.road_profile import TOLD_OVER
 
-    road = result.road
+    road = found.road
     if road is None:
         return f"none over {TOLD_OVER:.0%} of the way."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""

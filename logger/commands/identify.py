@@ -31,21 +31,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.identification.axle_response import AxleResponse
-    from logger.identification.crossing import Drive
-    from logger.identification.fit import Fit
-    from logger.identification.noise import Noise
+    from logger.identification.fit import Fit, Options
     from logger.identification.prediction import VehicleModel
     from logger.identification.record import Record
     from logger.identification.road_input import RoadInput
@@ -55,14 +52,9 @@ if TYPE_CHECKING:
     from logger.vehicle.vehicle import Vehicle
 
 NOISES = ("auto", "white", "ar", "road")
-_SAME_RATE = 1e-6
-_LEAST_SAMPLES = 50
 _MOST_TRIES = 1000
-# A mean beyond this is gravity [m/s2]; a fit that leaves more than this share is tried with the record turned over.
-_LARGEST_MEAN_MPS2, _POOR = 2.0, 0.3
-# Of roads that were not measured: how wavy, and how much of one is enough, and not too much, for one fit [m].
+# Of roads that were not measured: how wavy.
 _WAVINESS, _FLATTEST, _STEEPEST, _FREE_WAVINESS = 2.0, 1.0, 3.5, "road.waviness"
-_LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
 # By how much the distances of two drives over one road may disagree.
 _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
 
@@ -83,13 +75,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--same-road", action="store_true",
                         help="the road was not measured; all runs are over the same one; their places may be "
                              "off by 10 m, their distances by 1 per cent")
-    parser.add_argument("--waviness", type=float, metavar="W",
-                        help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
+    add_number(parser, "--waviness", _FLATTEST, _STEEPEST, metavar="W",
+               help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
                         help="where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat")
-    parser.add_argument("--tries", type=int, default=0, metavar="N", help="so many further starts, spread around")
+    add_number(parser, "--tries", 0, _MOST_TRIES, kind=int, default=0, metavar="N",
+               help="so many further starts, spread around")
     parser.add_argument("--noise", choices=NOISES, default="auto",
                         help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
                              "the profile does not contain, through the car); auto: the likeliest (default)")
@@ -113,6 +106,7 @@ def _measured(args: argparse.Namespace) -> int:
     """A fit over roads that are known, but for a few numbers."""
     from logger.identification.common_roughness import with_common_roughness
     from logger.identification.report import as_json, common_words, lines, tests
+    from logger.identification.session import UnusableRun, error_before, upright_fit
     from logger.identification.verdict import NotIdentifiable
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
@@ -121,14 +115,18 @@ def _measured(args: argparse.Namespace) -> int:
         raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
     vehicle = read_vehicle(vehicle_path(args.vehicle))
     road, unplaced = _road(args)
-    records = [_record(path, args.skip, bool(road.obstacles)) for path in args.runs]
+    records = _records(args, flat_will_do=bool(road.obstacles))
     model_of = partial(_model, args, vehicle, road, unplaced)
     model = model_of(records)
     try:
-        found = _upright_fit(args, model_of, records)
+        found = upright_fit(model_of, records, partial(_options, args))
+    except UnusableRun as error:
+        raise BadInput(f"{args.runs[error.run]}: {error}") from None
+    except ValueError as error:
+        raise BadInput(f"{args.runs[0]}: {error}") from None
     except NotIdentifiable as refusal:
         if args.json:
-            print(json.dumps(_refused(model, refusal), allow_nan=False))
+            print(json.dumps(_nothing_told(refusal, error_before(model)), allow_nan=False))
             print(f"ridelog: {refusal}", file=sys.stderr)
             return EXIT_CHECK_FAILED
         raise
@@ -150,44 +148,16 @@ def _measured(args: argparse.Namespace) -> int:
     return EXIT_DONE if found.converged else EXIT_CHECK_FAILED
 
 
-def _upright_fit(args: argparse.Namespace, model_of: Callable[[list[Record]], VehicleModel],
-                 records: list[Record]) -> Fit:
-    """The fit. NotIdentifiable for what the records do not tell, or tell only when they are turned over."""
-    from logger.identification.verdict import NotIdentifiable, upside_down
-
-    try:
-        found: Fit | NotIdentifiable = _fit(args, model_of(records))
-    except NotIdentifiable as refusal:
-        found = refusal
-    error = 1.0 if isinstance(found, NotIdentifiable) else found.error_after
-    if error > _POOR:
-        turned = [replace(record, measured_mps2=-record.measured_mps2) for record in records]
-        try:
-            findings = upside_down(error, _fit(args, model_of(turned)).error_after)
-        except NotIdentifiable:
-            findings = []
-        if findings:
-            raise NotIdentifiable(findings)
-    if isinstance(found, NotIdentifiable):
-        raise found
-    return found
-
-
-def _fit(args: argparse.Namespace, model: VehicleModel) -> Fit:
-    from logger.identification.fit import fit
-
-    options = _options(args, model)
-    try:
-        return fit(model, model.measured, options)
-    except ValueError as error:
-        raise BadInput(f"{args.runs[0]}: {error}") from None
-
-
 def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced: list[str],
            records: list[Record]) -> VehicleModel:
     from logger.identification.prediction import VehicleModel
+    from logger.identification.session import obstacle_starts
 
-    free = _free(args, vehicle, road, _starts(vehicle, records, road, unplaced))
+    try:
+        starts = obstacle_starts(vehicle, records, road, unplaced)
+    except ValueError as error:
+        raise BadInput(f"--{error}") from None
+    free = _free(args, vehicle, road, starts)
     try:
         return VehicleModel(vehicle, free, records, road)
     except ValueError as error:
@@ -199,6 +169,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
     from logger.identification.axle_response import AxleResponse
     from logger.identification.road_input import RoadInput
     from logger.identification.road_report import as_json, lines
+    from logger.identification.session import UnusableRun, drives_of
     from logger.identification.shared_road import fit_roads
     from logger.identification.verdict import NotIdentifiable
     from logger.shipped import vehicle_path
@@ -206,7 +177,11 @@ def _unmeasured(args: argparse.Namespace) -> int:
 
     options = _road_options(args)
     vehicle = read_vehicle(vehicle_path(args.vehicle))
-    drives = _drives(args)
+    records = _records(args, flat_will_do=True)
+    try:
+        drives = drives_of(records)
+    except UnusableRun as error:
+        raise BadInput(f"{args.runs[error.run]}: {error}") from None
     free = _free(args, vehicle, RoadInput(), {})
     try:
         car = AxleResponse(vehicle, free, drives[0].rate_hz)
@@ -248,27 +223,10 @@ def _road_options(args: argparse.Namespace) -> Any:
     if args.same_road and len(args.runs) < 2:
         raise BadInput("--same-road: expected two runs or more")
     waviness = _WAVINESS if args.waviness is None else args.waviness
-    if not _FLATTEST <= waviness <= _STEEPEST:
-        raise BadInput(f"--waviness {waviness:g}: expected {_FLATTEST:g} to {_STEEPEST:g}")
     names = [name.strip() for name in args.free.split(",")]
     args.free = ",".join(name for name in names if name != _FREE_WAVINESS)
     return Options(waviness=waviness, free_waviness=_FREE_WAVINESS in names, place_off_m=_PLACES_OFF_M,
                    scale_off=_SCALE_OFF)
-
-
-def _drives(args: argparse.Namespace) -> list[Drive]:
-    """The runs without their roads. BadInput for files that are none, runs too short, and other rates."""
-    from logger.identification.crossing import Drive
-
-    drives = []
-    for path in args.runs:
-        record = _record(path, args.skip, True)
-        drives.append(Drive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
-        length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
-        if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
-            raise BadInput(f"{path}: expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of way, found {length_m:g} m")
-    _check_rates(args.runs, [drive.rate_hz for drive in drives])
-    return drives
 
 
 def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
@@ -325,21 +283,6 @@ def _road(args: argparse.Namespace) -> tuple[RoadInput, list[str]]:
     return RoadInput(**found), unplaced
 
 
-def _starts(vehicle: Vehicle, records: list[Record], road: RoadInput, unplaced: list[str]) -> dict[str, float]:
-    """Where an obstacle that was given no start begins in each run, by the names of these numbers."""
-    from logger.identification.locate import located
-    from logger.identification.road_input import EACH, expanded
-
-    found = {}
-    for part in unplaced:
-        for name, record in zip(expanded(f"{EACH}.{part}.start_m", len(records)), records, strict=True):
-            try:
-                found[name] = located(vehicle, record, road, part)
-            except ValueError as error:
-                raise BadInput(f"--{error}") from None
-    return found
-
-
 def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
     name, _, rest = text.partition("=")
     try:
@@ -351,10 +294,28 @@ def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
     return name, values
 
 
+def _records(args: argparse.Namespace, flat_will_do: bool) -> list[Record]:
+    """The runs, on their roads or where that will do on a flat one. BadInput for files that are not what they should
+    be, runs too short, and rates that differ."""
+    from logger.identification.session import UnusableRun, check_records, off_rate
+
+    records = [_record(path, args.skip, flat_will_do) for path in args.runs]
+    try:
+        check_records(records)
+    except UnusableRun as error:
+        raise BadInput(f"{args.runs[error.run]}: {error}") from None
+    rates_hz = [record.rate_hz for record in records]
+    if (run := off_rate(rates_hz)) is not None:
+        raise BadInput(f"{args.runs[run]}: expected {rates_hz[0]:g} samples a second as in {args.runs[0]}, found "
+                       f"{rates_hz[run]:g}")
+    return records
+
+
 def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
     import numpy as np
 
     from logger.identification.record import Record
+    from logger.identification.session import LEAST_SAMPLES
     from logger.profiles.track import Track
     from logger.store.drive_file import DRIVE, PROFILE, Run, read_drive, read_run
 
@@ -364,44 +325,19 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
     else:
         drive = read_run(path)
     track = drive.track if isinstance(drive, Run) else Track(1.0, np.zeros(2))
-    if not 0 <= skip_s < len(drive.time_s) / drive.rate_hz - _LEAST_SAMPLES / drive.rate_hz:
-        raise BadInput(f"{path}: expected at least {_LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
+    if not 0 <= skip_s < len(drive.time_s) / drive.rate_hz - LEAST_SAMPLES / drive.rate_hz:
+        raise BadInput(f"{path}: expected at least {LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
                        f"left out (--skip), found {len(drive.time_s) / drive.rate_hz:g} s in all")
-    record = Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
-    if not np.ptp(record.kept_mps2) > 0:
-        raise BadInput(f"{path}: expected an acceleration that moves, found {record.kept_mps2[0]:g} m/s2 all along")
-    if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
-        raise BadInput(f"{path}: expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on average "
-                       "(subtract the mean while the car stood)")
-    return record
+    return Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
 
 
-def _options(args: argparse.Namespace, model: VehicleModel) -> Any:
-    from logger.identification.fit import Options, spread_starts
-    from logger.identification.low_pass import LowPass
-    from logger.identification.noise import Autoregressive, RoadNoise, White
+def _options(args: argparse.Namespace, model: VehicleModel) -> Options:
+    from logger.identification.session import fit_options
 
     rate_hz = model.records[0].rate_hz
-    _check_rates(args.runs, [record.rate_hz for record in model.records])
     if args.low_pass is not None and not 0 < args.low_pass < rate_hz / 2:
         raise BadInput(f"--low-pass {args.low_pass:g}: expected above 0 and below {rate_hz / 2:g} Hz")
-    reach = LowPass(rate_hz, args.low_pass).reach
-    for path, measured in zip(args.runs, model.measured, strict=True):
-        if len(measured) <= reach:
-            raise BadInput(f"{path}: expected more than {reach} samples for --low-pass {args.low_pass:g}, found "
-                           f"{len(measured)} after the first {args.skip:g} s")
-    if not 0 <= args.tries <= _MOST_TRIES:
-        raise BadInput(f"--tries {args.tries}: expected 0 to {_MOST_TRIES}")
-    kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
-    return Options(rate_hz=rate_hz, low_pass_hz=args.low_pass, robust=args.robust,
-                   noise=list(kinds.values()) if args.noise == "auto" else [kinds[args.noise]],
-                   starts=spread_starts(model.parameters, args.tries))
-
-
-def _check_rates(paths: list[Path], rates_hz: list[float]) -> None:
-    for path, rate_hz in zip(paths, rates_hz, strict=True):
-        if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE:
-            raise BadInput(f"{path}: expected {rates_hz[0]:g} samples a second as in {paths[0]}, found {rate_hz:g}")
+    return fit_options(model, args.noise, args.low_pass, args.robust, args.tries)
 
 
 # --- what is told ---
@@ -411,17 +347,6 @@ def _head(vehicle: Vehicle, free: int, samples: list[int], rate_hz: float, more:
     runs = "1 run" if len(samples) == 1 else f"{len(samples)} runs"
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, {sum(samples)} samples at "
             f"{rate_hz:.5g} Hz{more}")
-
-
-def _refused(model: VehicleModel, refusal: NotIdentifiable) -> dict[str, Any]:
-    import numpy as np
-
-    from logger.identification.fit import normalised_error
-
-    predictions = model.predict(np.array([one.start for one in model.parameters]))
-    before = normalised_error(model.measured, [seen - one for seen, one in
-                                               zip(model.measured, predictions, strict=True)])
-    return _nothing_told(refusal, before)
 
 
 def _nothing_told(refusal: NotIdentifiable, before: float | None) -> dict[str, Any]:

@@ -201,8 +201,7 @@ def _check_sensor(runs: Runs, predictions: Sequence[Array]) -> None:
 
 def _predicted(word: str, model: Model, runs: Runs, effects: Sequence[Chosen]) -> list[Array]:
     """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
-    from logger.lab.prediction import bounded
-    from logger.vehicle.compose import compose
+    from logger.vehicle.compose import bounded, compose
 
     try:
         predictions = runs.predict(compose(model.vehicle, effects))

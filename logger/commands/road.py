@@ -11,9 +11,11 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
@@ -22,9 +24,7 @@ if TYPE_CHECKING:
     from logger.roads.spectrum import Array, Roughness
     from logger.store.profile_file import Profile
 
-_LENGTHS_M = (11.0, 1e6)
-_SPACINGS_M = (0.001, 0.3)
-_WAVINESSES = (1.5, 3.0)
+_SHORTEST_M = 11.0  # for an IRI
 _MOST_SAMPLES = 20_000_000
 _LINES_AT_ONCE = 100_000
 
@@ -37,13 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rough = make.add_mutually_exclusive_group(required=True)
     rough.add_argument("--class", dest="road_class", metavar="A-H", type=str.upper, choices=list("ABCDEFGH"),
                        help="class; the road gets the geometric mean of its degrees of roughness")
-    rough.add_argument("--gd", type=float, metavar="CM3", help="degree of roughness Gd(n0) [cm3]")
-    rough.add_argument("--iri", type=float, metavar="M_PER_KM",
-                       help="IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation")
-    make.add_argument("--waviness", type=float, default=2.0, metavar="W", help="1.5 to 3 (default: 2)")
-    make.add_argument("--length", type=float, default=1000.0, metavar="M", help="[m] (default: 1000)")
-    make.add_argument("--spacing", type=float, default=0.05, metavar="M", help="between samples [m] (default: 0.05)")
-    make.add_argument("--seed", type=int, default=1, metavar="N", help="another number, another road (default: 1)")
+    add_number(rough, "--gd", 1e-3, 1e7, "cm3", metavar="CM3", help="degree of roughness Gd(n0) [cm3]")
+    add_number(rough, "--iri", 0.01, 1000, "m/km", metavar="M_PER_KM",
+               help="IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation")
+    add_number(make, "--waviness", 1.5, 3.0, default=2.0, metavar="W", help="1.5 to 3 (default: 2)")
+    add_number(make, "--length", _SHORTEST_M, 1e6, "m", default=1000.0, metavar="M", help="[m] (default: 1000)")
+    add_number(make, "--spacing", 0.001, 0.3, "m", default=0.05, metavar="M",
+               help="between samples [m] (default: 0.05)")
+    add_number(make, "--seed", 0, inf, kind=int, default=1, metavar="N",
+               help="another number, another road (default: 1)")
     make.add_argument("--out", type=Path, metavar="FILE", help="CSV file to write (default: to stdout)")
     make.add_argument("--json", action="store_true", help="print what was made as one JSON object; needs --out")
 
@@ -71,18 +73,13 @@ def _generate(args: argparse.Namespace) -> int:
 
     if args.json and args.out is None:
         raise BadInput("--json: expected --out FILE with it, as stdout holds the JSON")
-    _check_range("--length", args.length, *_LENGTHS_M, "m")
-    _check_range("--spacing", args.spacing, *_SPACINGS_M, "m")
-    _check_range("--waviness", args.waviness, *_WAVINESSES, "")
-    if args.seed < 0:
-        raise BadInput(f"--seed {args.seed}: expected 0 or more")
     if args.length / args.spacing > _MOST_SAMPLES:
         raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected at most {_MOST_SAMPLES} samples")
     gd_n0_cm3 = _wanted_gd(args)
     last_m = int(args.length / args.spacing + 1e-9) * args.spacing
-    if last_m < _LENGTHS_M[0]:
+    if last_m < _SHORTEST_M:
         raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected the last sample at "
-                       f"{_LENGTHS_M[0]:g} m or more, it lies at {last_m:g} m")
+                       f"{_SHORTEST_M:g} m or more, it lies at {last_m:g} m")
     elevation = generate(gd_n0_cm3, args.length, args.spacing, args.seed, args.waviness)
     made = {
         "class": road_class(gd_n0_cm3), "gd_n0_cm3": gd_n0_cm3, "waviness": args.waviness, "seed": args.seed,
@@ -106,17 +103,10 @@ def _wanted_gd(args: argparse.Namespace) -> float:
     if args.road_class is not None:
         return iso8608.CLASS_GD_N0_CM3[args.road_class]
     if args.gd is not None:
-        _check_range("--gd", args.gd, 1e-3, 1e7, "cm3")
         return float(args.gd)
-    _check_range("--iri", args.iri, 0.01, 1000, "m/km")
     if args.waviness == iso8608.STANDARD_WAVINESS:
         return iso8608.gd_n0_from_iri(args.iri)
     return gd_iri.gd_of_road(args.iri, args.length, args.waviness).value
-
-
-def _check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    if not lowest <= value <= highest:
-        raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}".rstrip())
 
 
 def _csv(elevation_m: Array, spacing_m: float) -> Iterator[str]:

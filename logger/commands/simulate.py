@@ -17,18 +17,19 @@ asked for is the true one: with speed_scale the drive's own columns say somethin
 from __future__ import annotations
 
 import argparse
-import inspect
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.commands.lab_model import check_out
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
-    from logger.profiles.track import Array, Track
+    from logger.profiles.track import Track
+    from logger.simulation.virtual_drive import Motion
     from logger.vehicle.compose import Car
     from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
@@ -37,18 +38,7 @@ if TYPE_CHECKING:
 _SPEEDS_MPS = (0.1, 100.0)
 _RATES_HZ = (10.0, 10_000.0)
 _FLAT_M = (1.0, 10_000.0)
-_MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
-_MOST_SAMPLES = 5_000_000
-AFTER_S = 1.0
-"""How long a drive at one speed goes on after the last wheel has left the profile."""
-OBSTACLE_SPACING_M = 0.01
-_LARGEST_M = 10_000.0  # of an obstacle
-_NEARLY = 1e-6  # of a step: what rounding may do
-_FEWEST_STEPS = 2  # of the road, that an obstacle spans
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
-_STEPS_MATTER = 0.05  # of a simulation's r.m.s., when its steps are halved
-_NO_MOTION_MPS2 = 1e-6
-_SHORT_M = 0.5  # of a way on which a distorted distance is as good as straight
 OUTPUTS = ("wheels", "travel", "tires", "body")
 
 
@@ -59,13 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     road.add_argument("--profile", type=Path, metavar="FILE",
                       help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
                            "both, other cars the left one")
-    road.add_argument("--flat", type=float, metavar="M", help="a flat road of this length instead [m]")
+    add_number(road, "--flat", *_FLAT_M, "m", metavar="M", help="a flat road of this length instead [m]")
     parser.add_argument("--obstacle", action="append", default=[], metavar="NAME:PARAM=VALUE,...",
                         help="add one to the road; may repeat. bump (Eq 4.41): start_m, height_m, width_m; step: "
                              "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; "
                              "pothole: start_m, depth_m, length_m[, edge_m]")
     speed = parser.add_mutually_exclusive_group()
-    speed.add_argument("--speed", type=float, metavar="MPS", help="the same all the way [m/s]")
+    add_number(speed, "--speed", *_SPEEDS_MPS, "m/s", metavar="MPS", help="the same all the way [m/s]")
     speed.add_argument("--speed-file", type=Path, metavar="FILE",
                        help="CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file")
     parser.add_argument("--effect", action="append", default=[], metavar="NAME[:PARAM=VALUE,...]",
@@ -78,11 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run")
     parser.add_argument("--profile-out", type=Path, metavar="FILE",
                         help="write the road that was driven as well, with its obstacles")
-    parser.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="samples a second (default: 100)")
-    parser.add_argument("--noise", type=float, default=0.0, metavar="MPS2", help="r.m.s. of the sensor's noise [m/s2]")
-    parser.add_argument("--step", type=float, default=0.0, metavar="MPS2",
-                        help="the sensor gives whole multiples of this only [m/s2]")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="another number, another noise (default: 1)")
+    add_number(parser, "--rate", *_RATES_HZ, "Hz", default=100.0, metavar="HZ",
+               help="samples a second (default: 100)")
+    add_number(parser, "--noise", 0.0, 100.0, "m/s2", default=0.0, metavar="MPS2",
+               help="r.m.s. of the sensor's noise [m/s2]")
+    add_number(parser, "--step", 0.0, 100.0, "m/s2", default=0.0, metavar="MPS2",
+               help="the sensor gives whole multiples of this only [m/s2]")
+    add_number(parser, "--seed", 0, inf, kind=int, default=1, metavar="N",
+               help="another number, another noise (default: 1)")
     parser.add_argument("--output", action="append", default=[], metavar="WHAT",
                         help="further columns; may repeat. wheels: their acceleration; travel: extension of the "
                              "suspensions; tires: height of the wheels over the road; body:ahead_m=X,left_m=Y: "
@@ -102,25 +95,28 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
+    from logger.simulation.virtual_drive import SENSOR, as_sensed, response, response_with_effects
     from logger.store.drive_file import write_drive, write_profile
 
     _check_given(args)
-    _check_numbers(args)
+    _check_files(args)
     check_out(args.out, ())
     if args.profile_out is not None:
         check_out(args.profile_out, (), option="--profile-out")
     vehicle, effects, said = _model(args.vehicle, args.effect)
-    track = _with_obstacles(_road(args), args.obstacle)
+    track = _road(args)
     car = _car(vehicle, effects, said, track)
     outputs = _outputs(args.output, car.vehicle, car.structure)
     motion = _motion(args, track, float(car.structure.behind_m.max()))
     if effects:
-        columns, motion = _respond_with_effects(car, outputs, track, motion, args.rate)
+        try:
+            columns, motion = response_with_effects(car, outputs, track, motion, args.rate)
+        except ValueError as error:
+            raise BadInput(f"{car.vehicle.name}: {error}") from None
     else:
-        responses = _respond(car.structure, list(outputs.values()), track, motion, args.rate)
-        columns = dict(zip(outputs, responses.T, strict=True))
-    accel = _as_sensed(columns.pop("accel_z_mps2"), args.noise, args.step, args.seed)
-    write_drive(args.out, {"t_s": motion.time_s, "accel_z_mps2": accel, "speed_mps": motion.speed_mps,
+        columns = response(car.structure, outputs, track, motion, args.rate)
+    accel = as_sensed(columns.pop(SENSOR), args.noise, args.step, args.seed)
+    write_drive(args.out, {"t_s": motion.time_s, SENSOR: accel, "speed_mps": motion.speed_mps,
                            "distance_m": motion.distance_m, **columns})
     if args.profile_out is not None:
         write_profile(args.profile_out, track)
@@ -159,27 +155,13 @@ def _check_given(args: argparse.Namespace) -> None:
         raise BadInput(f"simulate: expected {', '.join(missing)} as well (try 'ridelog simulate --help')")
 
 
-def _check_numbers(args: argparse.Namespace) -> None:
+def _check_files(args: argparse.Namespace) -> None:
     from logger.shipped import vehicle_path
 
-    _check_range("--rate", args.rate, *_RATES_HZ, "Hz")
-    _check_range("--noise", args.noise, 0.0, 100.0, "m/s2")
-    _check_range("--step", args.step, 0.0, 100.0, "m/s2")
-    if args.seed < 0:
-        raise BadInput(f"--seed {args.seed}: expected 0 or more")
-    if args.speed is not None:
-        _check_range("--speed", args.speed, *_SPEEDS_MPS, "m/s")
-    if args.flat is not None:
-        _check_range("--flat", args.flat, *_FLAT_M, "m")
     read = (vehicle_path(args.vehicle), args.profile, args.speed_file)
     files = [path.resolve() for path in (args.out, args.profile_out, *read) if path is not None]
     if len(set(files)) < len(files):
         raise BadInput(f"--out {args.out}: expected every file to be another one")
-
-
-def _check_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
-    if not lowest <= value <= highest:
-        raise BadInput(f"{name} {value:g}: expected {lowest:g} to {highest:g} {unit}")
 
 
 def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
@@ -240,9 +222,10 @@ def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
 
 def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
     """Outputs by the names of their columns, the sensor's first."""
+    from logger.simulation.virtual_drive import SENSOR
     from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 
-    found = {"accel_z_mps2": body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)}
+    found = {SENSOR: body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)}
     each = {"wheels": ("wheel_{}_mps2", wheel), "travel": ("travel_{}_m", suspension_travel),
             "tires": ("tire_{}_m", tire_deflection)}
     for text in wanted:
@@ -262,165 +245,35 @@ def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[
     return found
 
 
-# --- the road ---
+# --- the road and the way ---
 
 
 def _road(args: argparse.Namespace) -> Track:
+    """The road with the obstacles on it. BadInput for files and obstacles that are not what they should be."""
     import numpy as np
 
     from logger.profiles.track import Track
+    from logger.simulation.virtual_drive import Obstacle, with_obstacles
     from logger.store.drive_file import track_of
     from logger.store.profile_file import read_profile
 
-    return Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
-
-
-def _with_obstacles(track: Track, wanted: list[str]) -> Track:
-    """The road with its obstacles; sampled more densely, with straight lines, where they would fall between samples."""
-    import numpy as np
-
-    from logger.profiles.track import Track
-    from logger.roads.obstacles import OBSTACLES
-
-    if not wanted:
-        return track
-    parts = int(np.ceil(track.spacing_m / OBSTACLE_SPACING_M - 1e-9))
-    count = (len(track.elevation_m) - 1) * parts + 1
-    if count > _MOST_SAMPLES:
-        raise BadInput(f"--obstacle: expected a road of at most {_MOST_SAMPLES * OBSTACLE_SPACING_M / 1000:g} km")
-    number = np.arange(count) / parts
-    columns = track.elevation_m.reshape(len(track.elevation_m), -1).T
-    dense = np.stack([np.interp(number, np.arange(len(column)), column) for column in columns], axis=1)
-    distance = track.start_m + track.spacing_m * number
-    for text in wanted:
-        name, parameters = named_numbers(text, "--obstacle")
-        if name not in OBSTACLES:
-            raise BadInput(f"--obstacle {text}: expected one of {', '.join(OBSTACLES)}")
-        known = list(inspect.signature(OBSTACLES[name]).parameters.values())[1:]
-        needed = {one.name for one in known if one.default is inspect.Parameter.empty}
-        if not needed <= set(parameters) <= {one.name for one in known}:
-            raise BadInput(f"--obstacle {text}: expected {name}:{','.join(f'{one.name}=M' for one in known)}")
-        try:
-            _check_place(parameters, distance)
-            added = OBSTACLES[name](distance, **parameters)
-        except ValueError as error:
-            raise BadInput(f"--obstacle {text}: {error}") from None
-        if added.all():
-            raise BadInput(f"--obstacle {text}: expected some road before it, from {track.start_m:g} m on")
-        dense += added[:, None]
-    return Track(track.spacing_m / parts, dense.reshape(count, *track.elevation_m.shape[1:]), track.start_m)
-
-
-def _check_place(parameters: dict[str, float], distance_m: Array) -> None:
-    """ValueError for an obstacle that is too large, not all on the road, or lost between the samples of the road."""
-    for name, value in parameters.items():
-        if name != "start_m" and abs(value) > _LARGEST_M:
-            raise ValueError(f"expected {name} within {_LARGEST_M:g} m, found {value:g}")
-    first_m, last_m = float(distance_m[0]), float(distance_m[-1])
-    step_m = (last_m - first_m) / (len(distance_m) - 1)
-    start_m = parameters["start_m"]
-    extent_m = parameters.get("width_m", parameters.get("length_m"))
-    end_m = start_m + (extent_m or 0.0)
-    if start_m < first_m - _NEARLY * step_m or end_m > last_m + _NEARLY * step_m:
-        raise ValueError(f"expected it on the road, {first_m:g} to {last_m:g} m, found {start_m:g} to {end_m:g} m")
-    if extent_m is not None and 0 < extent_m < (_FEWEST_STEPS - _NEARLY) * step_m:
-        raise ValueError(f"expected it to be {_FEWEST_STEPS * step_m:g} m long or more, found {extent_m:g} m")
-
-
-# --- the drive ---
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Where the front tires are, at the recorder's instants: arrays (n,) [s, m/s, m]."""
-
-    time_s: Array
-    speed_mps: Array
-    distance_m: Array
+    track = Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
+    wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
+    try:
+        return with_obstacles(track, wanted)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
 
 
 def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motion:
-    import numpy as np
-
+    from logger.simulation.virtual_drive import at_one_speed, motion_along
     from logger.store.drive_file import read_speeds
-    from logger.vehicle.simulate import FINE_RATE_HZ
 
-    if args.speed is not None:
-        length_m = track.end_m - track.start_m + wheelbase_m
-        knots_s, knots_mps = np.array([0.0, length_m / args.speed + AFTER_S]), np.full(2, args.speed)
-    else:
-        knots_s, knots_mps = read_speeds(args.speed_file)
-    duration_s = float(knots_s[-1] - knots_s[0])
-    count = int(duration_s * args.rate + 1e-6) + 1
-    longest_s = _MOST_STEPS / max(args.rate, FINE_RATE_HZ)
-    if count < 2 or duration_s > longest_s:
-        raise BadInput(f"expected a drive of {1 / args.rate:g} to {longest_s:g} s, found {duration_s:g} s")
-    time_s = knots_s[0] + np.arange(count) / args.rate
-    at_knots = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots_s) * (knots_mps[:-1] + knots_mps[1:]))])
-    last = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
-    speed_mps = np.interp(time_s, knots_s, knots_mps)
-    driven = at_knots[last] + 0.5 * (time_s - knots_s[last]) * (knots_mps[last] + speed_mps)
-    return Motion(time_s, speed_mps, track.start_m + driven)
-
-
-def _respond(structure: Structure, outputs: list[Output], track: Track, motion: Motion, rate_hz: float) -> Array:
-    """The outputs (n, p), the car having come to the start on a flat road as fast as it goes there."""
-    import numpy as np
-
-    from logger.vehicle.simulate import drive
-
-    pace_m = float(motion.distance_m[1] - motion.distance_m[0])
-    lead = int(np.ceil(structure.contact_patch_m / pace_m)) if pace_m > 0 else 0
-    lead = min(lead, int(rate_hz))
-    before = np.arange(-lead, 0)
-    time_s = np.concatenate([motion.time_s[0] + before / rate_hz, motion.time_s])
-    distance_m = np.concatenate([motion.distance_m[0] + pace_m * before, motion.distance_m])
-    return drive(structure, outputs, track, time_s, distance_m)[lead:]
-
-
-def _respond_with_effects(
-    car: Car, outputs: dict[str, Output], track: Track, motion: Motion, rate_hz: float
-) -> tuple[dict[str, Array], Motion]:
-    """The columns of a car with effects, and the motion as it is recorded."""
-    import numpy as np
-
-    from logger.lab.prediction import bounded
-    from logger.vehicle.compose import recorded
-    from logger.vehicle.observe import observed, recorded_distance
-    from logger.vehicle.passage import Passage
-    from logger.vehicle.simulate import FINE_RATE_HZ
-
-    passage = Passage(track, rate_hz, motion.distance_m)
-    more = {name: output for name, output in outputs.items() if name != "accel_z_mps2"}
-    with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is refused below
-        accel = recorded(car, passage)
-        if car.bends_laws:
-            finer = recorded(car, Passage(track, rate_hz, motion.distance_m, 2 * FINE_RATE_HZ))
-            allowed = max(_NO_MOTION_MPS2, _STEPS_MATTER * float(np.sqrt(np.mean(finer**2))))
-            if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
-                raise BadInput(f"{car.vehicle.name}: its effects are too strong for its masses: they would need steps "
-                               f"shorter than {1000 / FINE_RATE_HZ:g} ms")
-            accel = finer if car.rubs else accel
-    if not bounded([accel]):
-        raise BadInput(f"{car.vehicle.name}: with its effects the car's motion grows without bound")
-    columns = {"accel_z_mps2": accel}
-    if more:
-        columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
+    knots = (at_one_speed(track, wheelbase_m, args.speed) if args.speed is not None else read_speeds(args.speed_file))
     try:
-        distance_m = recorded_distance(car, motion.distance_m)
+        return motion_along(*knots, track.start_m, args.rate)
     except ValueError as error:
-        raise BadInput(f"{car.vehicle.name}: {error}") from None
-    stretch = (car.driven(distance_m + _SHORT_M) - car.driven(distance_m - _SHORT_M)) / (2 * _SHORT_M)
-    return columns, Motion(motion.time_s, motion.speed_mps / stretch, distance_m)
-
-
-def _as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int) -> Array:
-    """With the sensor's noise, then rounded to its steps."""
-    import numpy as np
-
-    if noise_mps2:
-        accel_mps2 = accel_mps2 + noise_mps2 * np.random.default_rng(seed).standard_normal(len(accel_mps2))
-    return step_mps2 * np.round(accel_mps2 / step_mps2) if step_mps2 else accel_mps2
+        raise BadInput(str(error)) from None
 
 
 # --- the effects there are ---

@@ -19,15 +19,13 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.profiles.track import Track
-from logger.vehicle.compose import Car, Response, recorded, respond
+from logger.vehicle.compose import MOST_MPS2, Car, Response, recorded, respond
 from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import FINE_RATE_HZ
 
 Array = npt.NDArray[np.float64]
 
 SKIP_S = 2.0
-MOST_MPS2 = 1e6
-"""Predictions end here: those of a car whose motion grows without bound, which effects may make."""
 _KEPT_PASSAGES = 4
 _STEPPERS = 2
 # Dry friction changes at once: it needs so many times the steps that other laws need.
@@ -120,11 +118,6 @@ def _recorded(car: Car, passage: Passage) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         found = recorded(car, passage)
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
-
-
-def bounded(predictions: Sequence[Array]) -> bool:
-    """Whether the car that they are of moves as cars do, and does not shake itself to pieces."""
-    return all(float(np.abs(one).max()) < MOST_MPS2 for one in predictions)
 
 
 def error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:

@@ -26,6 +26,9 @@ from logger.vehicle.vehicle import Axle, Vehicle
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+MOST_MPS2 = 1e6
+"""Records end here: those of a car whose motion grows without bound, which effects may make."""
+
 
 @dataclass(frozen=True, eq=False)
 class Car:
@@ -143,6 +146,11 @@ def respond(car: Car, passage: Passage) -> Response:
         passage.recorded(accel, car.factor), coordinates @ structure.travel.T, velocities @ structure.travel.T,
         coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps,
     )
+
+
+def bounded(records: Sequence[Array]) -> bool:
+    """Whether the car that they are of moves as cars do, and does not shake itself to pieces."""
+    return all(float(np.abs(one).max()) < MOST_MPS2 for one in records)
 
 
 def moved(car: Car, passage: Passage) -> Motion:

@@ -1,0 +1,26 @@
+"""Options that are numbers within a range, checked where they are declared."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from logger.errors import BadInput
+
+
+def add_number(
+    parser: argparse.ArgumentParser | argparse._ArgumentGroup, option: str, low: float, high: float, unit: str = "",
+    *, kind: type[float] | type[int] = float, **rest: Any,
+) -> None:
+    """Add an option whose number lies from ``low`` to ``high`` (infinity: no end). BadInput, which names the option,
+    for another one; ``rest`` as ``add_argument`` takes it."""
+    allowed = f"{low:g} or more" if high == float("inf") else f"{low:g} to {high:g} {unit}".rstrip()
+
+    def number(text: str) -> float:
+        value = kind(text)
+        if not low <= value <= high:
+            raise BadInput(f"{option} {value if kind is int else format(value, 'g')}: expected {allowed}")
+        return value
+
+    number.__name__ = kind.__name__  # argparse names it when a text is no number at all
+    parser.add_argument(option, type=number, **rest)

@@ -1,0 +1,132 @@
+"""A fit from records to numbers: records that can be used, starts that are looked for, and the right way up.
+
+Problem: before and after a fit there are questions that no optimiser answers. Can these records be what they say? Where
+does a bump lie of which only the kind is known? Is the sensor upside down? Solution: each is a function of arrays here;
+what is wrong with one run is raised as ``UnusableRun`` with its number, so that a caller can name its file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from logger.identification.crossing import Drive
+from logger.identification.fit import Fit, Options, fit, normalised_error, spread_starts
+from logger.identification.locate import located
+from logger.identification.low_pass import LowPass
+from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
+from logger.identification.prediction import VehicleModel
+from logger.identification.record import Record
+from logger.identification.road_input import EACH, RoadInput, expanded
+from logger.identification.verdict import NotIdentifiable, upside_down
+from logger.vehicle.vehicle import Vehicle
+
+LEAST_SAMPLES = 50
+_SAME_RATE = 1e-6
+# A mean beyond this is gravity [m/s2]; a fit that leaves more than this share is tried with the record turned over.
+_LARGEST_MEAN_MPS2, _POOR = 2.0, 0.3
+# How much of a road that was not measured is enough, and not too much, for one fit [m].
+_LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
+
+
+class UnusableRun(ValueError):
+    """A run that cannot be fitted; ``run``: its number, counted from 0."""
+
+    def __init__(self, run: int, message: str) -> None:
+        super().__init__(message)
+        self.run = run
+
+
+def check_records(records: Sequence[Record]) -> None:
+    """``UnusableRun`` for an acceleration that never changes, or that gravity is in, and for rates that differ."""
+    for run, record in enumerate(records):
+        if not np.ptp(record.kept_mps2) > 0:
+            raise UnusableRun(run, "expected an acceleration that moves, "
+                                   f"found {record.kept_mps2[0]:g} m/s2 all along")
+        if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
+            raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
+                                   "average (subtract the mean while the car stood)")
+
+
+def off_rate(rates_hz: Sequence[float]) -> int | None:
+    """The first run whose samples a second are not those of the first run; None: all are."""
+    return next((run for run, rate_hz in enumerate(rates_hz) if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE), None)
+
+
+def drives_of(records: Sequence[Record]) -> list[Drive]:
+    """The records without their roads. ``UnusableRun`` for a way that is too short or too long."""
+    drives = []
+    for run, record in enumerate(records):
+        drives.append(Drive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
+        length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
+        if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
+            raise UnusableRun(run, f"expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of way, found {length_m:g} m")
+    return drives
+
+
+def obstacle_starts(
+    vehicle: Vehicle, records: Sequence[Record], road: RoadInput, unplaced: Sequence[str]
+) -> dict[str, float]:
+    """Where obstacles that were given no start ("bump", "step") begin in each run [m], by the names of these numbers.
+
+    ValueError as ``located``.
+    """
+    return {name: located(vehicle, record, road, part) for part in unplaced
+            for name, record in zip(expanded(f"{EACH}.{part}.start_m", len(records)), records, strict=True)}
+
+
+def fit_options(model: VehicleModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> Options:
+    """How to fit a model of records at one rate.
+
+    noise          noise model: white, ar, road, or auto, the likeliest of them
+    low_pass_hz    what lies above is left out [Hz]; None: nothing is
+    tries          so many further starts
+
+    ``UnusableRun`` for a record that is too short for the low pass.
+    """
+    rate_hz = model.records[0].rate_hz
+    reach = LowPass(rate_hz, low_pass_hz).reach
+    for run, measured in enumerate(model.measured):
+        if len(measured) <= reach:
+            raise UnusableRun(run, f"expected more than {reach} samples for --low-pass {low_pass_hz:g}, found "
+                                   f"{len(measured)} after the first {model.records[run].skip_s:g} s")
+    kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
+    return Options(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
+                   noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
+                   starts=spread_starts(model.parameters, tries))
+
+
+def upright_fit(
+    model_of: Callable[[list[Record]], VehicleModel], records: list[Record], options: Callable[[VehicleModel], Options]
+) -> Fit:
+    """The fit of the model of records. NotIdentifiable for what they do not tell, or tell only when they are turned
+    over; ValueError as ``fit``."""
+    def fitted(of: list[Record]) -> Fit:
+        model = model_of(of)
+        return fit(model, model.measured, options(model))
+
+    try:
+        found: Fit | NotIdentifiable = fitted(records)
+    except NotIdentifiable as refusal:
+        found = refusal
+    error = 1.0 if isinstance(found, NotIdentifiable) else found.error_after
+    if error > _POOR:
+        turned = [replace(record, measured_mps2=-record.measured_mps2) for record in records]
+        try:
+            findings = upside_down(error, fitted(turned).error_after)
+        except NotIdentifiable:
+            findings = []
+        if findings:
+            raise NotIdentifiable(findings)
+    if isinstance(found, NotIdentifiable):
+        raise found
+    return found
+
+
+def error_before(model: VehicleModel) -> float:
+    """rms(measured - model) / rms(measured) with every free number where it starts."""
+    predictions = model.predict(np.array([one.start for one in model.parameters]))
+    return normalised_error(model.measured, [measured - one for measured, one in
+                                             zip(model.measured, predictions, strict=True)])

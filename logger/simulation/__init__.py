@@ -1,0 +1,1 @@
+"""Drives of a model that never happened, as a recorder would have kept them."""

@@ -1,0 +1,201 @@
+"""A drive that never happened: a road with obstacles, a car over it, and what its sensor would have recorded.
+
+Problem: what a person asks for (a speed, obstacles, effects, a sensor) has to become what a model needs, and what no
+car can do (a jump of a kilometre, effects that a car's masses cannot follow) is to be refused in words. Solution: each
+step is a function of arrays. ``with_obstacles`` makes the road, ``motion_along`` the way driven over it, ``response``
+or ``response_with_effects`` what is felt on the way, ``as_sensed`` what a sensor makes of it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.profiles.track import Track
+from logger.roads.obstacles import OBSTACLES
+from logger.vehicle.compose import Car, bounded, recorded
+from logger.vehicle.observe import observed, recorded_distance
+from logger.vehicle.passage import Passage
+from logger.vehicle.simulate import FINE_RATE_HZ, drive
+from logger.vehicle.structure import Output, Structure
+
+Array = npt.NDArray[np.float64]
+
+SENSOR = "accel_z_mps2"
+"""The column of the sensor's acceleration."""
+AFTER_S = 1.0
+"""How long a drive at one speed goes on after the last wheel has left the profile."""
+OBSTACLE_SPACING_M = 0.01
+_MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
+_MOST_SAMPLES = 5_000_000
+_LARGEST_M = 10_000.0  # of an obstacle
+_NEARLY = 1e-6  # of a step: what rounding may do
+_FEWEST_STEPS = 2  # of the road, that an obstacle spans
+_STEPS_MATTER = 0.05  # of a simulation's r.m.s., when its steps are halved
+_NO_MOTION_MPS2 = 1e-6
+_SHORT_M = 0.5  # of a way on which a distorted distance is as good as straight
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """One of ``OBSTACLES`` with its parameters; ``asked``: as it was asked for, which begins a complaint about it."""
+
+    name: str
+    parameters: Mapping[str, float]
+    asked: str
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where the front tires are, at the recorder's instants: arrays (n,) [s, m/s, m]."""
+
+    time_s: Array
+    speed_mps: Array
+    distance_m: Array
+
+
+# --- the road ---
+
+
+def with_obstacles(track: Track, obstacles: Sequence[Obstacle]) -> Track:
+    """The road with its obstacles; sampled more densely, with straight lines, where they would fall between samples.
+
+    ValueError for an obstacle that is none, is too large, or does not lie on the road, and for a road that is too long.
+    """
+    if not obstacles:
+        return track
+    parts = int(np.ceil(track.spacing_m / OBSTACLE_SPACING_M - 1e-9))
+    count = (len(track.elevation_m) - 1) * parts + 1
+    if count > _MOST_SAMPLES:
+        longest_km = _MOST_SAMPLES * OBSTACLE_SPACING_M / 1000
+        raise ValueError(f"{obstacles[0].asked}: expected a road of at most {longest_km:g} km")
+    number = np.arange(count) / parts
+    columns = track.elevation_m.reshape(len(track.elevation_m), -1).T
+    dense = np.stack([np.interp(number, np.arange(len(column)), column) for column in columns], axis=1)
+    distance = track.start_m + track.spacing_m * number
+    for one in obstacles:
+        try:
+            _check_parameters(one)
+            _check_extent(one.parameters, distance)
+            added = OBSTACLES[one.name](distance, **one.parameters)
+        except ValueError as error:
+            raise ValueError(f"{one.asked}: {error}") from None
+        if added.all():
+            raise ValueError(f"{one.asked}: expected some road before it, from {track.start_m:g} m on")
+        dense += added[:, None]
+    return Track(track.spacing_m / parts, dense.reshape(count, *track.elevation_m.shape[1:]), track.start_m)
+
+
+def _check_parameters(one: Obstacle) -> None:
+    """ValueError, which says what there is, for a name or parameters that there are not."""
+    if one.name not in OBSTACLES:
+        raise ValueError(f"expected one of {', '.join(OBSTACLES)}")
+    known = list(inspect.signature(OBSTACLES[one.name]).parameters.values())[1:]
+    needed = {parameter.name for parameter in known if parameter.default is inspect.Parameter.empty}
+    if not needed <= set(one.parameters) <= {parameter.name for parameter in known}:
+        raise ValueError(f"expected {one.name}:{','.join(f'{parameter.name}=M' for parameter in known)}")
+
+
+def _check_extent(parameters: Mapping[str, float], distance_m: Array) -> None:
+    """ValueError for an obstacle that is too large, not all on the road, or lost between the samples of the road."""
+    for name, value in parameters.items():
+        if name != "start_m" and abs(value) > _LARGEST_M:
+            raise ValueError(f"expected {name} within {_LARGEST_M:g} m, found {value:g}")
+    first_m, last_m = float(distance_m[0]), float(distance_m[-1])
+    step_m = (last_m - first_m) / (len(distance_m) - 1)
+    start_m = parameters["start_m"]
+    extent_m = parameters.get("width_m", parameters.get("length_m"))
+    end_m = start_m + (extent_m or 0.0)
+    if start_m < first_m - _NEARLY * step_m or end_m > last_m + _NEARLY * step_m:
+        raise ValueError(f"expected it on the road, {first_m:g} to {last_m:g} m, found {start_m:g} to {end_m:g} m")
+    if extent_m is not None and 0 < extent_m < (_FEWEST_STEPS - _NEARLY) * step_m:
+        raise ValueError(f"expected it to be {_FEWEST_STEPS * step_m:g} m long or more, found {extent_m:g} m")
+
+
+# --- the way ---
+
+
+def at_one_speed(track: Track, wheelbase_m: float, speed_mps: float) -> tuple[Array, Array]:
+    """Knots (2,), (2,) [s, m/s] of a drive at one speed from the front tires' start on the track until the last wheel
+    has left it, and ``AFTER_S`` more."""
+    length_m = track.end_m - track.start_m + wheelbase_m
+    return np.array([0.0, length_m / speed_mps + AFTER_S]), np.full(2, speed_mps)
+
+
+def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: float) -> Motion:
+    """The motion at a recorder's instants when the speed is a straight line between knots (k,), (k,).
+
+    ValueError for a drive of less than two samples, or one that is too long to be simulated.
+    """
+    duration_s = float(knots_s[-1] - knots_s[0])
+    count = int(duration_s * rate_hz + 1e-6) + 1
+    longest_s = _MOST_STEPS / max(rate_hz, FINE_RATE_HZ)
+    if count < 2 or duration_s > longest_s:
+        raise ValueError(f"expected a drive of {1 / rate_hz:g} to {longest_s:g} s, found {duration_s:g} s")
+    time_s = knots_s[0] + np.arange(count) / rate_hz
+    at_knots = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots_s) * (knots_mps[:-1] + knots_mps[1:]))])
+    last = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
+    speed_mps = np.interp(time_s, knots_s, knots_mps)
+    driven = at_knots[last] + 0.5 * (time_s - knots_s[last]) * (knots_mps[last] + speed_mps)
+    return Motion(time_s, speed_mps, start_m + driven)
+
+
+# --- what is felt ---
+
+
+def response(
+    structure: Structure, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float
+) -> dict[str, Array]:
+    """The outputs (n,) of a car without effects, which came to the start on a flat road as fast as it goes there."""
+    pace_m = float(motion.distance_m[1] - motion.distance_m[0])
+    lead = int(np.ceil(structure.contact_patch_m / pace_m)) if pace_m > 0 else 0
+    lead = min(lead, int(rate_hz))
+    before = np.arange(-lead, 0)
+    time_s = np.concatenate([motion.time_s[0] + before / rate_hz, motion.time_s])
+    distance_m = np.concatenate([motion.distance_m[0] + pace_m * before, motion.distance_m])
+    columns = drive(structure, list(outputs.values()), track, time_s, distance_m)[lead:]
+    return dict(zip(outputs, columns.T, strict=True))
+
+
+def response_with_effects(
+    car: Car, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float
+) -> tuple[dict[str, Array], Motion]:
+    """The outputs (n,) of a car with effects, that of ``SENSOR`` behind the sensor's own, and the motion as it is
+    recorded.
+
+    ValueError for effects under which no such car, or no such motion, is possible.
+    """
+    passage = Passage(track, rate_hz, motion.distance_m)
+    columns = {SENSOR: _accelerations(car, passage)}
+    if more := {name: output for name, output in outputs.items() if name != SENSOR}:
+        columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
+    distance_m = recorded_distance(car, motion.distance_m)
+    stretch = (car.driven(distance_m + _SHORT_M) - car.driven(distance_m - _SHORT_M)) / (2 * _SHORT_M)
+    return columns, Motion(motion.time_s, motion.speed_mps / stretch, distance_m)
+
+
+def _accelerations(car: Car, passage: Passage) -> Array:
+    """What the sensor records (n,) [m/s2], its steps halved where that may matter. ValueError where it does."""
+    with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is refused below
+        accel = recorded(car, passage)
+        if car.bends_laws:
+            finer = recorded(car, Passage(passage.track, passage.rate_hz, passage.distance_m, 2 * FINE_RATE_HZ))
+            allowed = max(_NO_MOTION_MPS2, _STEPS_MATTER * float(np.sqrt(np.mean(finer**2))))
+            if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
+                raise ValueError("its effects are too strong for its masses: they would need steps shorter than "
+                                 f"{1000 / FINE_RATE_HZ:g} ms")
+            accel = finer if car.rubs else accel
+    if not bounded([accel]):
+        raise ValueError("with its effects the car's motion grows without bound")
+    return accel
+
+
+def as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int) -> Array:
+    """An acceleration (n,) with a sensor's noise, then rounded to its steps; 0: without [m/s2]."""
+    if noise_mps2:
+        accel_mps2 = accel_mps2 + noise_mps2 * np.random.default_rng(seed).standard_normal(len(accel_mps2))
+    return step_mps2 * np.round(accel_mps2 / step_mps2) if step_mps2 else accel_mps2
