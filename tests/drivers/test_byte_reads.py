@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.bma220 import REGISTER_STEP, Bma220, Bma220Settings
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220, Bma220Settings
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 from drivers.replay import RecordedBus
@@ -23,7 +24,7 @@ Sample = tuple[int, int, int]
 
 def opened(monkeypatch: pytest.MonkeyPatch, functions: int, chip: RecordedBus | None = None) -> Callable[[], object]:
     """Opens a bus whose adapter has these functions."""
-    bus = chip or RecordedBus()
+    bus = chip or RecordedBus(Bma220Chip())
 
     def opens(self: smbus2.SMBus, number: int) -> None:
         self.funcs = I2cFunc(functions)
@@ -39,7 +40,7 @@ class Renewing(RecordedBus):
     """A chip that has another sample after every so many byte reads of its data registers."""
 
     def __init__(self, samples: list[Sample], every: int, first: int) -> None:
-        super().__init__()
+        super().__init__(Bma220Chip())
         self._samples = samples
         self._every = every
         self._read = first
@@ -85,7 +86,7 @@ def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(
 
 
 def test_an_adapter_with_block_reads_is_used_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     chip = Bma220(opened(monkeypatch, BYTES | I2cFunc.SMBUS_READ_I2C_BLOCK, bus)(), Bma220Settings(),  # type: ignore[arg-type]
                   lambda seconds: None)
     chip.start()
