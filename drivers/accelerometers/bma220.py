@@ -15,7 +15,6 @@ driver (drivers/iio/accel/bma220), Bosch's API of 2014 and the UPM library, whic
 
 from __future__ import annotations
 
-import errno
 import logging
 from array import array
 from collections.abc import Callable, Iterable, Mapping
@@ -28,7 +27,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.accelerometers.accelerometer import Accelerometer, Readings
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, Timeout, WrongDevice
+from drivers.chip_bus import bus_fault, find_chip
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
@@ -65,7 +65,6 @@ FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
 SETTLING_S = {1000: 0.002, 500: 0.002, 250: 0.003, 125: 0.005, 64: 0.009, 32: 0.017}
 WATCHDOG_CODES = {0: 0, 1: 2, 10: 3}  # [ms]; 0 is off
 TOGGLE_WAIT_S = 0.002
-NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
 
 log = logging.getLogger(__name__)
 
@@ -154,7 +153,7 @@ class Bma220:
         """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
         self._chip = None
         self._checked = 0
-        chip = self._probe()
+        chip = find_chip(self._bus, CHIP_ID, self._settings.addresses, "a BMA220")
         try:
             revision = REVISION.read(self._bus, chip)
             self._make_run(SUSPEND, chip)
@@ -162,7 +161,7 @@ class Bma220:
             for register, values in self._wanted:
                 register.update(self._bus, chip, values)
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         self._sleep(SETTLING_S[self._settings.filter_hz])
         self._chip = chip
         log.info("BMA220 revision %d runs at 0x%02X, filter %d Hz", revision, chip, self._settings.filter_hz)
@@ -174,7 +173,7 @@ class Bma220:
         try:
             data = bytes(self._read_block(chip, DATA_ADDRESS, SAMPLE_BYTES))
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         if len(data) != SAMPLE_BYTES:
             raise BadReply(f"BMA220 at 0x{chip:02X}: a burst of {SAMPLE_BYTES} bytes gave {len(data)}")
         return data
@@ -197,7 +196,7 @@ class Bma220:
         try:
             register.check(self._bus, chip, values)
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         except BadReply as error:
             raise SettingsLost(f"BMA220 lost its settings (did its supply dip?): {error}") from error
         self._checked = (self._checked + 1) % len(self._wanted)
@@ -214,30 +213,6 @@ class Bma220:
         if self._chip is None:
             raise NotPresent("the BMA220 has not been started")
         return self._chip
-
-    def _probe(self) -> int:
-        """The first address with the right chip id. Otherwise the error that tells most: a held bus at once, then
-        a wrong chip or an occupied address, and only then that nobody is there."""
-        faults: list[DeviceError] = []
-        for chip in self._settings.addresses:
-            try:
-                found = CHIP_ID.read(self._bus, chip)
-            except OSError as error:
-                fault = _fault(error, chip)
-                if isinstance(fault, Timeout):
-                    raise fault from error
-                if error.errno not in NOT_ACKNOWLEDGED:
-                    faults.append(fault)
-                continue
-            if found == CHIP_ID.reset_value:
-                return chip
-            faults.append(WrongDevice(
-                f"the chip at I2C address 0x{chip:02X} has id 0x{found:02X}, a BMA220 has 0x{CHIP_ID.reset_value:02X}"
-            ))
-        if faults:
-            raise faults[0]
-        places = " or ".join(f"0x{chip:02X}" for chip in self._settings.addresses)
-        raise NotPresent(f"nothing answers at I2C address {places}: check the sensor's power, ground, SDA and SCL")
 
     def _make_run(self, toggle: ToggleRegister, chip: int) -> None:
         """Flip the state until the chip says that it runs, two reads at most."""
@@ -306,22 +281,6 @@ class Bma220Decoder:
         counts = raw >> 2
         clipped = ((counts == -32) | (counts == 31)).any(axis=1)
         return AccelerationBlock(t_us, counts.astype(np.float64) * self.mps2_per_count, clipped)
-
-
-def _fault(error: OSError, chip: int) -> DeviceError:
-    """What a failed transfer means, in one line."""
-    if error.errno in NOT_ACKNOWLEDGED:
-        return NotPresent(f"nothing answers at I2C address 0x{chip:02X}: check the sensor's power, ground, SDA and SCL")
-    if error.errno == errno.ETIMEDOUT:
-        return Timeout(
-            f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, "
-            "and take the sensor's power away for a moment if it stays"
-        )
-    if error.errno == errno.EBUSY:
-        return NotPresent(
-            f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod for bma220) or remove its overlay"
-        )
-    return BadReply(f"I2C transfer with 0x{chip:02X} failed: {error}")
 
 
 def _choose(name: str, value: int, known: Iterable[int]) -> None:

@@ -21,19 +21,18 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.accelerometers.accelerometer import Readings, SerialAccelerometer
+from drivers.dated_samples import WORTH_TELLING, DatedSamples, Samples
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
-from drivers.sample_clock import NO_TIME, SampleClock
 from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
 from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile
 
-WORTH_TELLING = 0.005
 NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
 
 
-class _Samples(NamedTuple):
-    """Decoded samples, before they have their times: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
+class _Found(NamedTuple):
+    """Decoded samples and where they began in the stream: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
 
     after_loss: bool
     offsets: npt.NDArray[np.int64]
@@ -52,10 +51,10 @@ class _FrameReader:
             layout.length_bytes, layout.plausible, layout.oriented if told_by_gravity else None, layout.sync
         )
 
-    def read(self, data: bytes) -> list[_Samples]:
+    def read(self, data: bytes) -> list[_Found]:
         return [self._samples(frame) for frame in self.framer.feed(data)]
 
-    def _samples(self, run: Frame) -> _Samples:
+    def _samples(self, run: Frame) -> _Found:
         layout = self._layout
         frames = np.frombuffer(run.data, dtype=np.uint8).reshape(-1, layout.length_bytes)
         counts = layout.counts(frames)
@@ -65,7 +64,7 @@ class _FrameReader:
         accel_mps2: npt.NDArray[np.float64] = (counts - zero_raw) * scale_mps2
         offsets = run.start + layout.length_bytes * np.arange(len(frames), dtype=np.int64)
         clipped = np.asarray(((counts <= low) | (counts >= high)).any(axis=1))
-        return _Samples(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
+        return _Found(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
 
 
 _DECIMAL = rb" *([+-]?(?:\d{1,6}(?:\.\d{0,12})?|\.\d{1,12})) *"
@@ -80,15 +79,15 @@ class _LineReader:
         self._layout = layout
         self.framer = LineFramer()
 
-    def read(self, data: bytes) -> list[_Samples]:
+    def read(self, data: bytes) -> list[_Found]:
         frames = self.framer.feed(data)
         cuts = [0, *(k for k, frame in enumerate(frames) if k and frame.after_loss), len(frames)]
         return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
 
-    def _samples(self, lines: list[Frame]) -> _Samples:
+    def _samples(self, lines: list[Frame]) -> _Found:
         values = np.array([_triple(line.data) for line in lines], dtype=np.float64)
         largest = np.abs(values).max(axis=1)
-        return _Samples(
+        return _Found(
             lines[0].after_loss,
             np.array([line.start for line in lines], dtype=np.int64),
             values * self._layout.unit_mps2,
@@ -145,14 +144,10 @@ class PascoDecoder:
         else:
             raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
         self._profile = profile
-        self._clock = SampleClock(profile.rate_hz, profile.clock_tolerance)
+        self._samples = DatedSamples(profile.rate_hz, profile.clock_tolerance)
+        self._clock = self._samples.clock
         self._arrivals = Arrivals()
         self._chunks: list[bytes] = []
-        self._untimed: list[_Samples] = []
-        self._frames = 0
-        self._bad_frames = 0
-        self._undated = 0
-        self._ended = False
 
     name = "pasco"
 
@@ -175,9 +170,9 @@ class PascoDecoder:
     @property
     def counters(self) -> PascoCounters:
         """What came in so far and was taken."""
-        clock = self._clock
+        samples, clock = self._samples, self._clock
         dropped = self._reader.framer.dropped_bytes
-        return PascoCounters(self._frames, self._bad_frames, dropped, clock.resyncs, clock.lost, self._undated)
+        return PascoCounters(samples.good, samples.bad, dropped, clock.resyncs, clock.lost, samples.undated)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -191,40 +186,16 @@ class PascoDecoder:
 
     def flush(self) -> None:
         """No more bytes will come: the next ``take`` gives all."""
-        self._ended = True
+        self._samples.flush()
 
     def take(self) -> AccelerationBlock:
         """All samples that are complete and have their times, oldest first; may be none."""
-        samples = self._reader.read(b"".join(self._chunks))
+        found = self._reader.read(b"".join(self._chunks))
         self._chunks.clear()
-        times = [np.empty(0, dtype=np.int64)]
-        for some in samples:
-            if some.after_loss:
-                times.append(self._clock.restart())
-            times.append(self._clock.feed(self._arrivals.many(some.offsets)))
-            good = int(some.good.sum())
-            self._frames += good
-            self._bad_frames += len(some.good) - good
+        for some in found:
+            self._samples.add(Samples(some.after_loss, self._arrivals.many(some.offsets), *some[2:]))
         self._arrivals.forget(self._reader.framer.position)
-        self._untimed += samples
-        if self._ended:
-            times.append(self._clock.restart())
-        return self._timed(np.concatenate(times))
-
-    def _timed(self, t_us: npt.NDArray[np.int64]) -> AccelerationBlock:
-        """Give the oldest samples their times; the others wait."""
-        if len(t_us) == 0:
-            return AccelerationBlock(t_us, np.empty((0, 3)), np.empty(0, dtype=np.bool_))
-        accel_mps2 = np.concatenate([some.accel_mps2 for some in self._untimed])
-        clipped = np.concatenate([some.clipped for some in self._untimed])
-        good = np.concatenate([some.good for some in self._untimed])
-        n = len(t_us)
-        no_offsets = np.empty(0, dtype=np.int64)
-        self._untimed = [_Samples(False, no_offsets, accel_mps2[n:], clipped[n:], good[n:])]
-        dated = t_us != NO_TIME
-        self._undated += int(np.count_nonzero(~dated))
-        keep = good[:n] & dated
-        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self._clock.rate_hz)
+        return self._samples.take()
 
 
 _LARGEST_COUNT = 65536
