@@ -6,6 +6,7 @@ them, so real and recorded ones look the same.
 
 from __future__ import annotations
 
+import random
 import time
 from collections import deque
 from collections.abc import Callable
@@ -80,6 +81,27 @@ class Deadlines:
             self._next_us += skipped * self._step_us
             wait_us = self._next_us - now_us
         self._sleep(wait_us / US_PER_S)
+
+
+class Scattered:
+    """Times to look into a buffer that a device fills at even intervals.
+
+    Problem: looks in step with the device find the newest sample always equally old, until the clocks have drifted
+    apart by an interval; then its age jumps by that, as where a sample was lost. Solution: each wait is longer by
+    another share of the interval, by chance, so that every few looks one finds a sample that has just been taken.
+    """
+
+    missed = 0
+
+    def __init__(self, step_us: int, interval_us: int, sleep: Callable[[float], None]) -> None:
+        self._step_us = step_us
+        self._interval_us = interval_us
+        self._sleep = sleep
+        self._rng = random.Random(0)
+
+    def wait(self) -> None:
+        """Sleep until the next look."""
+        self._sleep((self._step_us + self._interval_us * self._rng.random()) / US_PER_S)
 
 
 class Chip(Protocol):
