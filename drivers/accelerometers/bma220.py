@@ -332,7 +332,7 @@ class _Bma220(Accelerometer[Bma220Config]):
     keys: ClassVar[Mapping[str, Kind]] = {
         "i2c_bus": Special(_bus, ("1", "0")),
         "range_g": OneOf(tuple(RANGE_CODES)),
-        "bandwidth_hz": OrNone("auto", OneOf(tuple(sorted(FILTER_CODES)))),
+        "bandwidth_hz": OrNone("auto", OneOf(tuple(sorted(hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE)))),
         "oversample": Whole(1, LARGEST_OVERSAMPLE),
     }
     event_bytes = SAMPLE_BYTES
