@@ -23,15 +23,17 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
+from drivers.accelerometers import accelerometers
 from drivers.disk import FileSystem
 from drivers.errors import DumpError, shortened
+from drivers.events import GPS, Event
 from drivers.regular_file import open_regular
 
 VERSION = "1"
-SOURCES = ("bma220", "pasco", "nmea")
-ACCELEROMETERS = ("bma220", "pasco")
+ACCELEROMETERS = tuple(accelerometers())
+SOURCES = (*ACCELEROMETERS, GPS)
 
 LINE_BYTES = 65536
 """Longest line, without its newline."""
@@ -39,13 +41,12 @@ LINE_BYTES = 65536
 EVENT_BYTES = 32000
 """Most bytes in one event: in hex, with time and source, they fit a line."""
 
-BMA220_HEX_DIGITS = 6
-"""One read of X, Y and Z: three bytes."""
-
 LATEST_US = 10**15 - 1
 """No monotonic clock has run for 31 years."""
 
 _SOURCE_OF = {name.encode(): name for name in SOURCES}
+_BYTES_OF = {name: kind.event_bytes for name, kind in accelerometers().items()} | {GPS: None}
+_HEX_DIGITS_OF = {name.encode(): 2 * size for name, size in _BYTES_OF.items() if size is not None}
 _BLOCK_BYTES = 65536
 _GZIP_MAGIC = b"\x1f\x8b"
 _GZIP_WBITS = 31  # zlib: a window of 2^15 bytes with a gzip wrapper
@@ -53,25 +54,12 @@ _MEMBER = bytes.fromhex("1f8b0800000000000003")  # how zlib begins a gzip member
 _TAIL_BYTES = 1 << 18
 
 
-class Event(NamedTuple):
-    """Bytes from one source at one time.
-
-    t_us      monotonic time [us]: when the read was made, or when the bytes arrived
-    source    one of ``SOURCES``
-    data      at least one byte
-    """
-
-    t_us: int
-    source: str
-    data: bytes
-
-
 @dataclass(frozen=True)
 class DumpHeader:
     """What a recording says about itself.
 
     start_utc        ISO 8601 time of the start; None where the clock was not known
-    accelerometer    ``{"driver": "bma220" or "pasco", ...}``, for the BMA220 with ``range_g``
+    accelerometer    ``{"driver": one of ``ACCELEROMETERS``, ...}``, with what that one adds to it
     gps              settings of the receiver's line, such as ``{"baud": 9600}``
     vehicle          name of the vehicle
     """
@@ -135,6 +123,7 @@ class DumpReader:
         """Yield the events of the lines after the header. The hot loop: every microsecond here is paid per event."""
         last_us = 0
         number = 1
+        digits_of = _HEX_DIGITS_OF
         lines = first[1:]
         while True:
             for line in lines:
@@ -148,7 +137,7 @@ class DumpReader:
                 except (ValueError, KeyError):
                     raise _complaint(self._path, number, line, last_us) from None
                 if not (last_us <= t_us <= LATEST_US and digits.isdigit() and len(fraction) == 6 and whole and text
-                        and len(line) <= LINE_BYTES and (name != b"bma220" or len(text) == BMA220_HEX_DIGITS)):
+                        and len(line) <= LINE_BYTES and len(text) == digits_of.get(name, len(text))):
                     raise _complaint(self._path, number, line, last_us)
                 last_us = t_us
                 yield event
@@ -234,9 +223,9 @@ class DumpWriter:
 
     def write(self, event: Event) -> None:
         """Add an event. Raises ``ValueError`` for one that no reader would accept: an unknown source, a time
-        before the last one's or out of range, no bytes, more than ``EVENT_BYTES``, a chip read of other than 3."""
+        before the last one's or out of range, no bytes, more than ``EVENT_BYTES``, a chip read of another size."""
         t_us, source, data = event
-        fits = len(data) == BMA220_HEX_DIGITS // 2 if source == "bma220" else 0 < len(data) <= EVENT_BYTES
+        fits = 0 < len(data) <= EVENT_BYTES and len(data) == (_BYTES_OF.get(source) or len(data))
         if not (source in SOURCES and self._last_us <= t_us <= LATEST_US and fits):
             raise ValueError(f"event {source!r} at {t_us} us with {len(data)} bytes, after {self._last_us} us, "
                              "cannot be recorded")
@@ -386,7 +375,8 @@ def _complaint(path: Path, number: int, line: bytes, last_us: int) -> DumpError:
     elif int(fields[0].replace(b".", b"")) < last_us:
         expected = f"a time not before the last one, {last_us // 1_000_000}.{last_us % 1_000_000:06d}"
     else:
-        expected = "three bytes" if fields[1] == b"bma220" else "at least one byte"
+        size = _BYTES_OF[_SOURCE_OF[fields[1]]]
+        expected = "at least one byte" if size is None else f"{size} bytes"
         expected += ", in pairs of hex digits"
     return DumpError(f"{path}:{number}: expected {expected}, found {line[:60].decode('ascii', 'replace')!r}")
 

@@ -41,7 +41,11 @@ class SettingsLost(BadReply):
 
 
 class SettingsError(DriverError):
-    """A setting that this device cannot have."""
+    """A setting that this device cannot have. ``key``: which of its settings; empty: several together, or unknown."""
+
+    def __init__(self, words: str, key: str = "") -> None:
+        super().__init__(words)
+        self.key = key
 
 
 class DumpError(DriverError):

@@ -24,11 +24,11 @@ WRITE_TIMEOUT_S = 1.0
 log = logging.getLogger(__name__)
 
 
-def open_i2c(number: int, register_step: int = 1) -> I2cBus:
+def open_i2c(number: int, register_step: int | None = 1) -> I2cBus:
     """Bus ``/dev/i2c-<number>``, for chips whose registers' addresses are ``register_step`` apart.
 
     NotPresent when it is not there, may not be opened, or is behind an adapter that cannot do what it takes. One that
-    reads single registers only is used so (``ByteReads``).
+    reads single registers only is used so (``ByteReads``), unless ``register_step`` is None: the chip needs blocks.
     """
     from smbus2 import I2cFunc, SMBus
 
@@ -45,6 +45,10 @@ def open_i2c(number: int, register_step: int = 1) -> I2cBus:
                          "what it can); connect the sensor to the Pi's own I2C pins, or use another adapter")
     if bus.funcs & I2cFunc.SMBUS_READ_I2C_BLOCK:
         return bus
+    if register_step is None:
+        bus.close()
+        raise NotPresent(f"/dev/i2c-{number}: its adapter reads single registers only, and this chip needs blocks; "
+                         "connect the sensor to the Pi's own I2C pins, or use another adapter")
     log.info("/dev/i2c-%d: its adapter reads no blocks, each register is read by itself", number)
     return ByteReads(bus, register_step)
 

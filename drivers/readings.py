@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+STANDARD_GRAVITY_MPS2 = 9.80665
+
 
 @dataclass(frozen=True)
 class AccelerationBlock:

@@ -17,12 +17,10 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Self
+from typing import Protocol, Self
 
-from drivers.bma220 import DATA_ADDRESS, SAMPLE_BYTES
-from drivers.dump import Event
 from drivers.errors import DumpError
-from drivers.simulator import Bma220Chip
+from drivers.events import Event
 
 US_PER_S = 1_000_000
 
@@ -127,16 +125,37 @@ class _Recording:
             yield data
 
 
+class Chip(Protocol):
+    """A chip on a recorded bus, as a model of its registers.
+
+    data_address, sample_bytes    a read of so many bytes from there on takes a sample
+    sample                        gives the bytes of one
+    watchdog_on                   it lets go of a bus that it holds low
+    """
+
+    data_address: int
+    sample_bytes: int
+    sample: Callable[[], bytes]
+
+    @property
+    def watchdog_on(self) -> bool: ...
+    def lose_power(self) -> None: ...
+    def read(self, address: int, length: int = 1) -> bytes: ...
+    def write(self, address: int, value: int) -> None: ...
+
+
 class RecordedBus:
-    """An I2C bus with one BMA220 (``chip``) on it, whose data registers give recorded samples.
+    """An I2C bus with one chip on it, whose data registers give recorded samples.
 
     Loaded: ``load`` puts a sample into the data registers, over one that nobody has read; a burst takes it out.
     Playing: a burst gives the latest sample at or before the present. With nothing to give, a burst is not
     acknowledged: a sample is never invented. ``now_us`` is only needed for cues with ``at_us``.
     """
 
-    def __init__(self, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None, address: int = 0x0A) -> None:
-        self.chip = Bma220Chip(self._take_loaded)
+    def __init__(self, chip: Chip, cues: Iterable[Cue] = (), now_us: Callable[[], int] | None = None,
+                 address: int = 0x0A) -> None:
+        self.chip = chip
+        self.chip.sample = self._take_loaded
         self._address = address
         self._cues = _Cues(cues, BUS_FAULTS, now_us)
         self._loaded: bytes | None = None
@@ -149,6 +168,7 @@ class RecordedBus:
     @classmethod
     def playing(
         cls,
+        chip: Chip,
         events: Iterable[Event],
         now_us: Callable[[], int],
         cues: Iterable[Cue] = (),
@@ -159,14 +179,14 @@ class RecordedBus:
         names another start on the recording's scale. A sample of the wrong length is a DumpError when it is its
         turn."""
         recording = _Recording(events, now_us, first_us)
-        bus = cls(cues, recording.now_us, address)
+        bus = cls(chip, cues, recording.now_us, address)
         bus._recording = recording
         bus.chip.sample = bus._take_latest
         return bus
 
     def load(self, data: bytes) -> None:
-        """Put one sample of three bytes into the data registers. DumpError on any other length."""
-        self._loaded = _whole_sample(data)
+        """Put one whole sample into the data registers. DumpError on any other length."""
+        self._loaded = self._whole_sample(data)
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
         self._transfer(i2c_addr, register)
@@ -186,13 +206,13 @@ class RecordedBus:
     def _transfer(self, i2c_addr: int, read_register: int | None) -> None:
         """What comes before the bytes: address, acknowledgement, and whatever goes wrong. A burst that fails here
         loses its sample, as on a real wire."""
-        if read_register == DATA_ADDRESS:
+        if read_register == self.chip.data_address:
             self._reads += 1
         for cue in self._cues.due(self._reads):
             self._happen(cue)
         failure = self._failure(i2c_addr)
         if failure:
-            if read_register == DATA_ADDRESS:
+            if read_register == self.chip.data_address:
                 self._loaded = None
             raise _os_error(failure)
 
@@ -217,6 +237,11 @@ class RecordedBus:
             self._stuck_low = False
             self.chip.lose_power()
 
+    def _whole_sample(self, data: bytes) -> bytes:
+        if len(data) != self.chip.sample_bytes:
+            raise DumpError(f"a recorded read of the chip has {len(data)} bytes, expected {self.chip.sample_bytes}")
+        return data
+
     def _take_loaded(self) -> bytes:
         data, self._loaded = self._loaded, None
         if data is None:
@@ -226,7 +251,7 @@ class RecordedBus:
     def _take_latest(self) -> bytes:
         if self._recording is not None:
             for data in self._recording.until_now():
-                self._loaded = _whole_sample(data)
+                self._loaded = self._whole_sample(data)
         if self._loaded is None:
             raise _os_error(errno.EREMOTEIO)
         return self._loaded
@@ -272,6 +297,10 @@ class RecordedPort:
         """Bytes arrive, and are lost when the port is unplugged."""
         if not self._gone:
             self._waiting += data
+
+    def has_bytes(self) -> bool:
+        """Some wait to be read."""
+        return bool(self._waiting)
 
     def read(self, size: int, timeout_s: float) -> bytes:
         self._reads += 1
@@ -332,12 +361,6 @@ class RecordedPort:
     def _pause(self, wait_s: float) -> None:
         if self._sleep is not None and wait_s > 0:
             self._sleep(wait_s)
-
-
-def _whole_sample(data: bytes) -> bytes:
-    if len(data) != SAMPLE_BYTES:
-        raise DumpError(f"a recorded read of the BMA220 has {len(data)} bytes, expected {SAMPLE_BYTES} (X, Y, Z)")
-    return data
 
 
 def _os_error(number: int) -> OSError:

@@ -1,8 +1,4 @@
-"""A folder is a catalogue: dropping in a file is the whole registration.
-
-Problem: a list of what there is, kept beside the files themselves, is forgotten when a file is added. Solution: each
-file of a folder offers one thing under an agreed name, and the folder is read. The thing is called after its file. The
-one file that offers nothing is the one that says what such a thing is (``weighting.py`` for the offers ``WEIGHTING``).
+"""What files offer: those of a folder of the package (``drivers.catalogue``), and a user's own.
 
 A user's own file outside the package offers its one thing in the same way. It is Python that nobody has checked, so
 whatever goes wrong in it becomes one line that names the file and the line in it, and whatever it prints goes to
@@ -14,14 +10,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from threading import Lock
 from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
+from drivers.catalogue import CatalogueError, offers
 from logger.errors import BadInput, RidelogError
 from logger.files import read_bounded
 
@@ -33,18 +28,10 @@ def catalogue(package: str, offer: str) -> dict[str, Any]:
 
     Raises BadInput that names the file when one offers nothing, or something of another name than the file's.
     """
-    offers = {}
-    for name in sorted(module.name for module in iter_modules(import_module(package).__path__)):
-        if name == offer.lower():
-            continue
-        module = import_module(f"{package}.{name}")
-        if not hasattr(module, offer):
-            raise BadInput(f"{module.__file__}: expected it to offer {offer}")
-        offers[name] = getattr(module, offer)
-        if offers[name].name != name:
-            raise BadInput(f"{module.__file__}: expected {offer} to be named {name!r}, as the file is, "
-                           f"found {offers[name].name!r}")
-    return offers
+    try:
+        return offers(package, offer)
+    except CatalogueError as error:
+        raise BadInput(str(error)) from None
 
 
 def offered_by(path: Path, offer: str) -> Any:

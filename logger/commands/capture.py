@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.accelerometers import line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import open_serial
 from drivers.ports import BytePort
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         raise BadInput(f"--seconds {args.seconds:g}: expected more than 0")
     port = open_serial(args.port, args.baud)
     try:
-        header = DumpHeader(None, {"driver": "pasco", "port": args.port, "baud": args.baud}, {}, "unknown")
+        header = DumpHeader(None, {"driver": line_reader().name, "port": args.port, "baud": args.baud}, {}, "unknown")
         writer = _new_dump(args.out, header)
         print(f"recording {args.port} at {args.baud} baud to {args.out}; Ctrl-C ends it", file=sys.stderr)
         try:
@@ -107,6 +108,7 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
     """
     look = bytearray()
     total = 0
+    source = line_reader().name
     start_us = told_us = now_us()
     told_bytes = 0
     fault = None
@@ -118,7 +120,7 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
             break
         at_us = now_us()
         if data:
-            writer.write(Event(at_us, "pasco", data))
+            writer.write(Event(at_us, source, data))
             look += data[:_LOOK_BYTES - len(look)]
             total += len(data)
         if at_us - told_us >= US_PER_S:

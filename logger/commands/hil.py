@@ -5,7 +5,7 @@ pseudo-terminals) a service that has just been started listens. Its log is compa
 under the same settings. With ports and --log: play, then compare. With ports alone: only play, for a service on
 another machine. With --log alone: only compare, with a copy of its folder.
 
-The readings of a BMA220 are sent as a bridge microcontroller would send them: as lines, profile `lines`.
+The readings of a chip such as the BMA220 are sent as a bridge microcontroller would: as lines, profile `lines`.
 Exit status 1 when the log does not agree, or the bytes were sent too late to tell.
 """
 
@@ -21,7 +21,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from drivers.accelerometers import accelerometers, serial_accelerometers
+from drivers.accelerometers.accelerometer import SerialAccelerometer
 from drivers.dump import DumpReader, open_dump
+from drivers.events import GPS
 from drivers.hardware import open_serial
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.records import WindowRecord
@@ -39,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog hil``."""
     parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
     parser.add_argument("--nmea-port", metavar="PORT", help="serial port wired to that of the service's GPS")
-    parser.add_argument("--pasco-port", metavar="PORT", help="serial port wired to that of its accelerometer")
+    also = [f"--{name}-port" for name in serial_accelerometers()]
+    parser.add_argument("--accelerometer-port", *also, dest="accelerometer_port", metavar="PORT",
+                        help="serial port wired to that of its accelerometer")
     parser.add_argument("--log", metavar="DIR", type=Path, help="folder of the service's logs, or a copy of it")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service (default: those of 'run')")
     parser.add_argument("--seconds", metavar="N", type=float, help="only the first N seconds of the recording")
@@ -48,8 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog hil``."""
-    if (args.nmea_port is None) != (args.pasco_port is None):
-        raise BadInput("expected --nmea-port and --pasco-port, or neither")
+    if (args.nmea_port is None) != (args.accelerometer_port is None):
+        raise BadInput("expected --nmea-port and --accelerometer-port, or neither")
     if args.nmea_port is None and args.log is None:
         raise BadInput("expected two ports to play into, --log DIR to compare with, or all three")
     if args.seconds is not None and not args.seconds > 0:
@@ -60,16 +65,17 @@ def run(args: argparse.Namespace) -> int:
     if sent is not None and expected is not None:
         time.sleep(WRITTEN_S)
     agreement = compare(expected, read_sessions(args.log), config.gps.bridge_s) if expected is not None else None
-    result = Result(_is_bridged(args), sent, agreement)
+    result = Result(_bridged(args), sent, agreement)
     print(json.dumps(result.as_json()) if args.json else result.text())
     return EXIT_DONE if result.ok else EXIT_CHECK_FAILED
 
 
 @dataclass(frozen=True)
 class Result:
-    """What was sent and what was found; None: not asked for. ``bridged``: sent as lines, though a BMA220's."""
+    """What was sent and what was found; None: not asked for. ``bridged``: title of the chip whose readings
+    were sent as lines; empty: the bytes went as they are."""
 
-    bridged: bool
+    bridged: str
     sent: Sent | None
     agreement: Agreement | None
 
@@ -85,14 +91,14 @@ class Result:
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, units in the names."""
-        return {"ok": self.ok, "bridged_to_lines": self.bridged, "sent": _sent_json(self.sent, self.in_time),
+        return {"ok": self.ok, "bridged_to_lines": bool(self.bridged), "sent": _sent_json(self.sent, self.in_time),
                 "agreement": _agreement_json(self.agreement)}
 
     def text(self) -> str:
         """For a person."""
         lines = []
         if self.bridged:
-            lines.append("The BMA220's readings go as lines x,y,z in g: no serial port can stand in for its I2C bus.")
+            lines.append(f"The {self.bridged}'s readings go as lines x,y,z in g: no port can stand in for its bus.")
         if self.sent is not None:
             size = ", ".join(f"{count} bytes of {source}" for source, count in self.sent.size_bytes.items())
             half, most, longest = self.sent.late_ms
@@ -108,9 +114,10 @@ class Result:
         return "\n".join(lines)
 
 
-def _is_bridged(args: argparse.Namespace) -> bool:
+def _bridged(args: argparse.Namespace) -> str:
     with open_dump(args.dump) as reader:
-        return reader.header.accelerometer["driver"] == "bma220"
+        kind = accelerometers()[reader.header.accelerometer["driver"]]
+    return "" if isinstance(kind, SerialAccelerometer) else kind.title
 
 
 def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
@@ -127,11 +134,13 @@ def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
 
 
 def _play(args: argparse.Namespace, config: Config) -> Sent:
-    bauds = {"pasco": config.accelerometer.pasco.baud, "nmea": config.gps.baud}
-    names = {"pasco": args.pasco_port, "nmea": args.nmea_port}
     with ExitStack() as stack:
         reader = stack.enter_context(open_dump(args.dump))
         recording = _wired(args, reader)
+        sensor = str(recording.header.accelerometer["driver"])
+        _, baud = serial_accelerometers()[sensor].line(config.accelerometer.sections[sensor])
+        bauds = {sensor: baud, GPS: config.gps.baud}
+        names = {sensor: args.accelerometer_port, GPS: args.nmea_port}
         ports = {}
         for source, name in names.items():
             ports[source] = open_serial(name, bauds[source])

@@ -103,7 +103,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
             pipeline = assemble.pipeline(config, sensor, car)
             core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
-            player = Player(core, assemble.bma220_settings(config.accelerometer), rate, _progress(quiet))
+            player = Player(core, config.accelerometer, rate, _progress(quiet))
             started_s = time.monotonic()
             played = player.play(reader)
             wall_s = time.monotonic() - started_s

@@ -8,6 +8,8 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+from drivers.accelerometers import accelerometers
+from drivers.sources import serial_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
 from logger.service.config import find_config, load_config
@@ -111,16 +113,12 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
 
 def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     if sensor.state == "ok":
-        return []
+        return [f"{name}: {sensor.note} (at {sensor.place})."] if sensor.note else []
     if sensor.state == "doubtful":
         return [f"{name}: {sensor.last_error} (at {sensor.place})."]
     error = f" It said: {sensor.last_error}." if sensor.last_error else ""
-    if sensor.driver == "bma220":
-        check = "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
-    elif sensor.state == "silent":
-        check = "check its power, that its TX goes to our RX, and the baud rate in the settings"
-    else:
-        check = "check the cable, and the port in the settings (ls /dev/serial/by-id)"
+    kind = accelerometers().get(sensor.driver)
+    check = serial_advice(sensor.state) if kind is None else kind.advice(sensor.state)
     return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{error}"]
 
 

@@ -17,11 +17,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from heapq import merge
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from drivers.accelerometers import DEFAULT, accelerometers, line_reader
+from drivers.accelerometers.accelerometer import Accelerometer, SerialAccelerometer
 from drivers.dump import DumpHeader, DumpWriter, Event
+from drivers.events import GPS
 from logger.demo.motion import STEP_S, Bump, Motion, Road, Stretch, body_acceleration, build_road, drive_along
 from logger.demo.receiver import Reception, parse_start, transmit
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
@@ -29,10 +33,10 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-RANGE_G = 2
-COUNTS_PER_G = 16
 GPS_BAUD = 9600
+LINES = "lines"
 LINES_BAUD = 115_200
+_HEADER_KEYS = ("range_g", "profile")  # what the format asks of a header; the rest is at its default
 
 # A host that sleeps until a deadline wakes late by tens of microseconds, and one time in a hundred by a millisecond.
 _LATE_US, _RARE_SHARE, _RARE_LATE_US = 30.0, 0.01, (800.0, 2000.0)
@@ -48,7 +52,8 @@ class DrivePlan:
     stretches      roughness along the road; the last one goes on
     bumps          speed bumps
     reception      what the GPS receiver sees
-    sensor         "bma220" (register bytes) or "lines" (a serial sensor that sends ``x,y,z`` in g per line)
+    sensor         ``DEFAULT``, the accelerometer that settings mean when they name none (a BMA220: register bytes), or
+                   "lines", a serial sensor that sends ``x,y,z`` in g per line
     rate_hz        samples per second
     noise_mps2     r.m.s. noise of the sensor on each axis, before it quantises [m/s2]
     offset_mps2    zero offset of X, Y, Z [m/s2]
@@ -61,7 +66,7 @@ class DrivePlan:
     stretches: Sequence[Stretch]
     bumps: Sequence[Bump] = ()
     reception: Reception = field(default_factory=Reception)
-    sensor: str = "bma220"
+    sensor: str = DEFAULT
     rate_hz: int = 100
     noise_mps2: float = 0.1
     offset_mps2: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -93,9 +98,9 @@ class Drive:
 
 def simulate_drive(plan: DrivePlan, vehicle: Vehicle) -> Drive:
     """Drive a half car along the plan. ValueError for a sensor that is not known."""
-    make_events = {"bma220": _bma220_events, "lines": _line_events}.get(plan.sensor)
-    if make_events is None:
-        raise ValueError(f"expected the sensor bma220 or lines, found {plan.sensor!r}")
+    if plan.sensor not in (DEFAULT, LINES):
+        raise ValueError(f"expected the sensor {DEFAULT} or {LINES}, found {plan.sensor!r}")
+    kind = line_reader() if plan.sensor == LINES else accelerometers()[plan.sensor]
     sensor_rng, wire_rng, receiver_rng = (np.random.default_rng([plan.seed, part]) for part in range(3))
     motion = drive_along(plan.speed_knots)
     road = build_road(plan.stretches, plan.bumps, motion.distance_m[-1], plan.seed)
@@ -104,13 +109,12 @@ def simulate_drive(plan: DrivePlan, vehicle: Vehicle) -> Drive:
     start_utc = parse_start(plan.start_utc)
     data, arrival_s = transmit(motion, start_utc, plan.reception, GPS_BAUD, receiver_rng)
     end_us = plan.start_us + round(motion.time_s[-1] * US_PER_S)
-    gps_events = _read_in_chunks("nmea", data, plan.start_us + arrival_s * US_PER_S, wire_rng)
-    sensor_events = make_events(plan, *_sampled(plan, motion, accel, sensor_rng), wire_rng)
+    gps_events = _read_in_chunks(GPS, data, plan.start_us + arrival_s * US_PER_S, wire_rng)
+    sensor_events = _sensor_events(plan, kind, *_sampled(plan, motion, accel, sensor_rng), wire_rng)
     return Drive(
         header=DumpHeader(
             start_utc=plan.start_utc,
-            accelerometer={"driver": "bma220", "range_g": RANGE_G} if plan.sensor == "bma220"
-            else {"driver": "pasco", "profile": "lines"},
+            accelerometer={"driver": kind.name, **_header(kind)},
             gps={"baud": GPS_BAUD},
             vehicle=vehicle.name,
         ),
@@ -150,25 +154,23 @@ def _sampled(
     return plan.start_us + since_us, values
 
 
-def _bma220_events(
-    plan: DrivePlan, t_us: npt.NDArray[np.int64], values: Array, rng: np.random.Generator
-) -> list[Event]:
-    """Three register bytes per read: six bits in two's complement, to the left."""
-    counts = np.clip(np.rint(values * (COUNTS_PER_G / STANDARD_GRAVITY_MPS2)), -32, 31).astype(np.int8)
-    registers = (counts << 2).tobytes()
-    return [Event(t, "bma220", registers[3 * i: 3 * i + 3]) for i, t in enumerate(t_us.tolist())]
+def _header(kind: Accelerometer[Any]) -> dict[str, Any]:
+    said = kind.header(kind.settings())
+    return {key: said[key] for key in _HEADER_KEYS if key in said}
 
 
-def _line_events(
-    plan: DrivePlan, t_us: npt.NDArray[np.int64], values: Array, rng: np.random.Generator
+def _sensor_events(
+    plan: DrivePlan, kind: Accelerometer[Any], t_us: npt.NDArray[np.int64], values: Array, rng: np.random.Generator
 ) -> list[Event]:
-    """Lines of text over a serial port, in the chunks they are read in."""
-    lines = [b"%.4f,%.4f,%.4f\n" % tuple(row) for row in (values / STANDARD_GRAVITY_MPS2).tolist()]
+    """Readings as its source gives them: one event each, or, over a serial port, in the chunks they are read in."""
+    readings = kind.simulated(kind.settings(), values)
+    if not isinstance(kind, SerialAccelerometer):
+        return [Event(t, kind.name, data) for t, data in zip(t_us.tolist(), readings, strict=True)]
     byte_us = 10 * US_PER_S / LINES_BAUD
     arrival = np.concatenate([
-        t + byte_us * np.arange(1, len(line) + 1) for t, line in zip(t_us.tolist(), lines, strict=True)
+        t + byte_us * np.arange(1, len(line) + 1) for t, line in zip(t_us.tolist(), readings, strict=True)
     ])
-    return _read_in_chunks("pasco", b"".join(lines), arrival, rng)
+    return _read_in_chunks(kind.name, b"".join(readings), arrival, rng)
 
 
 def _read_in_chunks(source: str, data: bytes, arrival_us: Array, rng: np.random.Generator) -> list[Event]:

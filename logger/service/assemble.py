@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from pathlib import Path
 from typing import Any
 
-from drivers.bma220 import Bma220Decoder, Bma220Settings, mps2_per_count
+from drivers.accelerometers import accelerometers
+from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import DumpHeader
 from drivers.errors import SettingsError, shortened
 from drivers.nmea import NmeaDecoder
-from drivers.pasco import FrameLayout, PascoDecoder, Profile, load_profile
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
@@ -22,69 +21,33 @@ from logger.estimation.sensor import Sensor
 from logger.estimation.stream import RoadEstimator
 from logger.service.chain import Axis, SignalChain, recorder_gain
 from logger.service.config import AXES, AccelerometerConfig, Config
-from logger.service.core import AccelerationDecoder
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.shipped import vehicle_file, vehicle_names, version
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import Vehicle
 
-# R.m.s. noise on the 100 Hz grid that no data sheet states: of the chip beside its steps, and of a serial sensor.
-BMA220_NOISE_MPS2 = 0.1
-SERIAL_NOISE_MPS2 = 0.05
-
 
 @dataclass(frozen=True)
 class Instrument:
-    """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, a
-    description for the logs, and a look at what the decoder has counted."""
+    """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
+    description for the logs."""
 
-    decoder: AccelerationDecoder
+    decoder: Decoder
     oversample: int
     sensor: Sensor
     description: dict[str, Any]
-    counters: Callable[[], dict[str, int]]
-
-
-def bma220_settings(config: AccelerometerConfig) -> Bma220Settings:
-    """The driver's settings."""
-    chip = config.bma220
-    return Bma220Settings(range_g=chip.range_g, bandwidth_hz=chip.bandwidth_hz, oversample=chip.oversample)
 
 
 def instrument(config: AccelerometerConfig) -> Instrument:
     """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be."""
-    if config.driver == "bma220":
-        chip = bma220_settings(config)
-        step_mps2 = mps2_per_count(chip.range_g)
-        sensor = Sensor(BMA220_NOISE_MPS2, step_mps2)
-        if chip.oversample > 1:  # the mean of several readings is on no step any more
-            sensor = Sensor(sqrt(sensor.variance_mps2_2 / chip.oversample), 0.0)
-        description = {
-            "driver": "bma220",
-            "verified": True,
-            "range_g": chip.range_g,
-            "mps2_per_count": step_mps2,
-            "bandwidth_hz": chip.filter_hz,
-            "oversample": chip.oversample,
-        }
-        bytes_decoder = Bma220Decoder(chip.range_g)
-
-        def counters() -> dict[str, int]:
-            return {"odd_bits": bytes_decoder.anomalies, "repeated_samples": bytes_decoder.repeats}
-
-        return Instrument(bytes_decoder, chip.oversample, sensor, description, counters)
-    profile = _mounted(load_profile(config.pasco.profile), Axis.from_word(config.vertical_axis))
-    description = {
-        "driver": "pasco",
-        "profile": profile.name,
-        "profile_version": profile.version,
-        "verified": profile.verified,
-        "calibration": asdict(config.pasco.calibration) if config.pasco.calibration else None,
-    }
-    decoder = PascoDecoder(profile, config.pasco.calibration)
-    sensor = Sensor(SERIAL_NOISE_MPS2, 0.0)
-    return Instrument(decoder, 1, sensor, description, lambda: asdict(decoder.counters))
+    kind, settings = config.kind, config.settings
+    readings = kind.readings(settings)
+    sensor = Sensor(readings.noise_mps2, readings.step_mps2)
+    if readings.oversample > 1:  # the mean of several readings is on no step any more
+        sensor = Sensor(sqrt(sensor.variance_mps2_2 / readings.oversample), 0.0)
+    decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
+    return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)})
 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
@@ -131,7 +94,7 @@ def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, A
         "ridelog_version": version(),
         "sensor": sensor.description,
         "vehicle": asdict(vehicle),
-        "settings": _plain(asdict(config)),
+        "settings": _plain(_as_written(config)),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
@@ -140,11 +103,8 @@ def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, A
 def dump_header(config: Config) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
     sensor = config.accelerometer
-    accelerometer: dict[str, Any] = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis}
-    if sensor.driver == "bma220":
-        accelerometer |= {"range_g": sensor.bma220.range_g, "oversample": sensor.bma220.oversample}
-    else:
-        accelerometer |= {"profile": sensor.pasco.profile, "calibrated": sensor.pasco.calibration is not None}
+    accelerometer = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis,
+                     **sensor.kind.header(sensor.settings)}
     stem = config.vehicle.stem
     is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
     return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, stem if is_shipped else str(config.vehicle))
@@ -158,26 +118,16 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
     """
     says = header.accelerometer
     config = given or Config()
-    chip, serial = config.accelerometer.bma220, config.accelerometer.pasco
-    axis, profile = config.accelerometer.vertical_axis, serial.profile
+    kind = accelerometers()[says["driver"]]
+    axis = config.accelerometer.vertical_axis
     if given is None:
-        axis, profile = says.get("vertical_axis", axis), says.get("profile", profile)
-        if says.get("calibrated"):
-            raise BadInput(f"{place}: recorded with a calibration of its own; expected its settings, --config FILE")
-    range_g, oversample = (says.get(key, getattr(chip, key)) for key in ("range_g", "oversample"))
+        axis = says.get("vertical_axis", axis)
     if axis not in AXES:
         raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {shortened(str(axis))}")
-    if type(range_g) is not int or type(oversample) is not int:
-        raise BadInput(f"{place}: expected whole numbers for 'range_g' and 'oversample'")
-    if not isinstance(profile, str):
-        raise BadInput(f"{place}: expected 'profile' as a name")
-    sensor = AccelerometerConfig(
-        driver=says["driver"],
-        vertical_axis=axis,
-        bma220=replace(chip, range_g=range_g, oversample=oversample),
-        pasco=replace(serial, profile=profile),
-    )
+    sections = config.accelerometer.sections
     try:
+        settings = kind.recorded(says, sections[kind.name], is_given=given is not None)
+        sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings})
         instrument(sensor)
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
@@ -200,11 +150,11 @@ def _vehicle_file(name: str, place: str) -> Path:
     return path
 
 
-def _mounted(profile: Profile, up: Axis) -> Profile:
-    """The profile for a sensor mounted this way: frames without start bytes are told apart by gravity."""
-    if not isinstance(profile.layout, FrameLayout) or profile.layout.upright_axis is None:
-        return profile
-    return replace(profile, layout=replace(profile.layout, upright_axis=up.column))
+def _as_written(config: Config) -> dict[str, Any]:
+    """The settings, in the shape that they have in their file."""
+    settings = asdict(config)
+    sections = settings["accelerometer"].pop("sections")
+    return settings | {"accelerometer": settings["accelerometer"] | sections}
 
 
 def _plain(value: Any) -> Any:

@@ -12,60 +12,43 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from drivers.bma220 import Bma220Settings
+from drivers.accelerometers import DEFAULT, accelerometers
+from drivers.accelerometers.accelerometer import Accelerometer
 from drivers.errors import SettingsError
 from drivers.nmea import ROLLOVERS_MAX
+from drivers.settings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
-from logger.shipped import is_path, shipped, vehicle_file, vehicle_path
+from logger.shipped import shipped, vehicle_file, vehicle_path
 from logger.store.pairing import MODES, NOT_PAIRED, Pairing
 from logger.store.yaml_lines import Node, load_mapping
 from logger.units import WINDOW_M
 
-if TYPE_CHECKING:
-    from drivers.pasco import Calibration
-
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-_RANGES_G = ("2", "4", "8", "16")
-_BANDWIDTHS_HZ = ("32", "64", "125", "250", "500", "1000")
-_BAUDS = ("1200", "2400", "4800", "9600", "19200", "38400", "57600", "115200", "230400", "460800", "921600")
-_DUMP = "dump:"
-_LARGEST_COUNT = 65536
-_LEAST_STEP_G = 0.1
-
-
-@dataclass(frozen=True)
-class Bma220Config:
-    """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; ``bandwidth_hz`` None means automatic."""
-
-    i2c_bus: int | Path = 1
-    range_g: int = 2
-    bandwidth_hz: int | None = None
-    oversample: int = 1
-
-
-@dataclass(frozen=True)
-class PascoConfig:
-    """``profile`` is a shipped name or a path; ``calibration`` None takes the profile's own."""
-
-    port: str = "/dev/ttyUSB0"
-    baud: int = 115200
-    profile: str = "lines"
-    accept_unverified: bool = False
-    calibration: Calibration | None = None
 
 
 @dataclass(frozen=True)
 class AccelerometerConfig:
-    """``driver`` is bma220 or pasco; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up."""
+    """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
+    ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used."""
 
-    driver: str = "bma220"
+    driver: str = DEFAULT
     vertical_axis: str = "+z"
-    bma220: Bma220Config = Bma220Config()
-    pasco: PascoConfig = PascoConfig()
+    sections: Mapping[str, Any] = field(
+        default_factory=lambda: {name: kind.settings() for name, kind in accelerometers().items()})
+
+    @property
+    def kind(self) -> Accelerometer[Any]:
+        """What ``driver`` names."""
+        return accelerometers()[self.driver]
+
+    @property
+    def settings(self) -> Any:
+        """The settings of ``driver``."""
+        return self.sections[self.driver]
 
 
 @dataclass(frozen=True)
@@ -111,7 +94,7 @@ class LogConfig:
 class Config:
     """All settings of the service. ``vehicle`` is the path of its file. Paths are resolved."""
 
-    accelerometer: AccelerometerConfig = AccelerometerConfig()
+    accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig)
     gps: GpsConfig = GpsConfig()
     vehicle: Path = field(default_factory=lambda: vehicle_file("rav4-2009"))
     vehicle_error: float = 0.05
@@ -168,10 +151,6 @@ def _whole(low: int, high: int) -> Read:
     return lambda node: node.integer(low, high)
 
 
-def _number_out_of(allowed: tuple[str, ...]) -> Read:
-    return lambda node: int(node.choice(*allowed))
-
-
 def _or_none(word: str, read: Read) -> Read:
     """Let ``word`` stand for None (``null``: any way YAML has to write nothing)."""
     def read_or_none(node: Node) -> Any:
@@ -187,17 +166,8 @@ def _or_none(word: str, read: Read) -> Read:
     return read_or_none
 
 
-def _path(node: Node) -> Path:
-    path = Path(node.file).parent.resolve() / node.text()
-    try:
-        path.exists()
-    except OSError as error:
-        raise node.wrong(f"a path that can be ({error.strerror})") from None
-    return path
-
-
 def _file_to_write(node: Node) -> Path:
-    path = _path(node)
+    path = node.path()
     if path.exists() and not path.is_file():
         raise node.wrong("the name of a file to write (this is a folder or a device)")
     return path
@@ -208,83 +178,71 @@ def _vehicle(node: Node) -> Path:
         path = vehicle_path(node.text(), beside=Path(node.file).parent.resolve())
     except BadInput as error:
         raise BadInput(f"{node.file}:{node.line}: {error}") from None
-    if not _path(replace(node, content=str(path))).is_file():
+    if not replace(node, content=str(path)).path().is_file():
         raise node.wrong("a vehicle's file (there is no such file)")
     return path
 
 
-def _i2c_bus(node: Node) -> int | Path:
-    text = node.content
-    if isinstance(text, str) and text.startswith(_DUMP):
-        path = _path(replace(node, content=text.removeprefix(_DUMP)))
-        if not path.is_file():
-            raise node.wrong("a recorded dump (there is no such file)")
-        return path
-    if not node.plain or not isinstance(text, str) or not text.isdigit():
-        raise node.wrong("the number of an I2C bus from 0 to 255, or dump:FILE")
-    return node.integer(0, 255)
+def _reader(kind: Kind) -> Read:
+    """How a declared kind of setting is read."""
+    match kind:
+        case Whole(low, high):
+            return _whole(low, high)
+        case Decimal(low, high):
+            return _number(low, high)
+        case OneOf(numbers):
+            words = tuple(map(str, numbers))
+            return lambda node: int(node.choice(*words))
+        case Flag():
+            return Node.boolean
+        case Text():
+            return Node.text
+        case Special(read):
+            return read
+        case OrNone(word, inner):
+            return _or_none(word, _reader(inner))
 
 
-def _profile(node: Node) -> str:
-    return str(_path(node)) if is_path(node.text()) else node.text()
+def _section_of(accelerometer: Accelerometer[Any]) -> Read:
+    read = _section(accelerometer.settings, {key: _reader(kind) for key, kind in accelerometer.keys.items()})
+
+    def read_checked(node: Node) -> Any:
+        try:
+            return read(node)
+        except SettingsError as error:
+            raise _blamed(error, node) from None
+    return read_checked
 
 
-def _calibration(node: Node) -> Calibration:
-    from drivers.pasco import Calibration  # only loaded for this instrument
-
-    axes = node.mapping(required=("x", "y", "z"))
-    zeros_raw, ones_raw = zip(*(_counts_at_0_and_1_g(axes[axis]) for axis in "xyz"), strict=True)
-    return Calibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
+def _blamed(error: SettingsError, section: Node) -> BadInput:
+    """The error with the line of its key, or of the section."""
+    entry = section.content.get(error.key, section) if isinstance(section.content, Mapping) else section
+    return BadInput(f"{entry.file}:{entry.line}: {error}")
 
 
-def _counts_at_0_and_1_g(node: Node) -> tuple[float, float]:
-    """Two points of an axis, extended to the counts at 0 and at 1 g."""
-    values = [item.number(-_LARGEST_COUNT, _LARGEST_COUNT) for item in node.items()]
-    if len(values) != 4 or abs(values[3] - values[1]) < _LEAST_STEP_G:
-        raise node.wrong(f"two different points [raw, g, raw, g], {_LEAST_STEP_G} g or more apart")
-    first_raw, first_g, second_raw, second_g = values
-    counts_per_g = (second_raw - first_raw) / (second_g - first_g)
-    if abs(counts_per_g) < 1:
-        raise node.wrong("two different points [raw, g, raw, g], a count per g or more apart")
-    zero_g_raw = first_raw - first_g * counts_per_g
-    return zero_g_raw, zero_g_raw + counts_per_g
-
-
-_read_pasco = _section(PascoConfig, {
-    "port": Node.text,
-    "baud": _number_out_of(_BAUDS),
-    "profile": _profile,
-    "accept_unverified": Node.boolean,
-    "calibration": _or_none("null", _calibration),
-})
-
-_read_bma220 = _section(Bma220Config, {
-    "i2c_bus": _i2c_bus,
-    "range_g": _number_out_of(_RANGES_G),
-    "bandwidth_hz": _or_none("auto", _number_out_of(_BANDWIDTHS_HZ)),
-    "oversample": _whole(1, 8),
-})
-
-
-def _bma220(node: Node) -> Bma220Config:
-    config = _read_bma220(node)
+def _accelerometer(node: Node) -> AccelerometerConfig:
+    kinds = accelerometers()
+    readers: dict[str, Read] = {
+        "driver": lambda entry: entry.choice(*kinds),
+        "vertical_axis": lambda entry: entry.choice(*AXES),
+        **{name: _section_of(kind) for name, kind in kinds.items()},
+    }
+    read = {key: readers[key](entry) for key, entry in node.mapping(optional=readers).items()}
+    usual = AccelerometerConfig()
+    config = AccelerometerConfig(
+        read.get("driver", usual.driver), read.get("vertical_axis", usual.vertical_axis),
+        {name: read.get(name, settings) for name, settings in usual.sections.items()},
+    )
     try:
-        Bma220Settings(range_g=config.range_g, bandwidth_hz=config.bandwidth_hz, oversample=config.oversample)
+        config.kind.check_chosen(config.settings)
     except SettingsError as error:
-        raise BadInput(f"{node.file}:{node.line}: {error}") from None
+        raise _blamed(error, node.mapping().get(config.driver, node)) from None
     return config
 
 
-_read_accelerometer = _section(AccelerometerConfig, {
-    "driver": lambda node: node.choice("bma220", "pasco"),
-    "vertical_axis": lambda node: node.choice(*AXES),
-    "bma220": _bma220,
-    "pasco": _read_pasco,
-})
-
 _gps = _section(GpsConfig, {
     "port": Node.text,
-    "baud": _number_out_of(_BAUDS),
+    "baud": _reader(BAUDS),
     "latency_s": _number(0, 2),
     "bridge_s": _number(0, 60),
     "week_rollovers": _whole(0, ROLLOVERS_MAX),
@@ -303,7 +261,7 @@ _read_pipeline = _section(PipelineConfig, {
 })
 
 _log = _section(LogConfig, {
-    "directory": _path,
+    "directory": Node.path,
     "max_file_bytes": _whole(10_000, 1_000_000_000),
     "record_dump": Node.boolean,
     "sync_s": _number(0.1, 60),
@@ -314,7 +272,7 @@ _log = _section(LogConfig, {
 
 _pairing = _section(Pairing, {
     "mode": lambda node: node.choice(*MODES),
-    "key_file": _path,
+    "key_file": Node.path,
 })
 
 
@@ -325,25 +283,3 @@ def _pipeline(node: Node) -> PipelineConfig:
         raise BadInput(f"{entry.file}:{entry.line}: expected stationary_mps to be less than slow_mps, found "
                        f"{pipeline.stationary_mps:g} and {pipeline.slow_mps:g}")
     return pipeline
-
-
-def _accelerometer(node: Node) -> AccelerometerConfig:
-    settings = _read_accelerometer(node)
-    if settings.driver == "pasco":
-        pasco = node.mapping().get("pasco", node)
-        _refuse_silent_guess(settings.pasco, pasco)
-    return settings
-
-
-def _refuse_silent_guess(pasco: PascoConfig, node: Node) -> None:
-    """Refuse a profile that nobody has seen work on hardware, unless the file says that this is known."""
-    from drivers.pasco import load_profile  # only loaded for this instrument
-
-    entry = node.mapping().get("profile", node)
-    try:
-        profile = load_profile(pasco.profile)
-    except SettingsError as error:
-        raise BadInput(f"{entry.file}:{entry.line}: {error}") from None
-    if not profile.verified and not pasco.accept_unverified:
-        raise BadInput(f"{entry.file}:{entry.line}: expected a verified profile, and {profile.name!r} is not verified "
-                       "on hardware; set accept_unverified: true beside it to use it all the same")

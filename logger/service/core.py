@@ -10,8 +10,10 @@ from __future__ import annotations
 import logging
 from typing import Protocol
 
+from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import Event
 from drivers.errors import BadReply
+from drivers.events import GPS
 from drivers.nmea import NmeaDecoder
 from drivers.readings import AccelerationBlock, Fix
 from logger.records import WindowRecord
@@ -27,17 +29,6 @@ STEP_BYTES = 1_000_000
 log = logging.getLogger(__name__)
 
 
-class AccelerationDecoder(Protocol):
-    """What every accelerometer driver offers: bytes with their arrival time in, samples out; after ``flush`` the next
-    ``take`` gives all. ``doubt``: what is wrong with the samples that come; empty: nothing."""
-
-    @property
-    def doubt(self) -> str: ...
-    def feed(self, t_us: int, data: bytes) -> None: ...
-    def flush(self) -> None: ...
-    def take(self) -> AccelerationBlock: ...
-
-
 class RowSink(Protocol):
     """Where rows go: the segment log."""
 
@@ -50,10 +41,11 @@ class RowSink(Protocol):
 class Core:
     """Decodes events, steps the pipeline, writes its rows.
 
-    rows, samples, fixes count what has passed; last_record and last_fix are the newest of each.
+    rows, samples, fixes count what has passed; last_record and last_fix are the newest of each. bad_events were
+    passed over: of another accelerometer, no whole reading, or too much for their moment.
     """
 
-    def __init__(self, accelerometer: AccelerationDecoder, gps: NmeaDecoder, pipeline: Pipeline, sink: RowSink) -> None:
+    def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Pipeline, sink: RowSink) -> None:
         self._accelerometer = accelerometer
         self._gps = gps
         self._pipeline = pipeline
@@ -85,8 +77,11 @@ class Core:
         if self._step_bytes > STEP_BYTES:
             self.bad_events += 1
             return
-        if source == "nmea":
+        if source == GPS:
             self._fixes += self._gps.feed(t_us, data)
+            return
+        if source != self._accelerometer.name:
+            self.bad_events += 1
             return
         try:
             self._accelerometer.feed(t_us, data)

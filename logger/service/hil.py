@@ -5,47 +5,54 @@ adapters, threads, timing, the card. So the bytes of a recording are written to 
 came, for a service that listens at the other end of the wires, and its log is held against a replay of the same bytes
 (``logger.service.agreement``).
 
-A BMA220 sits on an I2C bus, which no serial port can stand in for. Its readings are sent as a bridge microcontroller
-would send them, as lines ``x,y,z`` in g (profile ``lines``); nothing of a reading is lost but the flag that it lies at
-the end of the range. The expected rows are made of the same lines.
+An accelerometer on an I2C bus is nothing that a serial port can stand in for. Its readings are sent as a bridge
+microcontroller would send them, as lines ``x,y,z`` in g (profile ``lines``); nothing of a reading is lost but the flag
+that it lies at the end of the range. The expected rows are made of the same lines.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any
 
 import numpy as np
 
-from drivers.bma220 import Bma220Decoder
-from drivers.dump import DumpHeader, Event
+from drivers.accelerometers import accelerometers, line_reader, serial_accelerometers
+from drivers.accelerometers.accelerometer import Decoder, SerialAccelerometer
+from drivers.dump import LATEST_US, DumpHeader, Event
+from drivers.errors import BadReply, SettingsError
 from drivers.ports import BytePort
+from drivers.readings import AccelerationBlock
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service import assemble
+from logger.service.chain import Axis
 from logger.service.config import Config
 from logger.service.core import Core
+from logger.service.merging import EventMerger
 from logger.store.rotation import ClockMap
 from logger.store.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
-BRIDGE_PROFILE = "lines"
 PROGRESS_EVERY_US = US_PER_S
+HELD_US = 10 * US_PER_S
+"""A decoder gives each sample within this time: a clock that is recovered looks some seconds ahead."""
 
 
 @dataclass(frozen=True)
 class Wired:
-    """A recording as it goes through serial wires: its header and events, of ``pasco`` and ``nmea`` alone.
+    """A recording as it goes through serial wires: its header and events, of a serial accelerometer and the GPS alone.
 
-    bridged    the accelerometer's bytes were turned into lines
+    bridged    title of the accelerometer whose bytes were turned into lines; empty: they go as they are
     """
 
     header: DumpHeader
     events: Iterator[Event]
-    bridged: bool
+    bridged: str
 
 
 @dataclass(frozen=True)
@@ -68,14 +75,22 @@ def wired(header: DumpHeader, events: Iterable[Event], seconds: float | None, pl
     if seconds is not None:
         events = _first(events, round(seconds * US_PER_S))
     sensor = header.accelerometer
-    if sensor["driver"] != "bma220":
-        return Wired(header, iter(events), bridged=False)
-    if sensor.get("oversample", 1) != 1:
-        raise BadInput(f"{place}: expected a BMA220 read 100 times a second, found oversample {sensor['oversample']}")
-    lines: dict[str, Any] = {"driver": "pasco", "profile": BRIDGE_PROFILE}
+    kind = accelerometers()[sensor["driver"]]
+    if isinstance(kind, SerialAccelerometer):
+        return Wired(header, iter(events), bridged="")
+    try:
+        settings = kind.recorded(sensor, kind.settings(), is_given=False)
+    except SettingsError as error:
+        raise BadInput(f"{place}: {error}") from None
+    oversample = kind.readings(settings).oversample
+    if oversample != 1:
+        raise BadInput(f"{place}: expected a {kind.title} read 100 times a second, found oversample {oversample}")
+    bridge = line_reader()
+    lines: dict[str, Any] = {"driver": bridge.name, **(bridge.lines or {})}
     if "vertical_axis" in sensor:
         lines["vertical_axis"] = sensor["vertical_axis"]
-    return Wired(replace(header, accelerometer=lines), _as_lines(events, sensor.get("range_g", 2)), bridged=True)
+    decoder = kind.decoder(settings, Axis.from_word(sensor.get("vertical_axis", "+z")).column)
+    return Wired(replace(header, accelerometer=lines), _as_lines(events, decoder), bridged=kind.title)
 
 
 def send(
@@ -114,12 +129,15 @@ def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRe
     Raises BadInput for settings under which the service does not listen to what the wires bring.
     """
     sensor = config.accelerometer
-    if sensor.driver != "pasco":
-        raise BadInput("the service's settings: expected the driver pasco, whose bytes a serial port can "
-                       f"bring, found {sensor.driver} (--config FILE names the settings)")
-    if recording.bridged and sensor.pasco.profile != BRIDGE_PROFILE:
-        raise BadInput(f"the service's settings: expected the profile {BRIDGE_PROFILE}, as which the bytes of the "
-                       f"BMA220 are sent, found {sensor.pasco.profile}")
+    if not isinstance(sensor.kind, SerialAccelerometer):
+        known = " or ".join(serial_accelerometers())
+        raise BadInput(f"the service's settings: expected the driver {known}, whose bytes a serial "
+                       f"port can bring, found {sensor.driver} (--config FILE names the settings)")
+    for key, value in (sensor.kind.lines or {}).items() if recording.bridged else ():
+        found = sensor.kind.header(sensor.settings).get(key)
+        if found != value:
+            raise BadInput(f"the service's settings: expected the {key} {value}, as which the bytes of the "
+                           f"{recording.bridged} are sent, found {found}")
     config = assemble.config_for_dump(recording.header, config, None, place)
     instrument = assemble.instrument(config.accelerometer)
     rows = _Rows()
@@ -170,15 +188,27 @@ def _first(events: Iterable[Event], length_us: int) -> Iterator[Event]:
     return takewhile(is_in, events)
 
 
-def _as_lines(events: Iterable[Event], range_g: int) -> Iterator[Event]:
-    """Readings of the chip as lines of text; other events as they are."""
-    decoder = Bma220Decoder(range_g)
-    for byte in range(256):
-        decoder.feed(byte, bytes((byte,) * 3))
-    texts = [b"%.4f" % value for value in (decoder.take().accel_mps2[:, 0] / STANDARD_GRAVITY_MPS2).tolist()]
+def _as_lines(events: Iterable[Event], decoder: Decoder) -> Iterator[Event]:
+    """Readings of the decoder's events as lines of text, each at its time; other events as they are."""
+    merger = EventMerger()
+    taken_us: int | None = None
     for event in events:
-        if event.source == "bma220":
-            x, y, z = event.data
-            yield Event(event.t_us, "pasco", b"%b,%b,%b\n" % (texts[x], texts[y], texts[z]))
+        if event.source == decoder.name:
+            with suppress(BadReply):
+                decoder.feed(event.t_us, event.data)
         else:
-            yield event
+            merger.add([event])
+        taken_us = event.t_us if taken_us is None else taken_us
+        if event.t_us - taken_us >= US_PER_S:
+            taken_us = event.t_us
+            merger.add(_lines(decoder.take()))
+            yield from merger.until(event.t_us - HELD_US)
+    decoder.flush()
+    merger.add(_lines(decoder.take()))
+    yield from merger.until(LATEST_US)
+
+
+def _lines(block: AccelerationBlock) -> list[Event]:
+    source = line_reader().name
+    return [Event(t_us, source, b"%.4f,%.4f,%.4f\n" % tuple(row))
+            for t_us, row in zip(block.t_us.tolist(), (block.accel_mps2 / STANDARD_GRAVITY_MPS2).tolist(), strict=True)]

@@ -41,27 +41,6 @@ def monotonic_us() -> int:
     return time.monotonic_ns() // 1000
 
 
-class Deadlines:
-    """Instants at equal steps. One that is missed is counted and skipped, never made up for in a burst."""
-
-    def __init__(self, step_us: int) -> None:
-        self._step_us = step_us
-        self._next_us = 0
-        self.missed = 0
-
-    def wait(self) -> None:
-        """Sleep until the next instant."""
-        now_us = monotonic_us()
-        self._next_us = (self._next_us or now_us) + self._step_us
-        wait_us = self._next_us - now_us
-        if wait_us < 0:
-            skipped = -wait_us // self._step_us + 1
-            self.missed += skipped
-            self._next_us += skipped * self._step_us
-            wait_us = self._next_us - now_us
-        time.sleep(wait_us / US_PER_S)
-
-
 class Listener(threading.Thread):
     """Looks at one device for ever. ``pace`` waits between two looks.
 

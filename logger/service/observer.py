@@ -11,7 +11,7 @@ from contextlib import suppress
 from logger.service.chain import Axis
 from logger.service.config import Config
 from logger.service.core import Core
-from logger.service.live import Deadlines, monotonic_us
+from logger.service.live import monotonic_us
 from logger.service.pipeline import Pipeline
 from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
 from logger.service.storage import Storage
@@ -39,7 +39,6 @@ class Observer:
         accelerometer: Supervisor,
         gps: Supervisor,
         counters: Mapping[str, Callable[[], dict[str, int]]],
-        deadlines: Deadlines,
         notices: tuple[str, ...] = (),
     ) -> None:
         self._config = config
@@ -48,7 +47,6 @@ class Observer:
         self._pipeline = pipeline
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
-        self._deadlines = deadlines
         self._notices = notices
         self._began_us = monotonic_us()
         self._told_us = self._began_us
@@ -95,13 +93,14 @@ class Observer:
         """Everything that ``ridelog status`` shows."""
         fix = self._core.last_fix
         storage = self._storage.status()
+        place = self._config.accelerometer.kind.place(self._config.accelerometer.settings)
         return ServiceStatus(
             state=self._state(now_us),
             pid=os.getpid(),
             version=self._version,
             uptime_s=(now_us - self._began_us) / US_PER_S,
             updated_t_us=now_us,
-            accelerometer=self._sensor("accelerometer", now_us, self._accelerometer_place(), self._core.samples),
+            accelerometer=self._sensor("accelerometer", now_us, place, self._core.samples),
             gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes),
             fix_valid=fix.valid if fix else None,
             satellites=fix.satellites if fix else None,
@@ -115,7 +114,7 @@ class Observer:
             storage=storage,
             notices=self._notices,
             counters={
-                "missed_samples": self._deadlines.missed,
+                "missed_samples": self._sensors["accelerometer"].missed,
                 "late_samples": self._pipeline.late_samples,
                 "crowded_samples": self._pipeline.crowded_samples,
                 "bad_events": self._core.bad_events,
@@ -182,16 +181,10 @@ class Observer:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=doubt or part.error or None,
             readings=readings,
+            note=part.note,
             counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
                       "dropped_readings": part.dropped, **self._counters[name]()},
         )
-
-    def _accelerometer_place(self) -> str:
-        sensor = self._config.accelerometer
-        if sensor.driver == "pasco":
-            return sensor.pasco.port
-        bus = sensor.bma220.i2c_bus
-        return f"/dev/i2c-{bus}" if isinstance(bus, int) else str(bus)
 
 
 class Progress:

@@ -11,12 +11,13 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from drivers.bma220 import Bma220Settings
 from drivers.dump import Event
-from drivers.replay import RecordedBus, RecordedPort
+from drivers.events import GPS
+from drivers.replay import RecordedPort
+from drivers.sources import Played, SerialSource
+from logger.service.config import AccelerometerConfig
 from logger.service.core import Core
 from logger.service.merging import EventMerger
-from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.supervisor import Supervisor
 from logger.units import US_PER_S
 
@@ -25,7 +26,7 @@ LONGEST_HELD_US = US_PER_S
 
 
 @dataclass(frozen=True)
-class Played:
+class Playback:
     """How much was played: events, and the time from the first to the last [s]."""
 
     events: int
@@ -33,29 +34,28 @@ class Played:
 
 
 class Player:
-    """Plays events into a core.
+    """Plays events of the accelerometer and of the GPS into a core; those of anything else are counted there as bad.
 
     rate        multiple of real time; 0: as fast as it goes
     progress    called about once a minute of drive with the time played [s]
     """
 
     def __init__(
-        self, core: Core, bma220: Bma220Settings, rate: float, progress: Callable[[float], None]
+        self, core: Core, accelerometer: AccelerometerConfig, rate: float, progress: Callable[[float], None]
     ) -> None:
         self._core = core
         self._rate = rate
         self._progress = progress
         self._clock_us = 0
-        bus = RecordedBus()
-        ports = {name: RecordedPort() for name in ("pasco", "nmea")}
-        sources: list[Source] = [Bma220Source(lambda: bus, bma220, self._now_us, _no_wait)]
-        sources += [SerialSource(name, _opener(port), self._now_us, wait_s=0.0) for name, port in ports.items()]
-        self._load = {"bma220": bus.load, **{name: port.load for name, port in ports.items()}}
-        self._supervisors = {source.name: Supervisor(source, self._now_us) for source in sources}
-        self._chip = self._supervisors["bma220"]
+        port = RecordedPort()
+        receiver = SerialSource(GPS, lambda: port, self._now_us, wait_s=0.0)
+        sensor = accelerometer.kind.played(accelerometer.settings, self._now_us)
+        self._devices = {sensor.source.name: sensor, GPS: Played(receiver, port.load, port.has_bytes)}
+        self._supervisors = {name: Supervisor(one.source, self._now_us) for name, one in self._devices.items()}
+        self._chip = self._supervisors[sensor.source.name]
         self._merger = EventMerger()
 
-    def play(self, events: Iterable[Event]) -> Played:
+    def play(self, events: Iterable[Event]) -> Playback:
         """All events, then the end of the drive."""
         count = 0
         first_us: int | None = None
@@ -76,18 +76,23 @@ class Player:
             self._merger.add(supervisor.close())
         self._feed_until(self._clock_us)
         self._core.finish()
-        return Played(count, (self._clock_us - first_us) / US_PER_S if first_us is not None else 0.0)
+        return Playback(count, (self._clock_us - first_us) / US_PER_S if first_us is not None else 0.0)
 
     def _one(self, event: Event) -> None:
         self._clock_us = event.t_us
-        self._load[event.source](event.data)
+        device = self._devices.get(event.source)
+        if device is None:
+            self._merger.add([event])
+            self._feed(False)
+            return
+        device.load(event.data)
         supervisor = self._supervisors[event.source]
         seen = supervisor.step()
         self._merger.add(seen)
-        while seen and supervisor is not self._chip:
+        while seen and device.has_more():
             seen = supervisor.step()
             self._merger.add(seen)
-        self._feed(bool(seen))
+        self._feed(bool(seen) and supervisor is self._chip)
 
     def _feed(self, chip_gave: bool) -> None:
         """Give the core what is complete. A chip that is not heard any more must not hold up the rest."""
@@ -106,14 +111,6 @@ class Player:
 
     def _now_us(self) -> int:
         return self._clock_us
-
-
-def _opener(port: RecordedPort) -> Callable[[], RecordedPort]:
-    return lambda: port
-
-
-def _no_wait(_seconds: float) -> None:
-    """Nothing settles in a recording."""
 
 
 def _sleep_until(monotonic_s: float) -> None:

@@ -6,35 +6,30 @@ import logging
 import os
 import time
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from drivers.bma220 import REGISTER_STEP
+from drivers.accelerometers.accelerometer import SERIAL_WAIT_S
 from drivers.disk import FileSystem
-from drivers.dump import Event, open_dump
-from drivers.hardware import open_i2c, open_serial
-from drivers.ports import I2cBus
-from drivers.replay import RecordedBus
+from drivers.events import GPS, Event
+from drivers.machine import Machine
+from drivers.sources import SerialSource
 from logger.errors import BadInput
 from logger.service import assemble
 from logger.service.config import Config
 from logger.service.core import Core
-from logger.service.live import Deadlines, Listener, LiveService, monotonic_us
+from logger.service.live import Listener, LiveService, monotonic_us
 from logger.service.notify import Notifier, watchdog_interval_s
 from logger.service.observer import Observer
 from logger.service.priority import go_first
-from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.stop import Stop
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.store.folder_lock import FolderLock
 from logger.store.space import Limits
 from logger.store.vehicle_file import read_vehicle
-from logger.units import US_PER_S
 
-SERIAL_WAIT_S = 0.5
 LONGEST_BEAT_S = 2.0
 log = logging.getLogger(__name__)
 
@@ -58,16 +53,18 @@ def _serve(config: Config, stop: Stop) -> None:
     pipeline = assemble.pipeline(config, sensor, vehicle)
     core = Core(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
-    deadlines = Deadlines(US_PER_S // (100 * sensor.oversample))
-    sources: list[Source] = [_accelerometer(config), _serial("nmea", config.gps.port, config.gps.baud)]
+    machine = Machine(monotonic_us, time.sleep)
+    receiver = SerialSource(GPS, lambda: machine.open_serial(config.gps.port, config.gps.baud), monotonic_us,
+                            SERIAL_WAIT_S)
+    sources = [config.accelerometer.kind.source(config.accelerometer.settings, machine), receiver]
     accelerometer, gps = (Supervisor(source, monotonic_us) for source in sources)
-    paces = [source.gather if isinstance(source, SerialSource) else deadlines.wait for source in sources]
-    listeners = [Listener(part, events, pace) for part, pace in zip((accelerometer, gps), paces, strict=True)]
-    counters = {"accelerometer": sensor.counters, "gps": lambda: asdict(decoder.counters)}
+    listeners = [Listener(part, events, source.rest)
+                 for part, source in zip((accelerometer, gps), sources, strict=True)]
+    counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: asdict(decoder.counters)}
     notices = assemble.notices(vehicle)
     for notice in notices:
         log.warning("%s", notice)
-    observer = Observer(config, core, storage, pipeline, accelerometer, gps, counters, deadlines, notices)
+    observer = Observer(config, core, storage, pipeline, accelerometer, gps, counters, notices)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
@@ -98,26 +95,3 @@ def _make(directory: Path) -> None:
     # one that is mounted read-only is no wrong setting, and may pass
     if not (os.access(directory, os.W_OK | os.X_OK) or FileSystem().is_read_only(directory)):
         raise BadInput(f"{directory}: expected a folder that the service may write to")
-
-
-def _accelerometer(config: Config) -> Source:
-    if config.accelerometer.driver == "pasco":
-        return _serial("pasco", config.accelerometer.pasco.port, config.accelerometer.pasco.baud)
-    settings = assemble.bma220_settings(config.accelerometer)
-    return Bma220Source(_bus_opener(config.accelerometer.bma220.i2c_bus), settings, monotonic_us, time.sleep)
-
-
-def _bus_opener(bus: int | Path) -> Callable[[], I2cBus]:
-    if isinstance(bus, int):
-        return lambda: open_i2c(bus, REGISTER_STEP)
-
-    def play() -> I2cBus:
-        with open_dump(bus) as reader:
-            events = [event for event in reader if event.source == "bma220"]
-        return RecordedBus.playing(events, monotonic_us)
-
-    return play
-
-
-def _serial(name: str, port: str, baud: int) -> SerialSource:
-    return SerialSource(name, lambda: open_serial(port, baud), monotonic_us, SERIAL_WAIT_S)

@@ -43,6 +43,7 @@ class SensorStatus:
     last_error      text of the last fault, also after it recovered; None: there was none
     readings        samples or fixes so far
     counters        what its decoder counted: bad checksums, dropped bytes ...
+    note            what a person should know of how it is read; empty: nothing
     """
 
     driver: str
@@ -52,6 +53,7 @@ class SensorStatus:
     last_error: str | None = None
     readings: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
+    note: str = ""
 
 
 @dataclass(frozen=True)

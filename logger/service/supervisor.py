@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from drivers.dump import Event
 from drivers.errors import BadReply, DeviceError, SettingsLost
-from logger.service.sources import Source
+from drivers.sources import Source
 from logger.service.status import SensorState
 from logger.units import US_PER_S
 
@@ -56,6 +56,16 @@ class Supervisor:
     def dropped(self) -> int:
         """Readings left out because the device did not vouch for them in the end."""
         return self._source.dropped
+
+    @property
+    def missed(self) -> int:
+        """Looks at the device that came too late to be made."""
+        return self._source.missed
+
+    @property
+    def note(self) -> str:
+        """What a person should know of how the device is read; empty: nothing."""
+        return self._source.note
 
     @property
     def waiting_since_us(self) -> int | None:

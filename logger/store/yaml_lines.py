@@ -74,6 +74,16 @@ class Node:
                 raise BadInput(f"{self.file}:{self.line}: expected the key {key!r} here, it is missing")
         return self.content
 
+    def path(self, after: str = "") -> Path:
+        """The path that stands ``after`` these characters; one that does not begin with / is seen from the folder of
+        the file."""
+        path = Path(self.file).parent.resolve() / self.text().removeprefix(after)
+        try:
+            path.exists()
+        except OSError as error:
+            raise self.wrong(f"a path that can be ({error.strerror})") from None
+        return path
+
     def items(self) -> tuple[Node, ...]:
         """The nodes of a list."""
         if not isinstance(self.content, tuple):

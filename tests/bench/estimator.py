@@ -524,9 +524,10 @@ def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Conf
     """The service's settings for a sensor; ``latency_s`` is what it is told of the receiver."""
     config = Config()
     driver = "pasco" if sensor is PASCO else "bma220"
-    chip = replace(config.accelerometer.bma220, oversample=sensor.oversample)
+    sections = config.accelerometer.sections
+    chip = replace(sections["bma220"], oversample=sensor.oversample)
     return replace(
-        config, accelerometer=AccelerometerConfig(driver=driver, bma220=chip),
+        config, accelerometer=AccelerometerConfig(driver=driver, sections={**sections, "bma220": chip}),
         gps=GpsConfig(latency_s=latency_s), pipeline=PipelineConfig(window_m=window_m),
     )
 

@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.bma220 import Bma220Decoder
+from drivers.accelerometers.bma220 import Bma220Decoder
+from drivers.accelerometers.pasco import PascoConfig
 from drivers.dump import DumpHeader, Event, open_dump
-from drivers.pasco import LineLayout, load_profile
+from drivers.wire_profiles import LineLayout, load_profile
 from logger.commands import hil as command
 from logger.commands import main
 from logger.errors import BadInput
@@ -121,7 +122,7 @@ def test_a_chip_read_more_often_is_refused() -> None:
 
 @pytest.mark.parametrize(("sensor", "said"), [
     (AccelerometerConfig(), "driver pasco"),
-    (AccelerometerConfig(driver="pasco", pasco=replace(AccelerometerConfig().pasco, profile="lines_mps2")), "lines"),
+    (AccelerometerConfig(driver="pasco", sections={"pasco": PascoConfig(profile="lines_mps2")}), "lines"),
 ])
 def test_a_service_that_would_not_hear_it_is_refused(sensor: AccelerometerConfig, said: str) -> None:
     with pytest.raises(BadInput, match=said):

@@ -110,7 +110,7 @@ def test_an_unverified_profile_is_named_in_every_log(ridelog: Path, tmp_path: Pa
         (
             b'# ridelog-dump 1 {"start_utc": null, "accelerometer": {"driver": "bma220"}, "gps": {}, '
             b'"vehicle": "rav4-2009"}\n1.000000 bma220 0000\n2.000000 bma220 000040\n',
-            ":2: expected three bytes",
+            ":2: expected 3 bytes",
         ),
         (
             b'# ridelog-dump 1 {"start_utc": null, "accelerometer": {"driver": "bma220", "range_g": 3}, "gps": {}, '

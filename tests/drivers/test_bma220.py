@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bma220 import Bma220, Bma220Decoder, Bma220Settings, mps2_per_count
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers.bma220 import Bma220, Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
 from drivers.replay import RecordedBus
 
@@ -90,7 +91,7 @@ def test_settings_that_the_chip_does_not_have_are_refused(wrong: dict) -> None:
 # ---- start
 
 def test_start_takes_the_documented_steps_and_touches_nothing_else() -> None:
-    wire = Wire(RecordedBus())
+    wire = Wire(RecordedBus(Bma220Chip()))
     identity = driver(wire).start()
     assert (identity.address, identity.revision, identity.bandwidth_hz) == (0x0A, 0, 32)
     assert_runs_as_set(wire.bus, Bma220Settings())
@@ -101,13 +102,13 @@ def test_start_takes_the_documented_steps_and_touches_nothing_else() -> None:
 
 def test_start_waits_for_the_filter_to_settle() -> None:
     waits: list[float] = []
-    Bma220(RecordedBus(), Bma220Settings(), waits.append).start()
+    Bma220(RecordedBus(Bma220Chip()), Bma220Settings(), waits.append).start()
     assert waits[-1] >= 1 / (2 * 32)
     assert waits[:-1] == [0.002] * 4
 
 
 def test_the_second_address_is_found() -> None:
-    bus = RecordedBus(address=0x0B)
+    bus = RecordedBus(Bma220Chip(), address=0x0B)
     bma220 = driver(bus)
     assert bma220.start().address == 0x0B
     bus.load(bytes((4, 8, 252)))
@@ -127,7 +128,7 @@ def test_any_state_of_the_chip_ends_in_one_that_runs_as_set(
     suspended: bool, in_reset: bool, registers: dict[int, int], range_g: int, oversample: int, watchdog_ms: int
 ) -> None:
     chosen = Bma220Settings(range_g=range_g, oversample=oversample, watchdog_ms=watchdog_ms)
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bus.chip.suspended, bus.chip.in_reset = suspended, in_reset
     bus.chip.registers |= registers
     bma220 = driver(bus, chosen)
@@ -141,7 +142,7 @@ def test_any_state_of_the_chip_ends_in_one_that_runs_as_set(
     st.sampled_from([0x00, 0x02, 0x1E, 0x20, 0x22, 0x2E, SUSPEND, SOFT_RESET]), st.integers(0, 255), min_size=1
 ))
 def test_a_broken_chip_is_a_documented_error_or_runs_as_set(stuck: dict[int, int]) -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bus.chip.stuck = stuck
     bma220 = driver(bus)
     try:
@@ -167,7 +168,7 @@ ERRNOS = st.sampled_from([errno.EREMOTEIO, errno.ENXIO, errno.ETIMEDOUT, errno.E
 def test_failing_transfers_raise_device_errors_and_a_later_start_succeeds(
     failures: dict[int, tuple[int, bool]], suspended: bool, in_reset: bool
 ) -> None:
-    wire = Wire(RecordedBus(), failures)
+    wire = Wire(RecordedBus(Bma220Chip()), failures)
     wire.bus.chip.suspended, wire.bus.chip.in_reset = suspended, in_reset
     bma220 = driver(wire)
     for _ in range(len(failures) + 1):
@@ -183,7 +184,7 @@ def test_failing_transfers_raise_device_errors_and_a_later_start_succeeds(
 
 
 def test_a_failed_toggle_is_not_read_again() -> None:
-    wire = Wire(RecordedBus(), {2: (errno.EIO, True)})
+    wire = Wire(RecordedBus(Bma220Chip()), {2: (errno.EIO, True)})
     with pytest.raises(BadReply):
         driver(wire).start()
     assert wire.log[-1] == ("read", SUSPEND)
@@ -193,7 +194,7 @@ def test_a_failed_toggle_is_not_read_again() -> None:
 # ---- errors told apart
 
 def failing(number: int) -> Wire:
-    return Wire(RecordedBus(), dict.fromkeys(range(100), (number, False)))
+    return Wire(RecordedBus(Bma220Chip()), dict.fromkeys(range(100), (number, False)))
 
 
 @pytest.mark.parametrize(("number", "kind", "words"), [
@@ -211,7 +212,7 @@ def test_each_fault_of_the_bus_has_its_own_line(number: int, kind: type[DeviceEr
 
 
 def test_a_wrong_chip_is_named_with_its_id_and_place() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bus.chip.stuck = {0x00: 0x55}
     with pytest.raises(WrongDevice, match=r"0x0A has id 0x55, a BMA220 has 0xDD"):
         driver(bus).start()
@@ -225,7 +226,7 @@ def test_a_held_bus_is_told_at_once() -> None:
 
 
 def test_reading_before_start_or_after_stop_is_refused() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bma220 = driver(bus)
     for call in (bma220.read_raw, bma220.check_settings):
         with pytest.raises(NotPresent, match="not been started"):
@@ -240,13 +241,13 @@ def test_reading_before_start_or_after_stop_is_refused() -> None:
 
 
 def test_stop_suspends_a_chip_that_was_already_suspended_and_never_raises() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bma220 = driver(bus)
     bma220.start()
     bus.chip.suspended = True
     bma220.stop()
     assert bus.chip.suspended
-    wire = Wire(RecordedBus())
+    wire = Wire(RecordedBus(Bma220Chip()))
     other = driver(wire)
     other.start()
     wire.failures = dict.fromkeys(range(100), (errno.ETIMEDOUT, False))
@@ -254,7 +255,7 @@ def test_stop_suspends_a_chip_that_was_already_suspended_and_never_raises() -> N
 
 
 def test_a_dip_of_the_supply_shows_in_the_settings_and_a_start_mends_it() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bma220 = driver(bus, Bma220Settings(range_g=4))
     bma220.start()
     bma220.check_settings()
@@ -266,7 +267,7 @@ def test_a_dip_of_the_supply_shows_in_the_settings_and_a_start_mends_it() -> Non
 
 
 def test_a_short_burst_is_a_bad_reply() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bma220 = driver(bus)
     bma220.start()
     bus.chip.sample = lambda: b"\x04\x08"

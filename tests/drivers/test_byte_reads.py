@@ -13,7 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.bma220 import REGISTER_STEP, Bma220, Bma220Settings, mps2_per_count
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers._bma220_registers import REGISTER_STEP
+from drivers.accelerometers.bma220 import Bma220, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 from drivers.replay import RecordedBus
@@ -24,7 +26,7 @@ Sample = tuple[int, int, int]
 
 def opened(monkeypatch: pytest.MonkeyPatch, functions: int, chip: RecordedBus | None = None) -> Callable[[], object]:
     """Opens a bus whose adapter has these functions."""
-    bus = chip or RecordedBus()
+    bus = chip or RecordedBus(Bma220Chip())
 
     def opens(self: smbus2.SMBus, number: int) -> None:
         self.funcs = I2cFunc(functions)
@@ -40,7 +42,7 @@ class Renewing(RecordedBus):
     """A chip that has another sample after every so many byte reads of its data registers."""
 
     def __init__(self, samples: list[Sample], every: int, first: int) -> None:
-        super().__init__()
+        super().__init__(Bma220Chip())
         self._samples = samples
         self._every = every
         self._read = first
@@ -106,7 +108,7 @@ def test_few_readings_are_lost_on_a_rough_road(
 ) -> None:
     """A chip that renews its registers 1000 times a second, read 100 times a second through a slow adapter."""
     taken = rough_road(30_000)
-    chip = RecordedBus()
+    chip = RecordedBus(Bma220Chip())
     now_ms = 0.0
 
     def read(i2c_addr: int, register: int) -> int:
@@ -131,7 +133,7 @@ def test_few_readings_are_lost_on_a_rough_road(
 
 
 def test_an_adapter_with_block_reads_is_used_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     chip = Bma220(opened(monkeypatch, BYTES | I2cFunc.SMBUS_READ_I2C_BLOCK, bus)(), Bma220Settings(),  # type: ignore[arg-type]
                   lambda seconds: None)
     chip.start()

@@ -212,7 +212,7 @@ def test_what_was_flushed_can_be_read_while_recording(tmp_path: Path) -> None:
         ("0.020000 bma220 00 440\n", "<t_s> <source> <hex>"),
         ("0.020000 bma220 0004zz\n", "pairs of hex digits"),
         ("0.020000 nmea \n", "at least one byte"),
-        ("0.020000 bma220 0004\n", "three bytes"),
+        ("0.020000 bma220 0004\n", "3 bytes"),
         ("0.020000 bma220\n", "<t_s> <source> <hex>"),
         ("\n", "<t_s> <source> <hex>"),
         ("0.009999 bma220 000440\n", "a time not before the last one, 0.010000"),

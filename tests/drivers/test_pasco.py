@@ -9,9 +9,10 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.accelerometers.pasco import PascoDecoder
 from drivers.errors import SettingsError
-from drivers.pasco import Calibration, PascoDecoder, load_profile, shipped_profiles
 from drivers.sample_clock import NO_TIME, SampleClock
+from drivers.wire_profiles import Calibration, load_profile, shipped_profiles
 
 G_MPS2 = 9.80665
 

@@ -39,7 +39,7 @@ def test_a_pipe_is_refused_at_once_whatever_it_is_given_as(what: str, pipe: Path
 
 
 def test_a_pipe_as_the_profile_of_a_sensor_is_refused(pipe: Path) -> None:
-    script = f"from drivers.pasco import load_profile; load_profile({str(pipe)!r})"
+    script = f"from drivers.wire_profiles import load_profile; load_profile({str(pipe)!r})"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=20, check=False)
     assert "SettingsError" in done.stderr
     assert "not a regular file" in done.stderr

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bma220 import Bma220, Bma220Settings
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers.bma220 import Bma220, Bma220Settings
 from drivers.dump import Event
 from drivers.errors import BadReply, DumpError, NotPresent, Timeout
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
@@ -43,7 +44,7 @@ def events(source: str, *at: tuple[int, bytes]) -> list[Event]:
 # ---- the bus, loaded
 
 def test_a_loaded_sample_is_read_once_and_never_invented() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     bma220 = started(bus)
     for number in range(5):
         bus.load(sample(number))
@@ -58,8 +59,8 @@ def test_a_loaded_sample_is_read_once_and_never_invented() -> None:
 @pytest.mark.parametrize("data", [b"", b"\x04", b"\x04\x08", b"\x04\x08\x40\x00"])
 def test_a_recorded_read_of_another_length_is_an_error_of_the_dump(data: bytes) -> None:
     with pytest.raises(DumpError, match="expected 3"):
-        RecordedBus().load(data)
-    playing = RecordedBus.playing(events("bma220", (0, data)), lambda: 0)
+        RecordedBus(Bma220Chip()).load(data)
+    playing = RecordedBus.playing(Bma220Chip(), events("bma220", (0, data)), lambda: 0)
     bma220 = started(playing)
     with pytest.raises(DumpError, match="expected 3"):
         bma220.read_raw()
@@ -67,7 +68,7 @@ def test_a_recorded_read_of_another_length_is_an_error_of_the_dump(data: bytes) 
 
 def test_no_one_answers_at_another_address() -> None:
     with pytest.raises(OSError) as caught:
-        RecordedBus().read_byte_data(0x0B, 0x00)
+        RecordedBus(Bma220Chip()).read_byte_data(0x0B, 0x00)
     assert caught.value.errno == errno.EREMOTEIO
 
 
@@ -87,12 +88,12 @@ def outcomes(bus: RecordedBus, bma220: Bma220, reads: int) -> list[str]:
     (Fault.NACK, "NotPresent"), (Fault.TIMEOUT, "Timeout"), (Fault.BUSY, "NotPresent"),
 ])
 def test_transfers_fail_on_cue_and_cost_their_own_samples_only(fault: Fault, name: str) -> None:
-    bus = RecordedBus([Cue(fault, at_read=2, count=2)])
+    bus = RecordedBus(Bma220Chip(), [Cue(fault, at_read=2, count=2)])
     assert outcomes(bus, started(bus), 6) == ["ok", "ok", name, name, "ok", "ok"]
 
 
 def test_the_sample_of_a_failed_burst_is_lost() -> None:
-    bus = RecordedBus([Cue(Fault.TIMEOUT, at_read=0)])
+    bus = RecordedBus(Bma220Chip(), [Cue(Fault.TIMEOUT, at_read=0)])
     bma220 = started(bus)
     bus.load(sample(1))
     with pytest.raises(Timeout):
@@ -102,13 +103,13 @@ def test_the_sample_of_a_failed_burst_is_lost() -> None:
 
 
 def test_a_bus_held_low_is_freed_by_the_chips_watchdog() -> None:
-    bus = RecordedBus([Cue(Fault.STUCK_LOW, at_read=1)])
+    bus = RecordedBus(Bma220Chip(), [Cue(Fault.STUCK_LOW, at_read=1)])
     assert outcomes(bus, started(bus), 4) == ["ok", "Timeout", "ok", "ok"]
 
 
 def test_without_the_watchdog_it_stays_low_until_the_power_goes() -> None:
     clock = Clock()
-    bus = RecordedBus([Cue(Fault.STUCK_LOW, at_read=1), Cue(Fault.REPLUG, at_us=50)], clock.now_us)
+    bus = RecordedBus(Bma220Chip(), [Cue(Fault.STUCK_LOW, at_read=1), Cue(Fault.REPLUG, at_us=50)], clock.now_us)
     bma220 = started(bus, Bma220Settings(watchdog_ms=0))
     assert outcomes(bus, bma220, 4) == ["ok", "Timeout", "Timeout", "Timeout"]
     with pytest.raises(Timeout, match="held low"):
@@ -121,7 +122,7 @@ def test_without_the_watchdog_it_stays_low_until_the_power_goes() -> None:
 def test_unplugged_and_back_the_chip_has_its_defaults() -> None:
     clock = Clock()
     cues = [Cue(Fault.UNPLUG, at_us=1_000), Cue(Fault.REPLUG, at_us=2_000)]
-    bus = RecordedBus(cues, clock.now_us)
+    bus = RecordedBus(Bma220Chip(), cues, clock.now_us)
     bma220 = started(bus)
     clock.now = 1_000
     assert outcomes(bus, bma220, 2) == ["NotPresent"] * 2
@@ -136,7 +137,7 @@ def test_unplugged_and_back_the_chip_has_its_defaults() -> None:
 
 
 def test_a_brown_out_is_silent_until_somebody_checks() -> None:
-    bus = RecordedBus([Cue(Fault.BROWN_OUT, at_read=1)])
+    bus = RecordedBus(Bma220Chip(), [Cue(Fault.BROWN_OUT, at_read=1)])
     bma220 = started(bus)
     assert outcomes(bus, bma220, 3) == ["ok"] * 3
     with pytest.raises(BadReply, match="lost its settings"):
@@ -144,7 +145,7 @@ def test_a_brown_out_is_silent_until_somebody_checks() -> None:
 
 
 def test_the_chip_stands_in_for_unknown_registers_too() -> None:
-    bus = RecordedBus()
+    bus = RecordedBus(Bma220Chip())
     assert bus.read_i2c_block_data(0x0A, 0x00, 2) == [0xDD, 0x00]
     bus.write_byte_data(0x0A, 0x00, 0x11)
     assert bus.read_byte_data(0x0A, 0x00) == 0xDD
@@ -162,7 +163,7 @@ def test_the_chip_stands_in_for_unknown_registers_too() -> None:
 def test_a_playing_bus_gives_the_latest_sample_by_now() -> None:
     clock = Clock(7_000_000)
     recorded = events("bma220", *((500_000 + 10_000 * number, sample(number)) for number in range(5)))
-    bus = RecordedBus.playing(iter(recorded), clock.now_us)
+    bus = RecordedBus.playing(Bma220Chip(), iter(recorded), clock.now_us)
     bma220 = started(bus)
     seen = []
     for wait_us in (0, 9_999, 1, 15_000, 5_000, 1_000_000):
@@ -174,7 +175,7 @@ def test_a_playing_bus_gives_the_latest_sample_by_now() -> None:
 
 def test_an_earlier_start_has_nothing_until_the_first_sample() -> None:
     clock = Clock(100)
-    bus = RecordedBus.playing(events("bma220", (50, sample(9))), clock.now_us, first_us=0)
+    bus = RecordedBus.playing(Bma220Chip(), events("bma220", (50, sample(9))), clock.now_us, first_us=0)
     bma220 = started(bus)
     with pytest.raises(NotPresent):
         bma220.read_raw()
@@ -185,7 +186,7 @@ def test_an_earlier_start_has_nothing_until_the_first_sample() -> None:
 def test_cues_of_a_playing_bus_are_on_the_recordings_time() -> None:
     clock = Clock(9_000)
     recorded = events("bma220", (1_000, sample(1)), (2_000, sample(2)))
-    bus = RecordedBus.playing(recorded, clock.now_us, [Cue(Fault.NACK, at_us=2_000)])
+    bus = RecordedBus.playing(Bma220Chip(), recorded, clock.now_us, [Cue(Fault.NACK, at_us=2_000)])
     bma220 = started(bus)
     assert bma220.read_raw() == sample(1)
     clock.now += 1_000
@@ -282,9 +283,9 @@ def test_a_playing_port_can_start_before_its_first_bytes_and_be_unplugged_while_
     lambda: Cue(Fault.NACK),
     lambda: Cue(Fault.NACK, at_us=1, at_read=1),
     lambda: Cue(Fault.NACK, at_read=1, count=0),
-    lambda: RecordedBus([Cue(Fault.SHORT_READ, at_read=0)]),
+    lambda: RecordedBus(Bma220Chip(), [Cue(Fault.SHORT_READ, at_read=0)]),
     lambda: RecordedPort([Cue(Fault.NACK, at_read=0)]),
-    lambda: RecordedBus([Cue(Fault.NACK, at_us=0)]),
+    lambda: RecordedBus(Bma220Chip(), [Cue(Fault.NACK, at_us=0)]),
 ])
 def test_a_cue_that_cannot_happen_is_refused(make: Callable[[], object]) -> None:
     with pytest.raises(ValueError):

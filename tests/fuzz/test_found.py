@@ -10,7 +10,7 @@ import pytest
 
 from drivers.dump import open_dump
 from drivers.errors import DriverError, SettingsError
-from drivers.pasco import Calibration, load_profile, shipped_profiles
+from drivers.wire_profiles import Calibration, load_profile, shipped_profiles
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.assemble import config_for_dump

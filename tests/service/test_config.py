@@ -23,8 +23,12 @@ def load(tmp_path: Path, text: str) -> Config:
 
 def names(section: Any) -> dict[str, Any]:
     """Names of a dataclass's fields, nested as they are."""
-    return {field.name: names(getattr(section, field.name)) if is_dataclass(getattr(section, field.name)) else None
-            for field in fields(section)}
+    shape = {field.name: names(getattr(section, field.name)) if is_dataclass(getattr(section, field.name)) else None
+             for field in fields(section)}
+    if "sections" in shape:  # the sections of the accelerometers stand beside the keys for all of them
+        del shape["sections"]
+        shape |= {name: names(settings) for name, settings in section.sections.items()}
+    return shape
 
 
 def keys(section: dict[str, Any], shape: dict[str, Any]) -> dict[str, Any]:
@@ -72,15 +76,15 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     assert config.vehicle == tmp_path / "mine.yaml"
     assert config.log.directory == tmp_path / "logs"
     assert config.status_file == Path("/tmp/status.json")
-    assert config.accelerometer.bma220.i2c_bus == tmp_path / "drive.dump.gz"
-    assert config.accelerometer.bma220.bandwidth_hz == 64
+    assert config.accelerometer.sections["bma220"].i2c_bus == tmp_path / "drive.dump.gz"
+    assert config.accelerometer.sections["bma220"].bandwidth_hz == 64
 
 
 def test_an_unverified_profile_runs_only_when_that_is_accepted(tmp_path: Path) -> None:
     text = "accelerometer:\n  driver: pasco\n  pasco:\n    profile: ps2119\n"
     with pytest.raises(BadInput, match=r":4: .*not verified on hardware.*accept_unverified"):
         load(tmp_path, text)
-    assert load(tmp_path, text + "    accept_unverified: true\n").accelerometer.pasco.accept_unverified
+    assert load(tmp_path, text + "    accept_unverified: true\n").accelerometer.sections["pasco"].accept_unverified
     assert load(tmp_path, text.replace("driver: pasco", "driver: bma220")).accelerometer.driver == "bma220"
 
 
@@ -88,9 +92,9 @@ def test_calibration_points_become_counts_at_0_and_1_g(tmp_path: Path) -> None:
     axis = {"x": "[4096, 0, 4424, 1]", "y": "[3768, -1, 4424, 1]", "z": "[5080, 3, 4752, 2]"}
     lines = "".join(f"      {name}: {points}\n" for name, points in axis.items())
     config = load(tmp_path, f"accelerometer:\n  pasco:\n    calibration:\n{lines}")
-    assert config.accelerometer.pasco.calibration is not None
-    assert config.accelerometer.pasco.calibration.zero_g_raw == pytest.approx((4096, 4096, 4096))
-    assert config.accelerometer.pasco.calibration.one_g_raw == pytest.approx((4424, 4424, 4424))
+    assert config.accelerometer.sections["pasco"].calibration is not None
+    assert config.accelerometer.sections["pasco"].calibration.zero_g_raw == pytest.approx((4096, 4096, 4096))
+    assert config.accelerometer.sections["pasco"].calibration.one_g_raw == pytest.approx((4424, 4424, 4424))
 
 
 @pytest.mark.parametrize(("text", "complaint"), [

@@ -132,6 +132,19 @@ def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) 
     assert all("gap" in record.flags for record in placed)
 
 
+def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive) -> None:
+    """A recording that holds two of them: its header says which one its rows are made of."""
+    serial = [event for event in lines_drive.events if event.source != "nmea"]
+    foreign = [Event(event.t_us, "bma220", b"\x00\x00\x40") for event in serial]
+    events = sorted([*lines_drive.events, *foreign], key=lambda event: event.t_us)
+    core, rows = core_for(lines_drive.header)
+    for event in events:
+        core.feed(event)
+    core.finish()
+    assert rows.rows == rows_of(lines_drive.header, lines_drive.events).rows
+    assert core.bad_events == len(foreign)
+
+
 def test_no_vehicle_of_that_name_is_refused(short_drive: Drive) -> None:
     with pytest.raises(BadInput, match="not known here"):
         core_for(replace(short_drive.header, vehicle="hovercraft"))

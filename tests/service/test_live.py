@@ -11,8 +11,9 @@ import pytest
 
 from drivers.dump import Event
 from drivers.errors import NotPresent
+from drivers.sources import Deadlines
 from logger.service import live
-from logger.service.live import Deadlines, Listener, LiveService, monotonic_us
+from logger.service.live import Listener, LiveService, monotonic_us
 from logger.service.supervisor import Supervisor
 
 
@@ -83,7 +84,7 @@ def test_what_was_written_is_synced_before_it_is_as_old_as_the_settings_allow(sy
 
 
 def test_deadlines_that_are_missed_are_counted_and_skipped() -> None:
-    deadlines = Deadlines(step_us=5_000)
+    deadlines = Deadlines(5_000, monotonic_us, time.sleep)
     deadlines.wait()
     time.sleep(0.021)
     deadlines.wait()

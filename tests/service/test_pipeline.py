@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from drivers.bma220 import Bma220Decoder
+from drivers.accelerometers.bma220 import Bma220Decoder
 from logger.demo.simulated_drive import Drive
 from logger.dsp.resample import GridResampler
 from logger.dsp.weightings.wk import WEIGHTING

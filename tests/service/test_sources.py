@@ -6,12 +6,13 @@ from collections import deque
 
 import pytest
 
-from drivers.bma220 import FILTER, RANGE, Bma220Settings
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers._bma220_registers import FILTER, RANGE
+from drivers.accelerometers.bma220 import Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.replay import RecordedBus
 from logger.service.live import Listener, LiveService
 from logger.service.merging import EventMerger
-from logger.service.sources import Bma220Source
 from logger.service.supervisor import Supervisor
 
 SETTINGS = Bma220Settings(range_g=4)
@@ -23,7 +24,7 @@ class Bus(RecordedBus):
     """The chip's readings name the registers under which they were made. Its power dips before some transfers."""
 
     def __init__(self, dips: set[int]) -> None:
-        super().__init__()
+        super().__init__(Bma220Chip())
         self.dips = dips
         self.transfers = 0
         self.register_reads = 0
@@ -49,7 +50,7 @@ class Clock:
 
 def polled(bus: Bus, polls: int, step_us: int = STEP_US) -> tuple[Supervisor, list[Event]]:
     clock = Clock()
-    supervisor = Supervisor(Bma220Source(lambda: bus, SETTINGS, clock, lambda seconds: None), clock)
+    supervisor = Supervisor(chip_source(lambda: bus, SETTINGS, clock, lambda seconds: None), clock)
     events = []
     for _ in range(polls):
         events += supervisor.step()
@@ -104,7 +105,7 @@ class Fed:
 def test_events_of_another_source_wait_for_the_readings_that_are_held_back() -> None:
     fed, queue, clock = Fed(), deque[Event](), Clock()
     bus = Bus(set())
-    chip = Supervisor(Bma220Source(lambda: bus, SETTINGS, clock, lambda seconds: None), clock)
+    chip = Supervisor(chip_source(lambda: bus, SETTINGS, clock, lambda seconds: None), clock)
     listener = Listener(chip, queue, lambda: None)
     service = LiveService(fed, fed, [listener], queue, 1.0, 1.0, lambda now_us: None)  # type: ignore[arg-type]
     for tick in range(500):

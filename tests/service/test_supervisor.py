@@ -6,11 +6,12 @@ import itertools
 
 import pytest
 
-from drivers.bma220 import Bma220Settings
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers.bma220 import Bma220Settings, chip_source
 from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
-from logger.service.sources import Bma220Source, SerialSource
+from drivers.sources import SerialSource
 from logger.service.supervisor import FAULTS_IN_A_ROW, FAULTY_US, FIRST_WAIT_US, LONGEST_WAIT_US, Supervisor
 
 
@@ -136,8 +137,8 @@ def test_a_fault_of_the_program_is_not_swallowed(clock: Clock, device: Device) -
 
 @pytest.mark.parametrize("fault", [Fault.NACK, Fault.TIMEOUT, Fault.STUCK_LOW])
 def test_the_chip_comes_back_after_a_fault_of_the_bus(clock: Clock, fault: Fault) -> None:
-    bus = RecordedBus(cues=[Cue(fault, at_read=4)], now_us=clock)
-    source = Bma220Source(lambda: bus, Bma220Settings(), clock, lambda seconds: None)
+    bus = RecordedBus(Bma220Chip(), cues=[Cue(fault, at_read=4)], now_us=clock)
+    source = chip_source(lambda: bus, Bma220Settings(), clock, lambda seconds: None)
     supervisor = Supervisor(source, clock)
     seen = []
     for count in range(400):
@@ -151,8 +152,8 @@ def test_the_chip_comes_back_after_a_fault_of_the_bus(clock: Clock, fault: Fault
 
 def test_a_chip_that_was_unplugged_is_started_again_with_its_settings(clock: Clock) -> None:
     cues = [Cue(Fault.UNPLUG, at_us=2_000_000), Cue(Fault.REPLUG, at_us=9_000_000)]
-    bus = RecordedBus(cues=cues, now_us=clock)
-    source = Bma220Source(lambda: bus, Bma220Settings(range_g=4), clock, lambda seconds: None)
+    bus = RecordedBus(Bma220Chip(), cues=cues, now_us=clock)
+    source = chip_source(lambda: bus, Bma220Settings(range_g=4), clock, lambda seconds: None)
     supervisor = Supervisor(source, clock)
     seen_us = []
     for _ in range(2000):

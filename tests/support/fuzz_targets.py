@@ -21,10 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.bma220 import Bma220Decoder
+from drivers.accelerometers.bma220 import Bma220Decoder
+from drivers.accelerometers.pasco import PascoDecoder
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
-from drivers.pasco import FrameLayout, LineLayout, PascoDecoder, Profile, load_profile, shipped_profiles
+from drivers.wire_profiles import FrameLayout, LineLayout, Profile, load_profile, shipped_profiles
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.assemble import config_for_dump
@@ -429,7 +430,7 @@ def config(folder: Path) -> Target:
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         settings = load_config(file.hold(data))
-        calibration = settings.accelerometer.pasco.calibration
+        calibration = settings.accelerometer.sections["pasco"].calibration
         if calibration is not None:
             promise(all(map(isfinite, calibration.mps2_per_count)), "a scale that is no number")
         for path in (settings.log.directory, settings.status_file):

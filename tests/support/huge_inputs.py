@@ -20,7 +20,7 @@ from pathlib import Path
 
 from drivers.dump import DumpHeader, Event, open_dump
 from drivers.errors import DriverError
-from drivers.pasco import load_profile
+from drivers.wire_profiles import load_profile
 from logger.errors import BadInput
 from logger.service.config import load_config
 from logger.store.channel_file import read_channels

@@ -19,19 +19,20 @@ from unittest.mock import patch
 
 import numpy as np
 
-from drivers.bma220 import AXES, CHIP_ID, FILTER, RANGE, RANGE_CODES, WATCHDOG, Bma220Settings
+from drivers.accelerometers._bma220_chip import Bma220Chip
+from drivers.accelerometers._bma220_registers import AXES, CHIP_ID, FILTER, RANGE, WATCHDOG
+from drivers.accelerometers.bma220 import RANGE_CODES, Bma220Config, Bma220Settings, chip_source
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
 from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
-from drivers.simulator import Bma220Chip
+from drivers.sources import SerialSource, Source
 from logger.commands.status import advice
 from logger.records import WindowRecord
 from logger.service import assemble
-from logger.service.config import AccelerometerConfig, Bma220Config, Config, PascoConfig
+from logger.service.config import AccelerometerConfig, Config
 from logger.service.core import Core
-from logger.service.live import HANG_US, Deadlines, Listener, LiveService, monotonic_us
+from logger.service.live import HANG_US, Listener, LiveService, monotonic_us
 from logger.service.observer import Observer
-from logger.service.sources import Bma220Source, SerialSource, Source
 from logger.service.status import ServiceStatus
 from logger.service.stillness import FROZEN_S
 from logger.service.storage import Storage
@@ -70,7 +71,7 @@ class Bus(RecordedBus):
     """A recorded bus on which transfers may fail at random, and failing ones take their time."""
 
     def __init__(self, clock: Clock, cues: list[Cue]) -> None:
-        super().__init__(cues, clock)
+        super().__init__(Bma220Chip(), cues, clock)
         self.clock = clock
         self.loss = 0.0
         self.rng = random.Random(3)
@@ -130,10 +131,10 @@ class Car:
         folder.mkdir(exist_ok=True)
         config = Config(status_file=folder / "status.json")
         if serial:
-            lines = PascoConfig(profile="lines")
-            config = replace(config, accelerometer=AccelerometerConfig("pasco", "+z", pasco=lines))
+            config = replace(config, accelerometer=AccelerometerConfig("pasco", "+z"))
         elif settings is not None:
-            config = replace(config, accelerometer=AccelerometerConfig(bma220=Bma220Config(range_g=settings.range_g)))
+            config = replace(config, accelerometer=AccelerometerConfig(
+                sections=AccelerometerConfig().sections | {"bma220": Bma220Config(range_g=settings.range_g)}))
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = assemble.instrument(self.config.accelerometer)
         vehicle = read_vehicle(self.config.vehicle)
@@ -142,12 +143,12 @@ class Car:
         self.pipeline = assemble.pipeline(self.config, sensor, vehicle)
         self.rows = Rows()
         self.core = Core(sensor.decoder, self.decoder, self.pipeline, self.rows)
-        source: Source = SerialSource("pasco", lambda: self.lines, self.clock, 0.0) if serial else Bma220Source(
+        source: Source = SerialSource("pasco", lambda: self.lines, self.clock, 0.0) if serial else chip_source(
             lambda: self.bus, settings or Bma220Settings(), self.clock, lambda seconds: None)
         self.accelerometer = Supervisor(source, self.clock)
         self.gps = Supervisor(SerialSource("nmea", self.port.opened, self.clock, 0.0), self.clock)
         self.observer = Observer(self.config, self.core, self.storage, self.pipeline, self.accelerometer, self.gps,
-                                 {"accelerometer": sensor.counters, "gps": dict}, Deadlines(STEP_US))
+                                 {"accelerometer": lambda: sensor.decoder.counts, "gps": dict})
         events: deque[Event] = deque()
         self.listeners = [Listener(part, events, lambda: None) for part in (self.accelerometer, self.gps)]
         self.service = LiveService(self.core, self.storage, self.listeners, events, 1.0, 1.0, lambda now_us: None)

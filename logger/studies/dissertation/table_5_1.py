@@ -13,7 +13,7 @@ def run(effort: Effort) -> Result:
     """As ``Study.run``."""
     compared = [compare_sensors(seed) for seed in effort.each(range(1, 1 + effort.count(20)))]
     first, second = compared[0]
-    differences = [100 * abs(phone.rms_g - pasco.rms_g) / pasco.rms_g for pasco, phone in compared]
+    differences = [100 * abs(phone.rms_g - ps2119.rms_g) / ps2119.rms_g for ps2119, phone in compared]
     rows = tuple((one.sensor.name, printed, one.rms_g)
                  for one, printed in zip((first, second), PRINTED_RMS, strict=True))
     table = Table("R.m.s. of the whole record", (Column("sensor"), Column("printed [m/s2, which must be g]", ".4f"),

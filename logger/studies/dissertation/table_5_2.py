@@ -11,9 +11,9 @@ PRINTED_PEAKS_G, PRINTED_CYCLES = (0.198, 0.085), 10
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    (pasco, phone), = (compare_sensors() for _ in effort.each(range(1)))
+    (ps2119, phone), = (compare_sensors() for _ in effort.each(range(1)))
     rows = tuple((float(mode), printed, *ours) for mode, (printed, *ours) in enumerate(
-        zip(PRINTED_HZ, pasco.peaks_hz, phone.peaks_hz, strict=True), start=1))
+        zip(PRINTED_HZ, ps2119.peaks_hz, phone.peaks_hz, strict=True), start=1))
     table = Table("Peaks of the spectrum", (Column("mode", ".0f"), Column("printed, both sensors [Hz]", ".3f"),
                                             Column("our PS-2119 [Hz]", ".3f"), Column("our BMA220 [Hz]", ".3f")), rows)
     printed = 100 * damping_of_two_peaks(*PRINTED_PEAKS_G, PRINTED_CYCLES)
@@ -21,7 +21,7 @@ def run(effort: Effort) -> Result:
         Column("sensor"), Column("printed, Eq 5.3 [%]", ".2f"), Column("ours [%]", ".3f"),
         Column("standard deviation [%]", ".3f")), tuple(
         (one.sensor.name, printed, 100 * one.decrement.damping_ratio, 100 * one.decrement.damping_std)
-        for one in (pasco, phone)))
+        for one in (ps2119, phone)))
     verdict = ("The printed 0.074 Hz is a misprint for the 0.7419 Hz of Table 5.4. Both sensors show the same first "
                "two peaks here, as there; the third is some bins off where steps of 0.0625 g bury it. Ours lie at "
                "the frequencies of the model that was simulated, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the "

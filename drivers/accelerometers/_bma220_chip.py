@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.bma220 import (
+from drivers.accelerometers._bma220_registers import (
     AXES,
     CHIP_ID,
     DATA_ADDRESS,
@@ -35,12 +35,16 @@ def lying_flat() -> bytes:
 class Bma220Chip:
     """One chip. All attributes may be changed at any time, to put it into any state.
 
+    data_address, sample_bytes    a read of so many bytes from there on takes a sample
     sample       gives the three data bytes; called once per read that begins at the data registers
     suspended    in suspend: reads work, writes are ignored
     in_reset     held in soft reset: the same, and the registers stand at their defaults
     registers    what the writable registers hold, by address
     stuck        register address to the value it answers, whatever was written: a broken chip, or another one
     """
+
+    data_address = DATA_ADDRESS
+    sample_bytes = SAMPLE_BYTES
 
     def __init__(self, sample: Callable[[], bytes] = lying_flat) -> None:
         self.sample = sample

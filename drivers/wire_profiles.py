@@ -1,24 +1,18 @@
-"""An accelerometer on a serial line: the PASCO PS-2119, or anything that sends samples or lines of text.
+"""What the bytes of an accelerometer on a serial line mean, as a data file: a profile.
 
-The problem: what an AirLink 2 sends is not public, so what a frame means must stay out of the code until a real
-device has settled it. And a radio link delivers late and in bursts what the sensor measured at even intervals, while
-road roughness wants the time of each sample.
-
-The solution, three layers: a ``BytePort`` brings bytes, ``drivers.framing`` finds frames in them, and a profile says
-what a frame means. A profile is a data file: shipped ones lie in ``drivers/profiles``, anyone may name another by
-its path. ``SampleClock`` finds the rate of the samples and their times from the arrival times.
+Problem: what an instrument sends may not be public, and everybody's bridge sends lines of its own; that must stay out
+of the code until a real device has settled it. Solution: a profile says where the numbers stand in a frame and what
+they mean. Shipped ones lie in ``drivers/profiles``, anyone may name another by its path.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
-from itertools import pairwise
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,19 +20,14 @@ from yaml import YAMLError
 from yaml.constructor import SafeConstructor
 
 from drivers.errors import SettingsError, shortened
-from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
 from drivers.plain_yaml import NotPlainError, compose_plain, lines_of
-from drivers.readings import AccelerationBlock
+from drivers.readings import STANDARD_GRAVITY_MPS2
 from drivers.regular_file import open_regular
-from drivers.sample_clock import NO_TIME, SampleClock
-
-STANDARD_GRAVITY_MPS2 = 9.80665
 
 WORDS = {"u16le": "<u2", "u16be": ">u2", "i16le": "<i2", "i16be": ">i2"}
 UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "mps2": 1.0}
 AXES = "xyz"
 PROFILE_BYTES_MAX = 65_536
-WORTH_TELLING = 0.005
 
 Triple = tuple[float, float, float]
 
@@ -296,191 +285,3 @@ def _line_layout(keys: _Keys) -> LineLayout:
     layout = LineLayout(UNITS_MPS2[keys.choice("unit", list(UNITS_MPS2))], keys.number("range", 1e-3, 1e4))
     keys.finish()
     return layout
-
-
-class _Samples(NamedTuple):
-    """Decoded samples, before they have their times: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
-
-    after_loss: bool
-    offsets: npt.NDArray[np.int64]
-    accel_mps2: npt.NDArray[np.float64]
-    clipped: npt.NDArray[np.bool_]
-    good: npt.NDArray[np.bool_]
-
-
-class _FrameReader:
-    """Bytes to samples by a frame layout."""
-
-    def __init__(self, layout: FrameLayout) -> None:
-        told_by_gravity = layout.upright_axis is not None and not layout.sync
-        self._layout = layout
-        self.framer = FixedFramer(
-            layout.length_bytes, layout.plausible, layout.oriented if told_by_gravity else None, layout.sync
-        )
-
-    def read(self, data: bytes) -> list[_Samples]:
-        return [self._samples(frame) for frame in self.framer.feed(data)]
-
-    def _samples(self, run: Frame) -> _Samples:
-        layout = self._layout
-        frames = np.frombuffer(run.data, dtype=np.uint8).reshape(-1, layout.length_bytes)
-        counts = layout.counts(frames)
-        low, high = layout.valid_raw
-        calibration = layout.calibration
-        zero_raw, scale_mps2 = np.array((calibration.zero_g_raw, calibration.mps2_per_count), dtype=np.float64)
-        accel_mps2: npt.NDArray[np.float64] = (counts - zero_raw) * scale_mps2
-        offsets = run.start + layout.length_bytes * np.arange(len(frames), dtype=np.int64)
-        clipped = np.asarray(((counts <= low) | (counts >= high)).any(axis=1))
-        return _Samples(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
-
-
-_DECIMAL = rb" *([+-]?(?:\d{1,6}(?:\.\d{0,12})?|\.\d{1,12})) *"
-_LINE = re.compile(_DECIMAL + rb"," + _DECIMAL + rb"," + _DECIMAL + rb"(?:\*([0-9A-Fa-f]{2}) *)?")
-_NO_SAMPLE = (np.nan, np.nan, np.nan)
-
-
-class _LineReader:
-    """Lines of text to samples. A bad line still takes the place of one sample."""
-
-    def __init__(self, layout: LineLayout) -> None:
-        self._layout = layout
-        self.framer = LineFramer()
-
-    def read(self, data: bytes) -> list[_Samples]:
-        frames = self.framer.feed(data)
-        cuts = [0, *(k for k, frame in enumerate(frames) if k and frame.after_loss), len(frames)]
-        return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
-
-    def _samples(self, lines: list[Frame]) -> _Samples:
-        values = np.array([_triple(line.data) for line in lines], dtype=np.float64)
-        largest = np.abs(values).max(axis=1)
-        return _Samples(
-            lines[0].after_loss,
-            np.array([line.start for line in lines], dtype=np.int64),
-            values * self._layout.unit_mps2,
-            largest >= self._layout.range_units,
-            largest <= 2 * self._layout.range_units,
-        )
-
-
-def _triple(line: bytes) -> Triple:
-    """The three numbers of a line; not-a-numbers when it is damaged."""
-    match = _LINE.fullmatch(line)
-    if match is None or (match[4] and exclusive_or(line[: line.index(b"*")]) != int(match[4], 16)):
-        return _NO_SAMPLE
-    return float(match[1]), float(match[2]), float(match[3])
-
-
-@dataclass(frozen=True)
-class PascoCounters:
-    """What came in so far.
-
-    frames          good ones
-    bad_frames      in their place, but with values or a checksum that cannot be
-    dropped_bytes   bytes that belonged to no frame
-    resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
-    lost            samples that were noticed to be missing between others
-    undated         samples left out because they came at a rate that cannot be used, or too many were lost among them
-    """
-
-    frames: int
-    bad_frames: int
-    dropped_bytes: int
-    resyncs: int
-    lost: int
-    undated: int
-
-
-class PascoDecoder:
-    """Bytes of the device in, blocks of acceleration out, by a profile. Raises nothing, whatever the bytes.
-
-    calibration   of this very unit, instead of the profile's; SettingsError where the profile has no raw counts
-
-    Samples come out a second late, at the start 1.2 s together: by then it is known whether any were lost on the way.
-    ``flush`` gives what is held at the end. A bad frame is left out and counted; so are samples that come at a rate
-    that cannot be used. What ``take`` returns over time does not depend on when it is called.
-    """
-
-    def __init__(self, profile: Profile, calibration: Calibration | None = None) -> None:
-        self._reader: _FrameReader | _LineReader
-        if isinstance(profile.layout, FrameLayout):
-            layout = profile.layout if calibration is None else replace(profile.layout, calibration=calibration)
-            self._reader = _FrameReader(layout)
-        elif calibration is None:
-            self._reader = _LineReader(profile.layout)
-        else:
-            raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
-        self._profile = profile
-        self._clock = SampleClock(profile.rate_hz, profile.clock_tolerance)
-        self._arrivals = Arrivals()
-        self._chunks: list[bytes] = []
-        self._untimed: list[_Samples] = []
-        self._frames = 0
-        self._bad_frames = 0
-        self._undated = 0
-        self._ended = False
-
-    @property
-    def doubt(self) -> str:
-        """What is wrong with the samples that come, and what to do; empty: nothing."""
-        usual = f"{self._profile.rate_hz:g}"
-        if self._clock.refused_hz is not None:
-            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
-                    f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
-                    "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
-        if self._clock.too_many_lost:
-            return ("more samples are lost on the line than can be located: no rows are made of those that come. Check "
-                    "the baud rate at both ends, the cable, and whether the bridge keeps up")
-        if self._clock.lost_share >= WORTH_TELLING:
-            return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
-                    "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
-        return ""
-
-    @property
-    def counters(self) -> PascoCounters:
-        """What came in so far and was taken."""
-        clock = self._clock
-        dropped = self._reader.framer.dropped_bytes
-        return PascoCounters(self._frames, self._bad_frames, dropped, clock.resyncs, clock.lost, self._undated)
-
-    def feed(self, t_us: int, data: bytes) -> None:
-        """Take the bytes that arrived at ``t_us`` [us, monotonic]."""
-        self._arrivals.note(t_us, len(data))
-        self._chunks.append(data)
-
-    def flush(self) -> None:
-        """No more bytes will come: the next ``take`` gives all."""
-        self._ended = True
-
-    def take(self) -> AccelerationBlock:
-        """All samples that are complete and have their times, oldest first; may be none."""
-        samples = self._reader.read(b"".join(self._chunks))
-        self._chunks.clear()
-        times = [np.empty(0, dtype=np.int64)]
-        for some in samples:
-            if some.after_loss:
-                times.append(self._clock.restart())
-            times.append(self._clock.feed(self._arrivals.many(some.offsets)))
-            good = int(some.good.sum())
-            self._frames += good
-            self._bad_frames += len(some.good) - good
-        self._arrivals.forget(self._reader.framer.position)
-        self._untimed += samples
-        if self._ended:
-            times.append(self._clock.restart())
-        return self._timed(np.concatenate(times))
-
-    def _timed(self, t_us: npt.NDArray[np.int64]) -> AccelerationBlock:
-        """Give the oldest samples their times; the others wait."""
-        if len(t_us) == 0:
-            return AccelerationBlock(t_us, np.empty((0, 3)), np.empty(0, dtype=np.bool_))
-        accel_mps2 = np.concatenate([some.accel_mps2 for some in self._untimed])
-        clipped = np.concatenate([some.clipped for some in self._untimed])
-        good = np.concatenate([some.good for some in self._untimed])
-        n = len(t_us)
-        no_offsets = np.empty(0, dtype=np.int64)
-        self._untimed = [_Samples(False, no_offsets, accel_mps2[n:], clipped[n:], good[n:])]
-        dated = t_us != NO_TIME
-        self._undated += int(np.count_nonzero(~dated))
-        keep = good[:n] & dated
-        return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self._clock.rate_hz)

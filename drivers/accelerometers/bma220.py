@@ -8,57 +8,60 @@ whether it still is in that state; ``read_raw`` is one burst and nothing else; d
 the bus.
 
 When anything raises a DeviceError, wait and call ``start`` again: it assumes nothing about the chip.
-
-Register addresses are those on I2C, twice the numbers that the data sheet gives for SPI. Facts from the Linux kernel's
-driver (drivers/iio/accel/bma220), Bosch's API of 2014 and the UPM library, which agree.
 """
 
 from __future__ import annotations
 
-import errno
 import logging
 from array import array
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, Timeout, WrongDevice
+from drivers.accelerometers._bma220_registers import (
+    AXES,
+    CHIP_ID,
+    DATA_ADDRESS,
+    ENABLED_AXES,
+    FILTER,
+    FILTER_CODE,
+    RANGE,
+    RANGE_CODE,
+    REGISTER_STEP,
+    REVISION,
+    SAMPLE_BYTES,
+    SELF_TEST,
+    SERIAL_HIGH_BANDWIDTH,
+    SLEEP_ENABLE,
+    SOFT_RESET,
+    SUSPEND,
+    WATCHDOG,
+    WATCHDOG_CODE,
+)
+from drivers.accelerometers.accelerometer import Accelerometer, Readings
+from drivers.chip_bus import bus_fault, find_chip
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost
+from drivers.machine import Machine
 from drivers.ports import I2cBus
-from drivers.readings import AccelerationBlock
+from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
 from drivers.registers import Field, Register, ToggleRegister
+from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
+from drivers.sources import US_PER_S, ChipSource, Deadlines, Played, Source
 
-STANDARD_GRAVITY_MPS2 = 9.80665
 BASE_RATE_HZ = 100
+NOISE_MPS2 = 0.1  # r.m.s., beside its steps; no data sheet states it
 LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some more in the kernel
-
-CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
-REVISION = Register("revision", 0x02)
-DATA_ADDRESS = 0x04  # X, Y, Z: three registers in one burst, which steps from register to register by itself
-SAMPLE_BYTES = 3
-REGISTER_STEP = 2  # from one register's address to the next one's
-AXES = Register("power and axes", 0x1E, reset_value=0x07)
-FILTER = Register("filter", 0x20)
-RANGE = Register("range", 0x22)
-WATCHDOG = Register("bus watchdog", 0x2E)
-SUSPEND = ToggleRegister("suspend", 0x30)
-SOFT_RESET = ToggleRegister("soft reset", 0x32)
-
-SLEEP_ENABLE = Field("sleep_en", 6, 6)
-ENABLED_AXES = Field("en_x, en_y, en_z", 2, 0)
-SERIAL_HIGH_BANDWIDTH = Field("serial_high_bw", 7, 7)
-FILTER_CODE = Field("filter code", 3, 0)
-SELF_TEST = Field("sbist", 3, 2)
-RANGE_CODE = Field("range code", 1, 0)
-WATCHDOG_CODE = Field("watchdog code", 2, 1)
 
 RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
 FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
 SETTLING_S = {1000: 0.002, 500: 0.002, 250: 0.003, 125: 0.005, 64: 0.009, 32: 0.017}
 WATCHDOG_CODES = {0: 0, 1: 2, 10: 3}  # [ms]; 0 is off
 TOGGLE_WAIT_S = 0.002
-NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
 
 log = logging.getLogger(__name__)
 
@@ -147,7 +150,7 @@ class Bma220:
         """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
         self._chip = None
         self._checked = 0
-        chip = self._probe()
+        chip = find_chip(self._bus, CHIP_ID, self._settings.addresses, "a BMA220")
         try:
             revision = REVISION.read(self._bus, chip)
             self._make_run(SUSPEND, chip)
@@ -155,7 +158,7 @@ class Bma220:
             for register, values in self._wanted:
                 register.update(self._bus, chip, values)
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         self._sleep(SETTLING_S[self._settings.filter_hz])
         self._chip = chip
         log.info("BMA220 revision %d runs at 0x%02X, filter %d Hz", revision, chip, self._settings.filter_hz)
@@ -167,10 +170,15 @@ class Bma220:
         try:
             data = bytes(self._read_block(chip, DATA_ADDRESS, SAMPLE_BYTES))
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         if len(data) != SAMPLE_BYTES:
             raise BadReply(f"BMA220 at 0x{chip:02X}: a burst of {SAMPLE_BYTES} bytes gave {len(data)}")
         return data
+
+    def read(self, now_us: Callable[[], int]) -> tuple[int, bytes]:
+        """The time just before a read of the data [us], and the data."""
+        t_us = now_us()
+        return t_us, self.read_raw()
 
     def check_settings(self) -> None:
         """SettingsLost when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
@@ -185,7 +193,7 @@ class Bma220:
         try:
             register.check(self._bus, chip, values)
         except OSError as error:
-            raise _fault(error, chip) from error
+            raise bus_fault(error, chip) from error
         except BadReply as error:
             raise SettingsLost(f"BMA220 lost its settings (did its supply dip?): {error}") from error
         self._checked = (self._checked + 1) % len(self._wanted)
@@ -202,30 +210,6 @@ class Bma220:
         if self._chip is None:
             raise NotPresent("the BMA220 has not been started")
         return self._chip
-
-    def _probe(self) -> int:
-        """The first address with the right chip id. Otherwise the error that tells most: a held bus at once, then
-        a wrong chip or an occupied address, and only then that nobody is there."""
-        faults: list[DeviceError] = []
-        for chip in self._settings.addresses:
-            try:
-                found = CHIP_ID.read(self._bus, chip)
-            except OSError as error:
-                fault = _fault(error, chip)
-                if isinstance(fault, Timeout):
-                    raise fault from error
-                if error.errno not in NOT_ACKNOWLEDGED:
-                    faults.append(fault)
-                continue
-            if found == CHIP_ID.reset_value:
-                return chip
-            faults.append(WrongDevice(
-                f"the chip at I2C address 0x{chip:02X} has id 0x{found:02X}, a BMA220 has 0x{CHIP_ID.reset_value:02X}"
-            ))
-        if faults:
-            raise faults[0]
-        places = " or ".join(f"0x{chip:02X}" for chip in self._settings.addresses)
-        raise NotPresent(f"nothing answers at I2C address {places}: check the sensor's power, ground, SDA and SCL")
 
     def _make_run(self, toggle: ToggleRegister, chip: int) -> None:
         """Flip the state until the chip says that it runs, two reads at most."""
@@ -255,6 +239,7 @@ class Bma220Decoder:
                      slowly than it is read, or nothing moves
     """
 
+    name = "bma220"
     doubt = ""
 
     def __init__(self, range_g: int) -> None:
@@ -264,6 +249,11 @@ class Bma220Decoder:
         self._t_us = array("q")
         self._data = bytearray()
         self._last = b""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Samples with a low bit set, and samples that equal the one before."""
+        return {"odd_bits": self.anomalies, "repeated_samples": self.repeats}
 
     def feed(self, t_us: int, data: bytes) -> None:
         """Take one sample of three bytes read at ``t_us``. BadReply (and nothing taken) on any other length."""
@@ -290,23 +280,138 @@ class Bma220Decoder:
         return AccelerationBlock(t_us, counts.astype(np.float64) * self.mps2_per_count, clipped)
 
 
-def _fault(error: OSError, chip: int) -> DeviceError:
-    """What a failed transfer means, in one line."""
-    if error.errno in NOT_ACKNOWLEDGED:
-        return NotPresent(f"nothing answers at I2C address 0x{chip:02X}: check the sensor's power, ground, SDA and SCL")
-    if error.errno == errno.ETIMEDOUT:
-        return Timeout(
-            f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, "
-            "and take the sensor's power away for a moment if it stays"
-        )
-    if error.errno == errno.EBUSY:
-        return NotPresent(
-            f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod for bma220) or remove its overlay"
-        )
-    return BadReply(f"I2C transfer with 0x{chip:02X} failed: {error}")
-
-
 def _choose(name: str, value: int, known: Iterable[int]) -> None:
     """SettingsError unless ``value``, of whatever type a file gave, is one of ``known``."""
     if value not in tuple(known):
         raise SettingsError(f"{name} is one of {', '.join(map(str, sorted(known)))}, not {value}")
+
+
+_DUMP = "dump:"
+
+
+def _bus(node: SettingNode) -> int | Path:
+    """The number of a bus, or the path of a recorded drive."""
+    text = node.content
+    if isinstance(text, str) and text.startswith(_DUMP):
+        path = node.path(after=_DUMP)
+        if not path.is_file():
+            raise node.wrong("a recorded dump (there is no such file)")
+        return path
+    if not node.plain or not isinstance(text, str) or not text.isdigit():
+        raise node.wrong("the number of an I2C bus from 0 to 255, or dump:FILE")
+    return node.integer(0, 255)
+
+
+@dataclass(frozen=True)
+class Bma220Config:
+    """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; ``bandwidth_hz`` None means automatic."""
+
+    i2c_bus: int | Path = 1
+    range_g: int = 2
+    bandwidth_hz: int | None = None
+    oversample: int = 1
+
+    def __post_init__(self) -> None:
+        self.chip  # noqa: B018 - SettingsError for what the chip cannot have
+
+    @property
+    def chip(self) -> Bma220Settings:
+        """The driver's settings."""
+        return Bma220Settings(range_g=self.range_g, bandwidth_hz=self.bandwidth_hz, oversample=self.oversample)
+
+
+class _Bma220(Accelerometer[Bma220Config]):
+    """The BMA220 on an I2C bus, or as a recorded drive that is played in real time."""
+
+    name = "bma220"
+    title = "BMA220"
+    settings = Bma220Config
+    keys: ClassVar[Mapping[str, Kind]] = {
+        "i2c_bus": Special(_bus, ("1", "0")),
+        "range_g": OneOf(tuple(RANGE_CODES)),
+        "bandwidth_hz": OrNone("auto", OneOf(tuple(sorted(
+            hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE)))),
+        "oversample": Whole(1, LARGEST_OVERSAMPLE),
+    }
+    event_bytes = SAMPLE_BYTES
+
+    def place(self, settings: Bma220Config) -> str:
+        """The bus, or the recording."""
+        return f"/dev/i2c-{settings.i2c_bus}" if isinstance(settings.i2c_bus, int) else str(settings.i2c_bus)
+
+    def source(self, settings: Bma220Config, machine: Machine) -> Source:
+        """Bursts at the sampling rate."""
+        return chip_source(_bus_opener(settings.i2c_bus, machine), settings.chip, machine.now_us, machine.sleep)
+
+    def decoder(self, settings: Bma220Config, upright_axis: int) -> Bma220Decoder:
+        """By the range."""
+        return Bma220Decoder(settings.range_g)
+
+    def readings(self, settings: Bma220Config) -> Readings:
+        """Coarse steps."""
+        return Readings(NOISE_MPS2, mps2_per_count(settings.range_g), settings.oversample)
+
+    def facts(self, settings: Bma220Config) -> dict[str, Any]:
+        """Range, scale, filter, rate."""
+        return {"verified": True, "range_g": settings.range_g, "mps2_per_count": mps2_per_count(settings.range_g),
+                "bandwidth_hz": settings.chip.filter_hz, "oversample": settings.oversample}
+
+    def header(self, settings: Bma220Config) -> dict[str, Any]:
+        """Range and rate."""
+        return {"range_g": settings.range_g, "oversample": settings.oversample}
+
+    def recorded(self, header: Mapping[str, Any], settings: Bma220Config, is_given: bool) -> Bma220Config:
+        """Range and rate are the recording's."""
+        range_g, oversample = (header.get(key, getattr(settings, key)) for key in ("range_g", "oversample"))
+        if type(range_g) is not int or type(oversample) is not int:
+            raise SettingsError("expected whole numbers for 'range_g' and 'oversample'")
+        return replace(settings, range_g=range_g, oversample=oversample)
+
+    def played(self, settings: Bma220Config, now_us: Callable[[], int]) -> Played:
+        """The driver reads the chip on a recorded bus."""
+        from drivers.accelerometers._bma220_chip import Bma220Chip
+        from drivers.replay import RecordedBus
+
+        bus = RecordedBus(Bma220Chip())
+        return Played(chip_source(lambda: bus, settings.chip, now_us, _no_wait), bus.load, lambda: False)
+
+    def simulated(self, settings: Bma220Config, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
+        """Three register bytes per reading: six bits in two's complement, to the left."""
+        counts = np.clip(np.rint(accel_mps2 * (32 / settings.range_g / STANDARD_GRAVITY_MPS2)), -32, 31).astype(np.int8)
+        registers = (counts << 2).tobytes()
+        return [registers[k: k + SAMPLE_BYTES] for k in range(0, len(registers), SAMPLE_BYTES)]
+
+    def advice(self, state: str) -> str:
+        """What to look at."""
+        return "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
+
+
+def chip_source(
+    open_bus: Callable[[], I2cBus], settings: Bma220Settings, now_us: Callable[[], int], sleep: Callable[[float], None]
+) -> ChipSource:
+    """One burst of the chip on that bus per poll, at its sampling rate."""
+    pace = Deadlines(US_PER_S // settings.rate_hz, now_us, sleep)
+    return ChipSource("bma220", open_bus, lambda bus: Bma220(bus, settings, sleep), now_us, pace)
+
+
+def _bus_opener(bus: int | Path, machine: Machine) -> Callable[[], I2cBus]:
+    if isinstance(bus, int):
+        return lambda: machine.open_i2c(bus, REGISTER_STEP)
+
+    def play() -> I2cBus:
+        from drivers.accelerometers._bma220_chip import Bma220Chip
+        from drivers.dump import open_dump
+        from drivers.replay import RecordedBus
+
+        with open_dump(bus) as reader:
+            events = [event for event in reader if event.source == "bma220"]
+        return RecordedBus.playing(Bma220Chip(), events, machine.now_us)
+
+    return play
+
+
+def _no_wait(_seconds: float) -> None:
+    """Nothing settles in a recording."""
+
+
+ACCELEROMETER = _Bma220()

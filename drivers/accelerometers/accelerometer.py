@@ -1,0 +1,161 @@
+"""What an accelerometer is to the rest of the program: one object per file, offered as ``ACCELEROMETER``.
+
+Problem: an accelerometer shows up in the settings, in the live service, in recordings and their replay, and in what
+``ridelog status`` advises; a branch on its name at each of these places is forgotten at one of them. Solution: each of
+these places asks this object.
+
+The bytes of a live source, with their times, are all that a decoder gets: what was recorded from the source replays to
+the same samples.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.machine import Machine
+from drivers.readings import AccelerationBlock
+from drivers.settings import Kind
+from drivers.sources import Played, PlayedSource, SerialSource, Source, serial_advice
+
+SERIAL_WAIT_S = 0.5
+
+Settings = TypeVar("Settings")
+
+
+class Decoder(Protocol):
+    """Bytes with their arrival time in, samples out; after ``flush`` the next ``take`` gives all.
+
+    name      of the events that it reads
+    doubt     what is wrong with the samples that come, and what to do; empty: nothing
+    counts    what came in so far, by name
+
+    ``feed`` raises BadReply for bytes that are none of this device's, and has then taken nothing.
+    """
+
+    name: str
+
+    @property
+    def doubt(self) -> str: ...
+    @property
+    def counts(self) -> dict[str, int]: ...
+    def feed(self, t_us: int, data: bytes) -> None: ...
+    def flush(self) -> None: ...
+    def take(self) -> AccelerationBlock: ...
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What single readings are.
+
+    noise_mps2    r.m.s. noise on the 100 Hz grid, before it is rounded [m/s2], above 0
+    step_mps2     step that they are rounded to [m/s2]; 0: finer than the noise, or not known
+    oversample    the source looks this many times 100 a second; 1 where the decoder finds out the rate by itself
+    """
+
+    noise_mps2: float
+    step_mps2: float = 0.0
+    oversample: int = 1
+
+
+class Accelerometer(ABC, Generic[Settings]):
+    """One kind of accelerometer.
+
+    name          in settings and recordings; the file is called so
+    title         what people call it
+    settings      frozen dataclass of its settings, each with its default; SettingsError for values that cannot be
+    keys          what may stand at each of them in a settings file
+    event_bytes   size of one event; None: any
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    settings: type[Settings]
+    keys: ClassVar[Mapping[str, Kind]]
+    event_bytes: int | None = None
+
+    def check_chosen(self, settings: Settings) -> None:
+        """SettingsError where nothing can be made of these settings, once this is the chosen accelerometer."""
+
+    @abstractmethod
+    def place(self, settings: Settings) -> str:
+        """Where it is, for people: ``/dev/i2c-1``."""
+
+    @abstractmethod
+    def source(self, settings: Settings, machine: Machine) -> Source:
+        """The live device; nothing is opened yet."""
+
+    @abstractmethod
+    def decoder(self, settings: Settings, upright_axis: int) -> Decoder:
+        """A new decoder of its events. ``upright_axis``: 0, 1, 2, the sensor's axis along which gravity is felt.
+        SettingsError for settings that cannot be."""
+
+    @abstractmethod
+    def readings(self, settings: Settings) -> Readings:
+        """What single readings are."""
+
+    @abstractmethod
+    def facts(self, settings: Settings) -> dict[str, Any]:
+        """What lies beside each log about it: scale, filter, and as ``verified`` whether hardware has confirmed it."""
+
+    def header(self, settings: Settings) -> dict[str, Any]:
+        """What a recording's first line says about it, beside driver and vertical axis."""
+        return {}
+
+    def recorded(self, header: Mapping[str, Any], settings: Settings, is_given: bool) -> Settings:
+        """Settings for the replay of a recording. What is in the bytes is always the header's; the rest is that of
+        ``settings``: those given for this replay, or the defaults. SettingsError for what cannot be."""
+        return settings
+
+    def played(self, settings: Settings, now_us: Callable[[], int]) -> Played:
+        """The device in a replay: as recorded events, unless its driver shall read them from a recorded wire."""
+        source = PlayedSource(self.name, now_us)
+        return Played(source, source.load, source.has_more)
+
+    def simulated(self, settings: Settings, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
+        """Readings (n, 3) [m/s2] as the bytes of n events, for drives that are simulated. NotImplementedError where its
+        events are not single readings."""
+        raise NotImplementedError(f"{self.name}: its events are not single readings")
+
+    @abstractmethod
+    def advice(self, state: str) -> str:
+        """What to look at when it is ``absent``, ``retrying`` or ``silent``."""
+
+
+class SerialAccelerometer(Accelerometer[Settings]):
+    """One whose bytes come on a serial port: what was recorded of it can be sent through a real wire.
+
+    lines    what the header of a recording says whose bytes are lines ``x,y,z`` in g; None: it does not read such
+    """
+
+    lines: ClassVar[Mapping[str, Any] | None] = None
+
+    @abstractmethod
+    def line(self, settings: Settings) -> tuple[str, int]:
+        """Path of the port, and its baud rate."""
+
+    def place(self, settings: Settings) -> str:
+        """The path of the port."""
+        return self.line(settings)[0]
+
+    def source(self, settings: Settings, machine: Machine) -> Source:
+        """The bytes of the port."""
+        port, baud = self.line(settings)
+        return SerialSource(self.name, lambda: machine.open_serial(port, baud), machine.now_us, SERIAL_WAIT_S,
+                            machine.sleep)
+
+    def played(self, settings: Settings, now_us: Callable[[], int]) -> Played:
+        """A recorded port."""
+        from drivers.replay import RecordedPort
+
+        port = RecordedPort()
+        return Played(SerialSource(self.name, lambda: port, now_us, wait_s=0.0), port.load, port.has_bytes)
+
+    def advice(self, state: str) -> str:
+        """What to look at on a serial line."""
+        return serial_advice(state)

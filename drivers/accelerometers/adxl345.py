@@ -1,0 +1,291 @@
+"""Driver of the Analog Devices ADXL345, a three-axis accelerometer with 13 bits per axis, on I2C.
+
+Problem: the chip samples by its own clock, whose rate is no more than nominal, into a buffer of 32 entries that gives
+them without times; a buffer that ran over has lost the oldest; and after a dip of its supply the chip stands by.
+Solution: the buffer (FIFO, in stream mode) is emptied some 20 times a second, ``SampleClock`` recovers the rate and the
+times from when that was, an overrun begins anew, and settings are read back in turn (``ChipSource``).
+
+It runs in full resolution at +-16 g: one count is 3.9 mg at every range, and a smaller range would only clip sooner.
+
+Facts: data sheet ADXL345, revision G [1]: device id 0xE5; addresses 0x53 and 0x1D (ALT ADDRESS pin); register map,
+Table 19; output rates and bandwidth (half the rate), Table 7; noise, Table 1; FIFO, "FIFO" and register 0x39. A read of
+the six data registers pops one entry, and has to take all six at once. 5 us have to lie between two such reads; on I2C
+the addressing takes longer. Overrun is noted in INT_SOURCE whatever INT_ENABLE says, and cleared by reading data. The
+same numbers stand in the Linux kernel's driver [2].
+
+[1] https://www.analog.com/media/en/technical-documentation/data-sheets/ADXL345.pdf
+[2] drivers/iio/accel/adxl345_core.c
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from drivers.accelerometers.accelerometer import Accelerometer, Readings
+from drivers.chip_bus import bus_fault, find_chip
+from drivers.dated_samples import DatedSamples, Samples
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost
+from drivers.machine import Machine
+from drivers.ports import I2cBus
+from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.registers import Field, Register
+from drivers.settings import Kind, OneOf, Whole
+from drivers.sources import US_PER_S, ChipSource, Scattered, Source
+
+ADDRESSES = (0x53, 0x1D)
+DEVICE_ID = Register("device id", 0x00, reset_value=0xE5)
+OFFSETS = tuple(Register(f"offset {axis}", address) for axis, address in (("X", 0x1E), ("Y", 0x1F), ("Z", 0x20)))
+RATE = Register("rate", 0x2C, reset_value=0x0A)
+POWER = Register("power control", 0x2D)
+INTERRUPTS = Register("interrupt source", 0x30)
+FORMAT = Register("data format", 0x31)
+DATA_ADDRESS = 0x32
+FIFO = Register("FIFO control", 0x38)
+FIFO_STATUS = Register("FIFO status", 0x39)
+
+WHOLE_BYTE = Field("offset", 7, 0)
+LOW_POWER = Field("LOW_POWER", 4, 4)
+RATE_CODE = Field("rate code", 3, 0)
+LINK_AND_SLEEP = Field("link, AUTO_SLEEP", 5, 4)
+MEASURE = Field("measure", 3, 3)
+SLEEP = Field("sleep, wakeup", 2, 0)
+SELF_TEST = Field("SELF_TEST", 7, 7)
+FULL_RESOLUTION = Field("FULL_RES", 3, 3)
+JUSTIFY = Field("justify", 2, 2)
+RANGE_CODE = Field("range", 1, 0)
+FIFO_MODE = Field("FIFO mode", 7, 6)
+ENTRIES = Field("entries", 5, 0)
+OVERRUN = Field("overrun", 0, 0)
+
+BYPASS, STREAM = 0, 2
+SIXTEEN_G = 3
+RATE_CODES = {200: 0x0B, 400: 0x0C, 800: 0x0D}  # [Hz]; at 100 what is above 50 Hz would fold into the pass band
+FIFO_ENTRIES = 32
+ENTRY_BYTES = 6
+COUNTS_PER_G = 256
+LARGEST_COUNT = 4095  # 13 bits
+NOISE_MPS2 = 1.1 / COUNTS_PER_G * STANDARD_GRAVITY_MPS2  # Z at 100 Hz, 1.1 LSB r.m.s.; on the 100 Hz grid at any rate
+TURN_ON_S = 0.0011  # and one sample (Table 1)
+RATE_TOLERANCE = 0.02  # the data sheet states none; a rate that is further off is found out
+LONGEST_LOOK_US = 50_000
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Adxl345Config:
+    """``i2c_bus`` is the N of /dev/i2c-N; ``rate_hz`` samples a second, each with a bandwidth of half of that."""
+
+    i2c_bus: int = 1
+    rate_hz: int = 200
+
+    def __post_init__(self) -> None:
+        if self.rate_hz not in RATE_CODES:
+            raise SettingsError(f"rate_hz is one of {', '.join(map(str, RATE_CODES))}, not {self.rate_hz}", "rate_hz")
+
+
+class Adxl345:
+    """One chip on a bus. ``sleep`` takes seconds. Every method but ``stop`` raises the DeviceError family, as
+    ``Bma220`` does; after any, wait and call ``start`` again: it assumes nothing about the chip."""
+
+    def __init__(self, bus: I2cBus, rate_hz: int, sleep: Callable[[float], None]) -> None:
+        self._bus = bus
+        self._sleep = sleep
+        self._rate_hz = rate_hz
+        self._chip: int | None = None
+        self._checked = 0
+        self._lost = True
+        self._wanted: tuple[tuple[Register, Mapping[Field, int]], ...] = (
+            (FORMAT, {FULL_RESOLUTION: 1, RANGE_CODE: SIXTEEN_G, JUSTIFY: 0, SELF_TEST: 0}),
+            (RATE, {RATE_CODE: RATE_CODES[rate_hz], LOW_POWER: 0}),
+            (FIFO, {FIFO_MODE: STREAM}),
+            (POWER, {MEASURE: 1, SLEEP: 0, LINK_AND_SLEEP: 0}),
+        )
+        self.registers_to_check = len(self._wanted)
+
+    def start(self) -> int:
+        """Find the chip, set it up with an empty buffer, and let it measure. Gives the address that it answers at."""
+        self._chip = None
+        self._checked = 0
+        self._lost = True
+        chip = find_chip(self._bus, DEVICE_ID, ADDRESSES, "an ADXL345")
+        try:
+            POWER.update(self._bus, chip, {MEASURE: 0})
+            for offset in OFFSETS:
+                offset.update(self._bus, chip, {WHOLE_BYTE: 0})
+            FIFO.update(self._bus, chip, {FIFO_MODE: BYPASS})  # empties the buffer
+            for register, values in self._wanted:
+                register.update(self._bus, chip, values)
+        except OSError as error:
+            raise bus_fault(error, chip) from error
+        self._sleep(TURN_ON_S + 1 / self._rate_hz)
+        self._chip = chip
+        log.info("ADXL345 runs at 0x%02X, %d samples a second", chip, self._rate_hz)
+        return chip
+
+    def read(self, now_us: Callable[[], int]) -> tuple[int, bytes]:
+        """The time at which the chip was asked how many entries it holds [us], and its answer: INT_SOURCE, FIFO_STATUS,
+        then X, Y, Z of each entry, low byte first, oldest entry first. Empty where it holds none.
+
+        The overrun bit of INT_SOURCE is also set where entries were lost between the last answer and this one: by a
+        transfer that failed, or because the chip has been started.
+        """
+        chip = self._started()
+        t_us = now_us()
+        try:
+            interrupts = INTERRUPTS.read(self._bus, chip)
+            status = FIFO_STATUS.read(self._bus, chip)
+            t_us = now_us()
+            count = ENTRIES.extract(status)
+            if not count:
+                return t_us, b""
+            lost = self._lost or bool(OVERRUN.extract(interrupts))
+            self._lost = True  # until all entries are here
+            entries = [self._entry(chip) for _ in range(count)]
+        except OSError as error:
+            raise bus_fault(error, chip) from error
+        self._lost = False
+        return t_us, bytes((OVERRUN.insert(interrupts, int(lost)), status)) + b"".join(entries)
+
+    def check_settings(self) -> None:
+        """SettingsLost when the chip no longer holds what ``start`` wrote."""
+        for _ in self._wanted:
+            self.check_next()
+
+    def check_next(self) -> None:
+        """Read back one register, each in its turn. SettingsLost when it does not hold what ``start`` wrote."""
+        chip = self._started()
+        register, values = self._wanted[self._checked]
+        try:
+            register.check(self._bus, chip, values)
+        except OSError as error:
+            raise bus_fault(error, chip) from error
+        except BadReply as error:
+            raise SettingsLost(f"ADXL345 lost its settings (did its supply dip?): {error}") from error
+        self._checked = (self._checked + 1) % len(self._wanted)
+
+    def stop(self) -> None:
+        """Let the chip stand by. Never raises."""
+        chip, self._chip = self._chip, None
+        if chip is not None:
+            with suppress(OSError, DeviceError):
+                POWER.update(self._bus, chip, {MEASURE: 0})
+
+    def _entry(self, chip: int) -> bytes:
+        data = bytes(self._bus.read_i2c_block_data(chip, DATA_ADDRESS, ENTRY_BYTES))
+        if len(data) != ENTRY_BYTES:
+            raise BadReply(f"ADXL345 at 0x{chip:02X}: a read of {ENTRY_BYTES} bytes gave {len(data)}")
+        return data
+
+    def _started(self) -> int:
+        if self._chip is None:
+            raise NotPresent("the ADXL345 has not been started")
+        return self._chip
+
+
+class Adxl345Decoder:
+    """What ``Adxl345.read`` gave, in; samples with their times, out."""
+
+    name = "adxl345"
+
+    def __init__(self, rate_hz: int) -> None:
+        self._samples = DatedSamples(rate_hz, RATE_TOLERANCE)
+        self._overruns = 0
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the samples that come; empty: nothing."""
+        return self._samples.doubt("Check the wires of the bus, its clock (400 kHz for 400 samples a second and more), "
+                                   "and what else keeps the computer busy")
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What came in so far, and what is missing in it."""
+        clock = self._samples.clock
+        return {"samples": self._samples.good, "overruns": self._overruns, "lost": clock.lost,
+                "resyncs": clock.resyncs, "undated": self._samples.undated}
+
+    def feed(self, t_us: int, data: bytes) -> None:
+        """Take the entries of one look at ``t_us``. BadReply (and nothing taken) where their number is another one."""
+        count, rest = divmod(len(data) - 2, ENTRY_BYTES)
+        if count < 1 or rest or ENTRIES.extract(data[1]) != count:
+            raise BadReply(f"an ADXL345 answer of {len(data)} bytes: expected INT_SOURCE, FIFO_STATUS and its entries")
+        counts = np.frombuffer(data, dtype="<i2", offset=2).reshape(-1, 3).astype(np.float64)
+        overrun = bool(OVERRUN.extract(data[0]))
+        self._overruns += overrun
+        self._samples.add(Samples(
+            after_loss=overrun,
+            arrivals_us=np.full(count, t_us, dtype=np.int64),
+            accel_mps2=counts * (STANDARD_GRAVITY_MPS2 / COUNTS_PER_G),
+            clipped=np.asarray(((counts <= -LARGEST_COUNT - 1) | (counts >= LARGEST_COUNT)).any(axis=1)),
+            good=np.ones(count, dtype=np.bool_),
+        ))
+
+    def flush(self) -> None:
+        """No more will come: the next ``take`` gives all."""
+        self._samples.flush()
+
+    def take(self) -> AccelerationBlock:
+        """The samples whose times are certain by now."""
+        return self._samples.take()
+
+
+class _Adxl345(Accelerometer[Adxl345Config]):
+    """The ADXL345 on an I2C bus."""
+
+    name = "adxl345"
+    title = "ADXL345"
+    settings = Adxl345Config
+    keys: ClassVar[Mapping[str, Kind]] = {"i2c_bus": Whole(0, 255), "rate_hz": OneOf(tuple(RATE_CODES))}
+
+    def place(self, settings: Adxl345Config) -> str:
+        """The bus."""
+        return f"/dev/i2c-{settings.i2c_bus}"
+
+    def source(self, settings: Adxl345Config, machine: Machine) -> Source:
+        """Looks that leave the buffer half empty."""
+        interval_us = US_PER_S // settings.rate_hz
+        look_us = min(LONGEST_LOOK_US, FIFO_ENTRIES // 2 * interval_us)
+        return ChipSource(
+            self.name, lambda: machine.open_i2c(settings.i2c_bus, None),
+            lambda bus: Adxl345(bus, settings.rate_hz, machine.sleep), machine.now_us,
+            Scattered(look_us, interval_us, machine.sleep),
+        )
+
+    def decoder(self, settings: Adxl345Config, upright_axis: int) -> Adxl345Decoder:
+        """By the nominal rate."""
+        return Adxl345Decoder(settings.rate_hz)
+
+    def readings(self, settings: Adxl345Config) -> Readings:
+        """Steps that the noise covers."""
+        return Readings(NOISE_MPS2)
+
+    def facts(self, settings: Adxl345Config) -> dict[str, Any]:
+        """Scale and rate; no real chip has confirmed it yet."""
+        return {"verified": False, "range_g": 16, "mps2_per_count": STANDARD_GRAVITY_MPS2 / COUNTS_PER_G,
+                "bandwidth_hz": settings.rate_hz / 2, "rate_hz": settings.rate_hz}
+
+    def header(self, settings: Adxl345Config) -> dict[str, Any]:
+        """The nominal rate."""
+        return {"rate_hz": settings.rate_hz}
+
+    def recorded(self, header: Mapping[str, Any], settings: Adxl345Config, is_given: bool) -> Adxl345Config:
+        """The rate is the recording's."""
+        rate_hz = header.get("rate_hz", settings.rate_hz)
+        if type(rate_hz) is not int:
+            raise SettingsError("expected a whole number for 'rate_hz'")
+        return replace(settings, rate_hz=rate_hz)
+
+    def advice(self, state: str) -> str:
+        """What to look at."""
+        return ("check its wires (VCC and CS to 3.3 V, SDO to ground or 3.3 V, ground, SDA, SCL) and that I2C is on "
+                "(sudo raspi-config)")
+
+
+ACCELEROMETER = _Adxl345()

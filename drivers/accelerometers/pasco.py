@@ -1,0 +1,312 @@
+"""An accelerometer on a serial line: the PASCO PS-2119, or anything that sends samples or lines of text.
+
+The problem: what an AirLink 2 sends is not public, so what a frame means must stay out of the code until a real
+device has settled it. And a radio link delivers late and in bursts what the sensor measured at even intervals, while
+road roughness wants the time of each sample.
+
+The solution, three layers: a ``BytePort`` brings bytes, ``drivers.framing`` finds frames in them, and a profile
+(``drivers.wire_profiles``) says what a frame means. ``SampleClock`` finds the rate of the samples and their times from
+the arrival times.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.accelerometers.accelerometer import Readings, SerialAccelerometer
+from drivers.dated_samples import WORTH_TELLING, DatedSamples, Samples
+from drivers.errors import SettingsError
+from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or
+from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
+from drivers.settings import BAUDS, Flag, Kind, OrNone, SettingNode, Special, Text
+from drivers.wire_profiles import Calibration, FrameLayout, LineLayout, Profile, Triple, load_profile
+
+NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
+
+
+class _Found(NamedTuple):
+    """Decoded samples and where they began in the stream: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
+
+    after_loss: bool
+    offsets: npt.NDArray[np.int64]
+    accel_mps2: npt.NDArray[np.float64]
+    clipped: npt.NDArray[np.bool_]
+    good: npt.NDArray[np.bool_]
+
+
+class _FrameReader:
+    """Bytes to samples by a frame layout."""
+
+    def __init__(self, layout: FrameLayout) -> None:
+        told_by_gravity = layout.upright_axis is not None and not layout.sync
+        self._layout = layout
+        self.framer = FixedFramer(
+            layout.length_bytes, layout.plausible, layout.oriented if told_by_gravity else None, layout.sync
+        )
+
+    def read(self, data: bytes) -> list[_Found]:
+        return [self._samples(frame) for frame in self.framer.feed(data)]
+
+    def _samples(self, run: Frame) -> _Found:
+        layout = self._layout
+        frames = np.frombuffer(run.data, dtype=np.uint8).reshape(-1, layout.length_bytes)
+        counts = layout.counts(frames)
+        low, high = layout.valid_raw
+        calibration = layout.calibration
+        zero_raw, scale_mps2 = np.array((calibration.zero_g_raw, calibration.mps2_per_count), dtype=np.float64)
+        accel_mps2: npt.NDArray[np.float64] = (counts - zero_raw) * scale_mps2
+        offsets = run.start + layout.length_bytes * np.arange(len(frames), dtype=np.int64)
+        clipped = np.asarray(((counts <= low) | (counts >= high)).any(axis=1))
+        return _Found(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
+
+
+_DECIMAL = rb" *([+-]?(?:\d{1,6}(?:\.\d{0,12})?|\.\d{1,12})) *"
+_LINE = re.compile(_DECIMAL + rb"," + _DECIMAL + rb"," + _DECIMAL + rb"(?:\*([0-9A-Fa-f]{2}) *)?")
+_NO_SAMPLE = (np.nan, np.nan, np.nan)
+
+
+class _LineReader:
+    """Lines of text to samples. A bad line still takes the place of one sample."""
+
+    def __init__(self, layout: LineLayout) -> None:
+        self._layout = layout
+        self.framer = LineFramer()
+
+    def read(self, data: bytes) -> list[_Found]:
+        frames = self.framer.feed(data)
+        cuts = [0, *(k for k, frame in enumerate(frames) if k and frame.after_loss), len(frames)]
+        return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
+
+    def _samples(self, lines: list[Frame]) -> _Found:
+        values = np.array([_triple(line.data) for line in lines], dtype=np.float64)
+        largest = np.abs(values).max(axis=1)
+        return _Found(
+            lines[0].after_loss,
+            np.array([line.start for line in lines], dtype=np.int64),
+            values * self._layout.unit_mps2,
+            largest >= self._layout.range_units,
+            largest <= 2 * self._layout.range_units,
+        )
+
+
+def _triple(line: bytes) -> Triple:
+    """The three numbers of a line; not-a-numbers when it is damaged."""
+    match = _LINE.fullmatch(line)
+    if match is None or (match[4] and exclusive_or(line[: line.index(b"*")]) != int(match[4], 16)):
+        return _NO_SAMPLE
+    return float(match[1]), float(match[2]), float(match[3])
+
+
+@dataclass(frozen=True)
+class PascoCounters:
+    """What came in so far.
+
+    frames          good ones
+    bad_frames      in their place, but with values or a checksum that cannot be
+    dropped_bytes   bytes that belonged to no frame
+    resyncs         times the sample clock lost the line and settled anew: samples went missing unseen
+    lost            samples that were noticed to be missing between others
+    undated         samples left out because they came at a rate that cannot be used, or too many were lost among them
+    """
+
+    frames: int
+    bad_frames: int
+    dropped_bytes: int
+    resyncs: int
+    lost: int
+    undated: int
+
+
+class PascoDecoder:
+    """Bytes of the device in, blocks of acceleration out, by a profile. Raises nothing, whatever the bytes.
+
+    calibration   of this very unit, instead of the profile's; SettingsError where the profile has no raw counts
+
+    Samples come out a second late, at the start 1.2 s together: by then it is known whether any were lost on the way.
+    ``flush`` gives what is held at the end. A bad frame is left out and counted; so are samples that come at a rate
+    that cannot be used. What ``take`` returns over time does not depend on when it is called.
+    """
+
+    def __init__(self, profile: Profile, calibration: Calibration | None = None) -> None:
+        self._reader: _FrameReader | _LineReader
+        if isinstance(profile.layout, FrameLayout):
+            layout = profile.layout if calibration is None else replace(profile.layout, calibration=calibration)
+            self._reader = _FrameReader(layout)
+        elif calibration is None:
+            self._reader = _LineReader(profile.layout)
+        else:
+            raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
+        self._profile = profile
+        self._samples = DatedSamples(profile.rate_hz, profile.clock_tolerance)
+        self._clock = self._samples.clock
+        self._arrivals = Arrivals()
+        self._chunks: list[bytes] = []
+
+    name = "pasco"
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the samples that come, and what to do; empty: nothing."""
+        usual = f"{self._profile.rate_hz:g}"
+        if self._clock.refused_hz is not None:
+            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
+                    f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
+                    "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
+        if self._clock.too_many_lost:
+            return ("more samples are lost on the line than can be located: no rows are made of those that come. Check "
+                    "the baud rate at both ends, the cable, and whether the bridge keeps up")
+        if self._clock.lost_share >= WORTH_TELLING:
+            return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
+                    "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
+        return ""
+
+    @property
+    def counters(self) -> PascoCounters:
+        """What came in so far and was taken."""
+        samples, clock = self._samples, self._clock
+        dropped = self._reader.framer.dropped_bytes
+        return PascoCounters(samples.good, samples.bad, dropped, clock.resyncs, clock.lost, samples.undated)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The same by name."""
+        return asdict(self.counters)
+
+    def feed(self, t_us: int, data: bytes) -> None:
+        """Take the bytes that arrived at ``t_us`` [us, monotonic]."""
+        self._arrivals.note(t_us, len(data))
+        self._chunks.append(data)
+
+    def flush(self) -> None:
+        """No more bytes will come: the next ``take`` gives all."""
+        self._samples.flush()
+
+    def take(self) -> AccelerationBlock:
+        """All samples that are complete and have their times, oldest first; may be none."""
+        found = self._reader.read(b"".join(self._chunks))
+        self._chunks.clear()
+        for some in found:
+            self._samples.add(Samples(some.after_loss, self._arrivals.many(some.offsets), *some[2:]))
+        self._arrivals.forget(self._reader.framer.position)
+        return self._samples.take()
+
+
+_LARGEST_COUNT = 65536
+_LEAST_STEP_G = 0.1
+
+
+def _profile_name(node: SettingNode) -> str:
+    """The name of a shipped profile, or a path, relative to the folder of the settings."""
+    is_path = "/" in node.text() or node.text().endswith((".yaml", ".yml"))
+    return str(node.path()) if is_path else node.text()
+
+
+def _calibration(node: SettingNode) -> Calibration:
+    axes = node.mapping(required=("x", "y", "z"))
+    zeros_raw, ones_raw = zip(*(_counts_at_0_and_1_g(axes[axis]) for axis in "xyz"), strict=True)
+    return Calibration(zero_g_raw=zeros_raw, one_g_raw=ones_raw)
+
+
+def _counts_at_0_and_1_g(node: SettingNode) -> tuple[float, float]:
+    """Two points of an axis, extended to the counts at 0 and at 1 g."""
+    values = [item.number(-_LARGEST_COUNT, _LARGEST_COUNT) for item in node.items()]
+    if len(values) != 4 or abs(values[3] - values[1]) < _LEAST_STEP_G:
+        raise node.wrong(f"two different points [raw, g, raw, g], {_LEAST_STEP_G} g or more apart")
+    first_raw, first_g, second_raw, second_g = values
+    counts_per_g = (second_raw - first_raw) / (second_g - first_g)
+    if abs(counts_per_g) < 1:
+        raise node.wrong("two different points [raw, g, raw, g], a count per g or more apart")
+    zero_g_raw = first_raw - first_g * counts_per_g
+    return zero_g_raw, zero_g_raw + counts_per_g
+
+
+@dataclass(frozen=True)
+class PascoConfig:
+    """``profile`` is a shipped name or a path; ``calibration`` None takes the profile's own."""
+
+    port: str = "/dev/ttyUSB0"
+    baud: int = 115200
+    profile: str = "lines"
+    accept_unverified: bool = False
+    calibration: Calibration | None = None
+
+
+class _Pasco(SerialAccelerometer[PascoConfig]):
+    """Any sensor on a serial line for which there is a profile."""
+
+    name = "pasco"
+    title = "serial sensor"
+    settings = PascoConfig
+    keys: ClassVar[Mapping[str, Kind]] = {
+        "port": Text(),
+        "baud": BAUDS,
+        "profile": Special(_profile_name, ("lines", "lines_mps2")),
+        "accept_unverified": Flag(),
+        "calibration": OrNone("null", Special(_calibration, (
+            "{x: [4096, 0, 4424, 1], y: [4096, 0, 4424, 1], z: [4096, 0, 4424, 1]}",))),
+    }
+    lines: ClassVar[Mapping[str, Any]] = {"profile": "lines"}
+
+    def check_chosen(self, settings: PascoConfig) -> None:
+        """A profile that nobody has seen work on hardware runs only where the settings say that this is known."""
+        try:
+            profile = load_profile(settings.profile)
+        except SettingsError as error:
+            raise SettingsError(str(error), "profile") from None
+        if not profile.verified and not settings.accept_unverified:
+            raise SettingsError(f"expected a verified profile, and {profile.name!r} is not verified on hardware; set "
+                                "accept_unverified: true beside it to use it all the same", "profile")
+
+    def line(self, settings: PascoConfig) -> tuple[str, int]:
+        """Port and baud rate."""
+        return settings.port, settings.baud
+
+    def decoder(self, settings: PascoConfig, upright_axis: int) -> PascoDecoder:
+        """By the profile; frames without start bytes are told apart by the axis that feels gravity."""
+        return PascoDecoder(_mounted(load_profile(settings.profile), upright_axis), settings.calibration)
+
+    def readings(self, settings: PascoConfig) -> Readings:
+        """Fine steps, at a rate that the decoder finds out."""
+        return Readings(NOISE_MPS2)
+
+    def facts(self, settings: PascoConfig) -> dict[str, Any]:
+        """Profile and calibration."""
+        profile = load_profile(settings.profile)
+        return {"profile": profile.name, "profile_version": profile.version, "verified": profile.verified,
+                "calibration": asdict(settings.calibration) if settings.calibration else None}
+
+    def header(self, settings: PascoConfig) -> dict[str, Any]:
+        """The profile, and whether a calibration of this very sensor is needed."""
+        return {"profile": settings.profile, "calibrated": settings.calibration is not None}
+
+    def simulated(self, settings: PascoConfig, accel_mps2: npt.NDArray[np.float64]) -> list[bytes]:
+        """Lines ``x,y,z`` in g, as the profile ``lines`` reads them."""
+        return [b"%.4f,%.4f,%.4f\n" % tuple(row) for row in (accel_mps2 / STANDARD_GRAVITY_MPS2).tolist()]
+
+    def recorded(self, header: Mapping[str, Any], settings: PascoConfig, is_given: bool) -> PascoConfig:
+        """The settings' own profile, or that of the recording where none are given."""
+        if is_given:
+            return settings
+        if header.get("calibrated"):
+            raise SettingsError("recorded with a calibration of its own; expected its settings, --config FILE")
+        profile = header.get("profile", settings.profile)
+        if not isinstance(profile, str):
+            raise SettingsError("expected 'profile' as a name")
+        return replace(settings, profile=profile)
+
+
+def _mounted(profile: Profile, upright_axis: int) -> Profile:
+    """The profile for a sensor that feels gravity along this axis."""
+    if not isinstance(profile.layout, FrameLayout) or profile.layout.upright_axis is None:
+        return profile
+    return replace(profile, layout=replace(profile.layout, upright_axis=upright_axis))
+
+
+ACCELEROMETER = _Pasco()
