@@ -41,13 +41,13 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.identification.axle_response import AxleResponse
     from logger.identification.fit import Fit, Options
     from logger.identification.prediction import VehicleModel
     from logger.identification.record import Record
     from logger.identification.road_input import RoadInput
     from logger.identification.shared_road import RoadFit
     from logger.identification.verdict import NotIdentifiable
+    from logger.vehicle.frequency_response import AxleResponse
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
 
@@ -166,7 +166,6 @@ def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced
 
 def _unmeasured(args: argparse.Namespace) -> int:
     """A fit over roads of which only the kind is known."""
-    from logger.identification.axle_response import AxleResponse
     from logger.identification.road_input import RoadInput
     from logger.identification.road_report import as_json, lines
     from logger.identification.session import UnusableRun, drives_of
@@ -174,6 +173,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
     from logger.identification.verdict import NotIdentifiable
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
+    from logger.vehicle.frequency_response import AxleResponse
 
     options = _road_options(args)
     vehicle = read_vehicle(vehicle_path(args.vehicle))

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
+from logger.vehicle.frequency_response import frequency_response
 from logger.vehicle.quarter_car import GOLDEN_CAR
 from logger.vehicle.quarter_car import structure as quarter_car
-from logger.vehicle.structure import Output, Structure, frequency_response, suspension_travel
+from logger.vehicle.structure import Output, Structure, suspension_travel
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]

@@ -34,7 +34,8 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.samples import RATE_HZ
 from logger.estimation.sensor import Sensor
 from logger.roads.iri import PER_KM
-from logger.vehicle.structure import Output, Structure, frequency_response
+from logger.vehicle.frequency_response import frequency_response
+from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from logger.dsp.sections import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import golden_car, iso8608
 from logger.units import MPH_MPS, WINDOW_M
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle, with_load
 
 Array = npt.NDArray[np.float64]

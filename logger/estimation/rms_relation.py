@@ -25,8 +25,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads import iso8608
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

@@ -23,10 +23,11 @@ import numpy.typing as npt
 
 from logger.identification.fit import Fit
 from logger.identification.noise import ROAD_LEVEL, Whitener
-from logger.identification.prediction import VehicleModel, recorder_gain
+from logger.identification.prediction import VehicleModel
 from logger.roads.iso8608 import displacement_psd
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_acceleration_response
+from logger.vehicle.simulate import recorder_gain
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -17,7 +17,6 @@ Everything that fits knows only ``Model``, or ``Differentiable`` where a model h
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -34,23 +33,25 @@ from logger.identification.road_input import (
     run_and_name,
 )
 from logger.roads.iso8608 import displacement_psd
+from logger.vehicle.frequency_response import (
+    SensedCar,
+    Sensitivity,
+    body_acceleration_response,
+    sensed_car,
+    sensitivity,
+)
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
-from logger.vehicle.simulate import recorder_taps
-from logger.vehicle.structure import Structure, body_acceleration_response, body_point
+from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-# Steps of the differences that derivatives of matrices (exact: they are quadratic at most) and of roads are taken by.
-_RELATIVE_STEP = 1e-3
 # Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
 _SPEEDS = 12
 _SLOWEST_MPS = 0.5
 _LONGEST_S = 100.0
-# The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
-_GAIN_STEPS, _GAIN_GRID = 4, 16384
 
 
 class Model(Protocol):
@@ -103,7 +104,7 @@ class VehicleModel:
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
-        car = car_of(self.vehicle_with(values))
+        car = sensed_car(self.vehicle_with(values))
         return [road.samples(_response(car, road.s, road.under_wheels(car.structure, self.road_with(values, run))))
                 for run, road in enumerate(self._roads)]
 
@@ -111,8 +112,8 @@ class VehicleModel:
         """As ``Differentiable``; derivatives are exact but for those by places and lengths of the car, which shift the
         road."""
         vehicle = self.vehicle_with(values)
-        car = car_of(vehicle)
-        changes = {index: change_of(vehicle, one) for index, one in enumerate(self.parameters)
+        car = sensed_car(vehicle)
+        changes = {index: sensitivity(vehicle, one) for index, one in enumerate(self.parameters)
                    if not is_input(one.name)}
         predictions, slopes = [], []
         for run, road in enumerate(self._roads):
@@ -164,74 +165,25 @@ class VehicleModel:
                 for run, road in enumerate(self._roads)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Car:
-    """A car's matrices and the row of its sensor (n,)."""
-
-    structure: Structure
-    row: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Change:
-    """Derivatives of a car's matrices by one number; and, for one that moves the wheels or their patches, the cars a
-    little before and after, ``apart`` apart in it."""
-
-    mass: Array
-    damping: Array
-    stiffness: Array
-    road: Array
-    row: Array
-    before: _Car
-    after: _Car
-    apart: float
-
-    @property
-    def shifts_road(self) -> bool:
-        before, after = self.before.structure, self.after.structure
-        return before.contact_patch_m != after.contact_patch_m or bool((before.behind_m != after.behind_m).any())
-
-
-def car_of(vehicle: Vehicle) -> _Car:
-    structure = structure_of(vehicle)
-    return _Car(structure, body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row)
-
-
-def change_of(vehicle: Vehicle, one: Free) -> _Change:
-    value = read(vehicle, one.name)
-    step = _RELATIVE_STEP * (abs(value) if one.by_factors else 1.0)
-    before, after = (car_of(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
-    low, high, apart = before.structure, after.structure, 2 * step
-    return _Change((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
-                   (high.stiffness - low.stiffness) / apart, (high.road - low.road) / apart,
-                   (after.row - before.row) / apart, before, after, apart)
-
-
-def _response(car: _Car, s: Complex, under: Complex) -> Complex:
+def _response(car: SensedCar, s: Complex, under: Complex) -> Complex:
     """Transform (f,) of the sensor's acceleration, of a road (f, w) under the wheels."""
     forces = under @ car.structure.road.T
-    return np.asarray(s**2 * (np.linalg.solve(_dynamic(car, s), forces[..., None])[..., 0] @ car.row))
+    return np.asarray(s**2 * (np.linalg.solve(car.dynamic_stiffness(s), forces[..., None])[..., 0] @ car.row))
 
 
-def _solved(car: _Car, s: Complex, under: Complex) -> tuple[Complex, Complex]:
+def _solved(car: SensedCar, s: Complex, under: Complex) -> tuple[Complex, Complex]:
     """q and w (f, n), with D = s2 M + s C + K, D q = R z and D w = s2 r; the sensor reads y = s2 r q."""
     forces = np.stack([under @ car.structure.road.T, (s * s)[:, None] * car.row], axis=-1)
-    q, w = np.moveaxis(np.linalg.solve(_dynamic(car, s), forces), -1, 0)
+    q, w = np.moveaxis(np.linalg.solve(car.dynamic_stiffness(s), forces), -1, 0)
     return q, w
 
 
-def _dynamic(car: _Car, s: Complex) -> Complex:
-    structure = car.structure
-    return np.asarray((s * s)[:, None, None] * structure.mass + s[:, None, None] * structure.damping
-                      + structure.stiffness)
-
-
-def _through(car: _Car, w: Complex, moved: Complex) -> Complex:
+def _through(car: SensedCar, w: Complex, moved: Complex) -> Complex:
     """What the sensor makes (f,) of a change (f, w) of the road under the wheels: w R dz."""
     return np.asarray((w * (moved @ car.structure.road.T)).sum(axis=1))
 
 
-def _by_car(car: _Car, change: _Change, s: Complex, under: Complex, q: Complex, w: Complex,
+def _by_car(car: SensedCar, change: Sensitivity, s: Complex, under: Complex, q: Complex, w: Complex,
             moved: Complex | None) -> Complex:
     """Derivative (f,) of the sensor's acceleration by a number of the car: s2 dr q + w (dR z - dD q) + w R dz."""
     s2 = s * s
@@ -239,9 +191,3 @@ def _by_car(car: _Car, change: _Change, s: Complex, under: Complex, q: Complex, 
     force -= q @ change.stiffness.T
     derivative = (w * force).sum(axis=1) + s2 * (q @ change.row)
     return np.asarray(derivative if moved is None else derivative + _through(car, w, moved))
-
-
-def recorder_gain(f_of_rate: Array) -> Array:
-    """The size of the recorder's gain at shares of its rate (f,)."""
-    gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
-    return np.interp(f_of_rate * _GAIN_GRID / _GAIN_STEPS, np.arange(len(gains)), gains)

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.prediction import recorder_gain
 from logger.vehicle.compose import Car
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.named_parameters import Free
+from logger.vehicle.simulate import recorder_gain
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

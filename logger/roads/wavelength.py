@@ -11,7 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
+from logger.vehicle.frequency_response import frequency_response
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
+from logger.vehicle.structure import suspension_travel
 
 Array = npt.NDArray[np.float64]
 
@@ -24,11 +26,8 @@ def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M)
     """
     wave_number = np.asarray(wave_number_cpm, dtype=float)
     car = structure(GOLDEN_CAR)
-    s = 2j * np.pi * wave_number[..., None, None] * STANDARD_SPEED_MPS
-    stiffness = car.stiffness + s * car.damping + s**2 * car.mass
-    body_wheel = np.linalg.solve(stiffness, np.broadcast_to(car.road, (*wave_number.shape, 2, 1)))[..., 0]
-    tire = np.sinc(wave_number * tire_base_m)
-    return np.abs((body_wheel[..., 0] - body_wheel[..., 1]) * tire)
+    travel = frequency_response(car, [suspension_travel(car, 0)], wave_number * STANDARD_SPEED_MPS)[..., 0, 0]
+    return np.abs(travel * np.sinc(wave_number * tire_base_m))
 
 
 def sinusoid_iri(amplitude_m: npt.ArrayLike, wave_number_cpm: npt.ArrayLike) -> Array:

@@ -33,6 +33,8 @@ STOP_DB = 80.0
 # Kaiser's rules for the length of such a filter, and for the shape of its window (J. F. Kaiser 1974).
 _HALF_SAMPLES = int(np.ceil((STOP_DB - 7.95) / (2.285 * 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)) / 2))
 _BETA = 0.1102 * (STOP_DB - 8.7)
+# The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
+_GAIN_STEPS, _GAIN_GRID = 4, 16384
 _EVEN = 1e-3
 
 
@@ -94,6 +96,12 @@ def recorder_taps(steps: int) -> Array:
     cutoff = PASS_OF_RATE + STOP_OF_RATE
     taps = np.sinc(cutoff * tap) * np.kaiser(len(tap), _BETA)
     return np.asarray(taps / taps.sum())
+
+
+def recorder_gain(f_of_rate: Array) -> Array:
+    """The size of the recorder's gain at shares of its rate (f,)."""
+    gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
+    return np.interp(f_of_rate * _GAIN_GRID / _GAIN_STEPS, np.arange(len(gains)), gains)
 
 
 def _checked(time_s: npt.ArrayLike, distance_m: npt.ArrayLike) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace
+from logger.vehicle.vehicle import Axle
 
 Array = npt.NDArray[np.float64]
 
@@ -175,36 +175,6 @@ def suspension_travel(structure: Structure, index: int, order: int = 0) -> Outpu
 def tire_deflection(structure: Structure, index: int) -> Output:
     """A wheel's height over the road under it, from rest [m]: negative when the tire is pressed."""
     return Output(structure.wheels[index], -np.eye(len(structure.wheels))[index], 0)
-
-
-def frequency_response(
-    structure: Structure, outputs: Sequence[Output], f_hz: npt.ArrayLike
-) -> npt.NDArray[np.complex128]:
-    """Outputs per elevation under each wheel separately, for waves exp(2 pi i f t); no delay, no contact patch.
-
-    f_hz (...) [Hz]; returns (..., p, w).
-    """
-    omega = 2 * np.pi * np.asarray(f_hz, float)[..., None, None]
-    dynamic_stiffness = structure.stiffness + 1j * omega * structure.damping - omega**2 * structure.mass
-    coordinates = np.linalg.solve(dynamic_stiffness, structure.road.astype(complex))
-    rows = np.array([output.row for output in outputs])
-    orders = np.array([[output.order] for output in outputs])
-    return (1j * omega) ** orders * (rows @ coordinates) + np.array([output.road_row for output in outputs])
-
-
-def body_acceleration_response(
-    structure: Structure, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike, sensor: SensorPlace = AT_CENTRE_OF_GRAVITY
-) -> npt.NDArray[np.complex128]:
-    """Body acceleration at the sensor per elevation under the front wheel [1/s2], at constant speed.
-
-    ``f_hz`` [Hz] and ``speed_mps`` [m/s], greater than 0, are broadcast against each other. A moving average over the
-    contact patch is a sinc in the road's wave number f / speed. Left and right wheels see the same road.
-    """
-    f, speed = np.broadcast_arrays(np.asarray(f_hz, float), np.asarray(speed_mps, float))
-    per_wheel = frequency_response(structure, [body_point(structure, sensor.ahead_m, sensor.left_m)], f)[..., 0, :]
-    wave_number = f / speed
-    delays = np.exp(-2j * np.pi * wave_number[..., None] * structure.behind_m)
-    return (per_wheel * delays).sum(axis=-1) * np.sinc(wave_number * structure.contact_patch_m)
 
 
 def hung(structure: Structure, mass: float, stiffness: float, damping: float, attached: Array,

@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
-from logger.identification.axle_response import AxleResponse
 from logger.identification.common_roughness import with_common_roughness
 from logger.identification.crossing import Drive
 from logger.identification.fit import Fit, Options, fit
@@ -32,9 +31,9 @@ from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
+from logger.vehicle.frequency_response import AxleResponse, body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free, names
-from logger.vehicle.structure import body_acceleration_response
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))

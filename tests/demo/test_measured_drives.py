@@ -10,7 +10,7 @@ from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle import half_car
-from logger.vehicle.structure import body_acceleration_response
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
 
 from measured_drives import (

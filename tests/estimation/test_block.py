@@ -12,8 +12,9 @@ from logger.estimation.car_response import CarResponse, golden_car_slope
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
-from logger.vehicle.structure import Structure, body_acceleration_response, body_point
+from logger.vehicle.structure import Structure, body_point
 
 RATE_HZ, SPACING_M, ALIGN_M = 100.0, 0.1524, 7.62
 ROAD = RoadSpectrum.of_iri(3.0)

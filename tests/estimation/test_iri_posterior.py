@@ -18,8 +18,9 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_acceleration_response, body_point
+from logger.vehicle.structure import body_point
 
 SPACING_M, POINTS, COUNT = 0.1524, 50, 50 * 2560
 WINDOW_M = SPACING_M * POINTS

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.axle_response import AxleResponse
 from logger.identification.crossing import Crossing, Drive, grid_under
 from logger.identification.shared_road import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
 from logger.identification.verdict import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
@@ -17,6 +16,7 @@ from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
+from logger.vehicle.frequency_response import AxleResponse
 from logger.vehicle.named_parameters import changed, free
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 

@@ -6,7 +6,7 @@ import pytest
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle import half_car, quarter_car
-from logger.vehicle.structure import body_acceleration_response
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.vehicle import Axle, Vehicle
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

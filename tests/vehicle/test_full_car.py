@@ -10,18 +10,10 @@ from hypothesis import strategies as st
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle import full_car, half_car, quarter_car
+from logger.vehicle.frequency_response import body_acceleration_response, frequency_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
-from logger.vehicle.structure import (
-    Output,
-    Structure,
-    body_acceleration_response,
-    body_point,
-    frequency_response,
-    suspension_travel,
-    tire_deflection,
-    wheel,
-)
+from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Axle, SensorPlace, Vehicle, with_load
 
 HALF = Vehicle(

@@ -15,9 +15,10 @@ from logger.roads.bumps import speed_bump
 from logger.roads.obstacles import pothole, step
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive, recorder_taps, simulate
-from logger.vehicle.structure import body_acceleration_response, body_point, suspension_travel, tire_deflection, wheel
+from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
 
 from newton import Told, judge, road_under
