@@ -354,3 +354,13 @@ def test_what_is_no_json_is_refused() -> None:
     for data in (b"{", b"[]", b"{" * 50_000, b"\xff"):
         with pytest.raises(BadReply):
             read_description(data)
+
+
+@pytest.mark.parametrize(("name", "text"), [("in_accel_scale", "soon"), ("scan_elements/in_accel_x_index", "first"),
+                                            ("sampling_frequency_available", "fast [faster"), ("in_mount_matrix", "?")])
+def test_files_that_say_what_cannot_be_are_no_traceback(tmp_path: Path, name: str, text: str) -> None:
+    fake = fake_in(tmp_path, **{name: text})
+    try:
+        IioSource(IioConfig(scale_mps2=0.00958), fake.machine()).open()
+    except BadReply as error:
+        assert "\n" not in str(error)
