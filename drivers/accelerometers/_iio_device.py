@@ -158,13 +158,13 @@ class IioDevice:
         nearest = min(known, key=lambda value: abs(value - scale_mps2), default=scale_mps2)
         with suppress(OSError):
             _set(path, f"{nearest:.9f}".rstrip("0"))
-        found = [float(self._of_axis(axis, "scale", "nan")) for axis in AXES]
-        if not all(abs(value / scale_mps2 - 1) < 0.01 for value in found):
+        found = [value for axis in AXES for value in _numbers(self._of_axis(axis, "scale", ""))]
+        if len(found) != len(AXES) or not all(abs(value / scale_mps2 - 1) < 0.01 for value in found):
             may = f"; it may be {', '.join(f'{value:g}' for value in known)}" if known else ""
             raise BadReply(f"{self.path.name}: expected the scale {scale_mps2:g} m/s2 of the settings (scale_mps2), "
-                           f"found {found[0]:g}{may}")
+                           f"found {self._of_axis('x', 'scale', 'none')}{may}")
 
-    def _channels(self) -> list[tuple[str, int, str]]:
+    def _channels(self) -> list[list[str]]:
         """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are told."""
         scans = self.path / "scan_elements"
         names = [switch.name.removesuffix("_en") for switch in sorted(scans.glob("*_en"))]
@@ -172,7 +172,7 @@ class IioDevice:
             names = [name for name in names if name.startswith("in_accel_")]
         else:
             names = [name for name in names if _text(scans / f"{name}_en") == "1"]
-        return [(name, int(_text(scans / f"{name}_index") or 0), _text(scans / f"{name}_type")) for name in names]
+        return [[name, _text(scans / f"{name}_index"), _text(scans / f"{name}_type")] for name in names]
 
     def _of_axis(self, axis: str, what: str, otherwise: str) -> str:
         return _text(self.path / f"in_accel_{axis}_{what}") or _text(self.path / f"in_accel_{what}") or otherwise
