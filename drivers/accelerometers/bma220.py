@@ -59,6 +59,7 @@ LARGEST_OVERSAMPLE = 8  # a burst takes 0.57 ms on a bus of 100 kHz, and some mo
 
 RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
 FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
+BANDWIDTHS_HZ = tuple(sorted(hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE))
 SETTLING_S = {1000: 0.002, 500: 0.002, 250: 0.003, 125: 0.005, 64: 0.009, 32: 0.017}
 WATCHDOG_CODES = {0: 0, 1: 2, 10: 3}  # [ms]; 0 is off
 TOGGLE_WAIT_S = 0.002
@@ -329,8 +330,7 @@ class _Bma220(Accelerometer[Bma220Config]):
     keys: ClassVar[Mapping[str, Kind]] = {
         "i2c_bus": Special(_bus, ("1", "0")),
         "range_g": OneOf(tuple(RANGE_CODES)),
-        "bandwidth_hz": OrNone("auto", OneOf(tuple(sorted(
-            hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE)))),
+        "bandwidth_hz": OrNone("auto", OneOf(BANDWIDTHS_HZ)),
         "oversample": Whole(1, LARGEST_OVERSAMPLE),
     }
     event_bytes = SAMPLE_BYTES

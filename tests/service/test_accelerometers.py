@@ -191,7 +191,7 @@ def test_the_header_of_a_recording_brings_its_settings_back(name: str, tmp_path:
     said = kind.header(usual)
     for key in set(kind.keys) & set(said):
         for text in examples(kind.keys[key])[0]:
-            other = replace(usual, **{key: yaml.safe_load(text)})
+            other = loaded(tmp_path / "ridelog.yaml", name, key, text)
             header = DumpHeader(None, {"driver": name, "vertical_axis": "-y", **kind.header(other)}, {}, "rav4-2009")
             config = assemble.config_for_dump(header, None, None)
             assert config.accelerometer.driver == name
@@ -263,9 +263,8 @@ def test_another_device_in_its_place_is_refused_in_one_line(name: str, ride: Cal
         core.feed(event)
     core.finish()
     progress = Progress()
-    said = [driven.supervisor.error]
-    said += [progress.look(second * 1_000_000, driven.supervisor.error == "", core.samples) or ""
-             for second in range(15)]
+    speaks = driven.supervisor.error == ""
+    said = [driven.supervisor.error, *(progress.look(s * 1_000_000, speaks, core.samples) or "" for s in range(15))]
     told = next(words for words in reversed(said) if words)
     assert re.search(driven.fake.wrong, told)
     assert "\n" not in told

@@ -1,0 +1,254 @@
+"""An accelerometer that a driver of the Linux kernel reads (Industrial I/O), as its files in sysfs.
+
+Problem: whether the kernel collects samples by itself depends on the chip's driver, on a trigger, and on who may write
+to sysfs. Solution: the buffer is set up where that can be done, or taken as somebody has set it up; otherwise the raw
+values are read one by one, and ``why_polled`` says what was missing.
+
+Source: Linux, Documentation/ABI/testing/sysfs-bus-iio and Documentation/iio/iio_devbuf.rst.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from drivers.accelerometers._iio_layout import AXES, MONOTONIC, TIMESTAMP
+from drivers.errors import BadReply, NotPresent
+
+DEVICES = Path("sys/bus/iio/devices")
+AUTO = "auto"
+POLLED_HZ = 100
+BUFFER_S = 2
+_RATES = ("in_accel_sampling_frequency", "sampling_frequency")
+_MATRICES = ("in_accel_mount_matrix", "in_mount_matrix", "mount_matrix")
+_NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+
+
+def find_device(root: Path, wanted: str) -> Path:
+    """The folder of the accelerometer with that name (of its chip, or of its folder); ``auto``: of the only one there.
+    NotPresent, with what there is, where there is none or more than one."""
+    found = {path: _name(path) for path in sorted((root / DEVICES).glob("iio:device*"))
+             if (path / "in_accel_x_raw").exists() or (path / "scan_elements/in_accel_x_en").exists()}
+    if not found:
+        raise NotPresent("the kernel has no IIO accelerometer: check its overlay (/boot/firmware/config.txt), its "
+                         "wires, and what the kernel says (dmesg)")
+    chosen = [path for path, name in found.items() if wanted in (AUTO, name, path.name)]
+    known = ", ".join(f"{name} ({path.name})" for path, name in found.items())
+    if not chosen:
+        raise NotPresent(f"no IIO accelerometer is called {wanted!r}; there are: {known}")
+    if len(chosen) > 1:
+        raise NotPresent(f"expected 'device' in the settings to name one of the IIO accelerometers: {known}")
+    return chosen[0]
+
+
+class IioDevice:
+    """One device, set up. Raises NotPresent where it is gone, BadReply where it does not take a setting.
+
+    why_polled    why the buffer is not used; empty: it is
+    """
+
+    def __init__(self, root: Path, wanted: str, rate_hz: int, scale_mps2: float | None) -> None:
+        self._root = root
+        self.path = find_device(root, wanted)
+        self._rate_hz = rate_hz
+        self._trigger: Path | None = None
+        self._is_ours = False
+        try:
+            if scale_mps2 is not None:
+                self._set_scale(scale_mps2)
+            self.why_polled = self._start_buffer()
+        except OSError as error:
+            raise NotPresent(f"{self.path.name}: {error.strerror}") from error
+
+    def describe(self) -> dict[str, Any]:
+        """What the kernel says of it now (see ``_iio_layout``). NotPresent where it is gone."""
+        if not self.path.exists():
+            raise NotPresent(f"{self.path.name} has gone: the kernel no longer has it")
+        try:
+            return {
+                "name": _name(self.path),
+                "polled": bool(self.why_polled),
+                "channels": self._channels(),
+                "scale": {axis: self._of_axis(axis, "scale", "1") for axis in AXES},
+                "offset": {axis: self._of_axis(axis, "offset", "0") for axis in AXES},
+                "matrix": next((text for name in _MATRICES if (text := _text(self.path / name))), ""),
+                "clock": _text(self.path / "current_timestamp_clock"),
+                "rate_hz": str(POLLED_HZ) if self.why_polled else self._rate(),
+                "buffer": _text(self.path / "buffer/enable"),
+            }
+        except OSError as error:
+            raise NotPresent(f"{self.path.name} has gone: {error.strerror}") from error
+
+    @property
+    def node(self) -> Path:
+        """Where the scans are read."""
+        return self._root / "dev" / self.path.name
+
+    def raw_files(self) -> list[Path]:
+        """Where single values of x, y, z are read."""
+        return [self.path / f"in_accel_{axis}_raw" for axis in AXES]
+
+    def close(self) -> None:
+        """Switch the buffer off if it was switched on here. Never raises."""
+        if self._is_ours:
+            with suppress(OSError):
+                write(self.path / "buffer/enable", "0")
+
+    def _start_buffer(self) -> str:
+        """Let the kernel collect samples. Gives why it does not; empty: it does."""
+        enable, scans = self.path / "buffer/enable", self.path / "scan_elements"
+        if not (enable.exists() and all((scans / f"in_accel_{axis}_en").exists() for axis in AXES)):
+            self._set_rate(self.path)
+            return "its driver in the kernel has no buffer"
+        runs = _text(enable) == "1"
+        try:
+            write(enable, "0")
+            self._set_rate(self.path)
+            for switch in sorted(scans.glob("*_en")):
+                kept = {TIMESTAMP, *(f"in_accel_{axis}" for axis in AXES)}
+                _set(switch, "1" if switch.name.removesuffix("_en") in kept else "0")
+            with suppress(OSError):
+                _set(self.path / "current_timestamp_clock", MONOTONIC)
+            why = self._choose_trigger()
+            if why:
+                return why
+            write(self.path / "buffer/length", str(BUFFER_S * self._rate_hz))
+            write(enable, "1")
+        except OSError as error:
+            if error.errno in _NOT_ALLOWED:
+                return "" if runs else "the service may not switch its buffer on"
+            return f"its buffer cannot be switched on ({error.strerror})"
+        self._is_ours = True
+        return ""
+
+    def _choose_trigger(self) -> str:
+        """A trigger, where the driver wants one: its own, or else another. Gives why there is none."""
+        current = self.path / "trigger/current_trigger"
+        if not current.exists():
+            return ""
+        triggers = {_name(path): path for path in sorted((self._root / DEVICES).glob("trigger*"))}
+        own = [name for name in triggers if name.startswith(f"{_name(self.path)}-dev")]
+        chosen = _text(current) or next(iter([*own, *triggers]), "")
+        if not chosen:
+            return "there is no trigger for its buffer"
+        _set(current, chosen)
+        self._trigger = triggers.get(chosen)
+        if self._trigger is not None:
+            self._set_rate(self._trigger)
+        return ""
+
+    def _set_rate(self, folder: Path) -> None:
+        """The least rate that is not below the one asked for, or else the highest, where it may be set."""
+        for path in (folder / name for name in _RATES):
+            if not path.exists():
+                continue
+            known = sorted(_numbers(_text(path.with_name(f"{path.name}_available"))))
+            rate_hz = next((hz for hz in known if hz >= self._rate_hz), known[-1] if known else self._rate_hz)
+            with suppress(OSError):
+                _set(path, f"{rate_hz:g}")
+            return
+
+    def _set_scale(self, scale_mps2: float) -> None:
+        path = self.path / "in_accel_scale"
+        known = _numbers(_text(self.path / "in_accel_scale_available"))
+        nearest = min(known, key=lambda value: abs(value - scale_mps2), default=scale_mps2)
+        with suppress(OSError):
+            _set(path, f"{nearest:.9f}".rstrip("0"))
+        found = [value for axis in AXES for value in _numbers(self._of_axis(axis, "scale", ""))]
+        if len(found) != len(AXES) or not all(abs(value / scale_mps2 - 1) < 0.01 for value in found):
+            may = f"; it may be {', '.join(f'{value:g}' for value in known)}" if known else ""
+            raise BadReply(f"{self.path.name}: expected the scale {scale_mps2:g} m/s2 of the settings (scale_mps2), "
+                           f"found {self._of_axis('x', 'scale', 'none')}{may}")
+
+    def _channels(self) -> list[list[str]]:
+        """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are told."""
+        scans = self.path / "scan_elements"
+        names = [switch.name.removesuffix("_en") for switch in sorted(scans.glob("*_en"))]
+        if self.why_polled:
+            names = [name for name in names if name.startswith("in_accel_")]
+        else:
+            names = [name for name in names if _text(scans / f"{name}_en") == "1"]
+        return [[name, _text(scans / f"{name}_index"), _text(scans / f"{name}_type")] for name in names]
+
+    def _of_axis(self, axis: str, what: str, otherwise: str) -> str:
+        return _text(self.path / f"in_accel_{axis}_{what}") or _text(self.path / f"in_accel_{what}") or otherwise
+
+    def _rate(self) -> str:
+        """That of the trigger where it has one, else that of the device, else as it was asked for."""
+        folders = [*([self._trigger] if self._trigger is not None else []), self.path]
+        return next((text for folder in folders for name in _RATES if (text := _text(folder / name))),
+                    str(self._rate_hz))
+
+
+class ScanPort:
+    """The character device of a buffer, as a ``BytePort`` that cannot be written to. NotPresent when it cannot be
+    opened."""
+
+    def __init__(self, path: Path, wait_readable: Callable[[int, float], bool]) -> None:
+        try:
+            self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except OSError as error:
+            hint = "another program reads it" if error.errno == errno.EBUSY else error.strerror
+            raise NotPresent(f"{path}: {hint}") from error
+        self._wait_readable = wait_readable
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        """What has been collected, waited for at most so long [s]. OSError when the device has gone."""
+        if not self._wait_readable(self._descriptor, timeout_s):
+            return b""
+        try:
+            data = os.read(self._descriptor, size)
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Nothing is written to it."""
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+    def close(self) -> None:
+        """Let go."""
+        os.close(self._descriptor)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a setting. OSError as the kernel says."""
+    path.write_text(text)
+
+
+def _set(path: Path, text: str) -> None:
+    """Write a setting where it is another one."""
+    if _text(path) != text:
+        write(path, text)
+
+
+def _text(path: Path) -> str:
+    """A setting's text; empty where the device has no such file or does not tell it now."""
+    try:
+        return path.read_text(errors="replace").strip()
+    except (FileNotFoundError, NotADirectoryError):
+        return ""
+    except OSError as error:
+        if error.errno in (errno.EBUSY, errno.EINVAL, errno.EOPNOTSUPP):
+            return ""
+        raise
+
+
+def _name(path: Path) -> str:
+    return _text(path / "name") or path.name
+
+
+def _numbers(text: str) -> list[float]:
+    """The numbers of an ``_available`` file, without those that are none; a range gives its ends."""
+    words = text.strip("[]").split()
+    values = []
+    for word in words:
+        with suppress(ValueError):
+            values.append(float(word))
+    return [values[0], values[-1]] if text.startswith("[") and len(values) == 3 else values
