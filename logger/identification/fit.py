@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.low_pass import LowPass
+from logger.dsp.decimating_low_pass import LowPass
 from logger.identification.noise import LEAST_SHARE, Autoregressive, Noise, White, Whitening
 from logger.identification.prediction import Differentiable, Model
 from logger.identification.verdict import (

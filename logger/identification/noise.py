@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.low_pass import LowPass
+from logger.dsp.decimating_low_pass import LowPass
 
 Array = npt.NDArray[np.float64]
 

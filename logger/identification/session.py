@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from logger.dsp.decimating_low_pass import LowPass
 from logger.identification.crossing import Drive
 from logger.identification.fit import Fit, Options, fit, normalised_error, spread_starts
 from logger.identification.locate import located
-from logger.identification.low_pass import LowPass
 from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
 from logger.identification.prediction import VehicleModel
 from logger.identification.record import Record

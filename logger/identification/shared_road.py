@@ -32,8 +32,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.decimating_low_pass import LowPass
 from logger.identification.crossing import Crossing, Drive, Grid, grid_under
-from logger.identification.low_pass import LowPass
 from logger.identification.noise import RoadNoise
 from logger.identification.verdict import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd

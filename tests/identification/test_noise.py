@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from logger.identification.low_pass import LowPass
+from logger.dsp.decimating_low_pass import LowPass
 from logger.identification.noise import Autoregressive, RoadNoise, White, Whitening
 
 Array = npt.NDArray[np.float64]

@@ -9,15 +9,17 @@ Measurement and prediction go through the same filter, so its shape biases nothi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
+
+from logger.dsp import kaiser
 
 Array = npt.NDArray[np.float64]
 
 _SAMPLES_PER_PERIOD = 2.5
 _STOP_DB = 60.0
-_BETA = 0.1102 * (_STOP_DB - 8.7)  # J. F. Kaiser 1974, as is the length
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,9 @@ class LowPass:
     @property
     def _half(self) -> int:
         pass_hz, stop_hz = self._edges
-        return int(np.ceil((_STOP_DB - 7.95) / (2.285 * 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz) / 2))
+        return ceil(kaiser.half_length(_STOP_DB, 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz))
 
     def _kernel(self, place: Array) -> Array:
         """The filter at places counted in samples from its middle."""
-        inside = np.clip(1 - (place / (self._half + 1)) ** 2, 0.0, None)
-        window = np.i0(_BETA * np.sqrt(inside)) / np.i0(_BETA)
+        window = kaiser.window(place, self._half + 1, _STOP_DB)
         return np.asarray(np.sinc(sum(self._edges) / self.rate_hz * place) * window)

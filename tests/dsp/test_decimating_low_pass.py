@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.identification.low_pass import LowPass
+from logger.dsp.decimating_low_pass import LowPass
 
 TIME_S = np.arange(2000) / 100
 
