@@ -1,4 +1,4 @@
-"""What is believed of road and sensor, from one block of readings to the next.
+"""Recursive estimation: what is known of road and sensor, carried from one block of readings to the next.
 
 A block cannot be solved without the road's spectrum, its roughness from place to place, the noise, and what coarse
 readings tell; none of them is known before it is solved. So each block is solved with what the one before it led to,
@@ -14,15 +14,15 @@ from math import log, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
-from logger.estimation.block import Block, Solution
 from logger.estimation.car_response import CarResponse
+from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
 from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
-from logger.estimation.local_roughness import LocalRoughness, mean_told
+from logger.estimation.local_variance import LocalRoughness, mean_told
+from logger.estimation.quantisation import Readings, bounds, first_guess, improved, unexplained
+from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
-from logger.estimation.samples import RATE_HZ, Samples
-from logger.estimation.sensor import Sensor
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import RATE_HZ, Samples
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]

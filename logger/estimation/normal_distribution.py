@@ -1,4 +1,4 @@
-"""Gaussian sums that numpy lacks: the distribution function, what rounding leaves of it, and its absolute value.
+"""Normal distribution without scipy: its integral, what rounding leaves of it, and its absolute value.
 
 The service must not import scipy (memory), so the error function is computed here, by the Chebyshev fit of Press et
 al., Numerical Recipes, 6.2: its relative error is below 1.2e-7 everywhere, also far out in the tail.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.estimation.sensor import Sensor
-from logger.estimation.whole_drive import Windows, exact_iri, laid_anew, local_level, on_grid, score
+from logger.estimation.batch import Windows, exact_iri, laid_anew, local_level, on_grid, score
+from logger.estimation.sensor_noise import Sensor
 from logger.roads.iri import rectified_slope
 
 SENSOR = Sensor(0.1, 0.06)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from logger.estimation.limit import Limit, Limits, pooled_r2
+from logger.estimation.error_bound import Limit, Limits, pooled_r2
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor import Sensor
+from logger.estimation.sensor_noise import Sensor
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file

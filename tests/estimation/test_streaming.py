@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from logger.estimation.sensor import Sensor
-from logger.estimation.stream import LAG_S, RoadEstimator, RoadPiece, WindowEstimate
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import LAG_S, RoadEstimator, RoadPiece, WindowEstimate
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri

@@ -1,7 +1,7 @@
-"""The road and its IRI while the car drives: blocks of readings, a few seconds behind.
+"""Streaming estimation of the road and its IRI while the car drives: blocks of readings, a few seconds behind.
 
-A block of 20 s is solved every 2 s (``block.py``), with what was learnt of road and sensor so far
-(``followed_road.py``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
+A block of 20 s is solved every 2 s (``road_solver``), with what was learnt of road and sensor so far
+(``recursive_road``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
 the body's slow swing, still tell of a road already driven; windows longer than 10 m are made of several stretches.
 Splitting the readings differently changes nothing.
 """
@@ -15,9 +15,7 @@ from math import ceil, hypot, nan, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.block import ENTRY_S, Block, TimeGrid
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
-from logger.estimation.followed_road import FollowedRoad
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
@@ -27,9 +25,11 @@ from logger.estimation.iri_posterior import (
     unseen_share,
     window_iri,
 )
+from logger.estimation.recursive_road import FollowedRoad
+from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.samples import RATE_HZ, Samples
-from logger.estimation.sensor import Sensor
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import RATE_HZ, Samples
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]

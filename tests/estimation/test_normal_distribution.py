@@ -6,7 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import foldnorm, norm
 
-from logger.estimation.gaussian import density, distribution, mean_absolute, variance_of_mean_absolute, within
+from logger.estimation.normal_distribution import (
+    density,
+    distribution,
+    mean_absolute,
+    variance_of_mean_absolute,
+    within,
+)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(400)
 

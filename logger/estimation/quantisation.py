@@ -1,4 +1,4 @@
-"""Readings rounded to coarse steps, as readings with Gaussian noise that tell as much.
+"""Quantisation: readings rounded to coarse steps, as readings with Gaussian noise that hold as much information.
 
 Problem. A BMA220 at +-2 g rounds to 0.61 m/s2, more than a smooth road shakes a car. Its error is not noise: a reading
 that stays on one step says that the acceleration stayed within it, one that toggles says that it is at the edge; taken
@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.gaussian import within
-from logger.estimation.sensor import Sensor
+from logger.estimation.normal_distribution import within
+from logger.estimation.sensor_noise import Sensor
 
 Array = npt.NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""A drive that lies complete: its windows, how good they are, and how good they could be."""
+"""Batch estimation of a complete drive: its windows, their errors, and the errors that are the least possible."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from math import ceil, exp, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.limit import Limits
+from logger.estimation.error_bound import Limits
 from logger.estimation.road_profile import RoadProfile, road_profile
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.samples import RATE_HZ
-from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RoadEstimator, RoadPiece
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator, RoadPiece
+from logger.estimation.time_grid import RATE_HZ
 from logger.roads.golden_car import START_M
 from logger.roads.iri import rectified_slope, window_iri
 from logger.vehicle.structure import Output, Structure

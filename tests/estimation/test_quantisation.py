@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.rounding import Readings, bounds, first_guess, improved, unexplained
-from logger.estimation.sensor import Sensor
+from logger.estimation.quantisation import Readings, bounds, first_guess, improved, unexplained
+from logger.estimation.sensor_noise import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
 GRID = np.linspace(-6.0, 6.0, 24_001)

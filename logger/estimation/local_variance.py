@@ -1,4 +1,4 @@
-"""A road is not equally rough everywhere: how its variance differs from place to place, learnt on the way.
+"""Local variance of a road that is not equally rough everywhere, learnt on the way.
 
 Problem. One level for a block of 20 s makes too much of a smooth stretch behind a rough patch, and too little of a
 pothole on a smooth road. Solution. The white innovations v of the road have, at each point, a variance d of their own

@@ -1,4 +1,4 @@
-"""Readings on the estimator's grid of time, and how they are cut and joined."""
+"""Time grid of the estimator: readings at even instants, cut and joined."""
 
 from __future__ import annotations
 

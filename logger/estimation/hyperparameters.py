@@ -1,4 +1,4 @@
-"""Learning the road's spectrum and the noise from the solution of a stretch.
+"""Empirical Bayes: the road's spectrum and the sensor's noise, learnt from the solution of a stretch.
 
 The evidence (marginal likelihood) of a Gaussian model is largest where each wave's estimated power equals the share
 of its prior variance that the readings tell: sum |u|^2 = sum g / (1 + g) (MacKay 1992). Its slope and curvature in the

@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from logger.estimation.block import Block, TimeGrid
 from logger.estimation.car_response import CarResponse
-from logger.estimation.local_roughness import LocalRoughness, RelativeVariance, mean_told
+from logger.estimation.local_variance import LocalRoughness, RelativeVariance, mean_told
+from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from logger.estimation.adaptation import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
-from logger.estimation.block import Block, Solution, TimeGrid
 from logger.estimation.car_response import CarResponse
-from logger.estimation.local_roughness import mean_told
+from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
+from logger.estimation.local_variance import mean_told
+from logger.estimation.road_solver import Block, Solution, TimeGrid
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
 from logger.roads import iso8608
 from logger.shipped import vehicle_file

@@ -1,4 +1,4 @@
-"""What no estimator can do better: the error of a window's IRI when road, noise and car are known exactly.
+"""Error bound: how well a window's IRI can be known at best, when road, noise and car are known exactly.
 
 Problem. An R2 of 0.95 is poor where 0.99 is possible, and excellent where 0.955 is. How much is possible depends on the
 speed, the sensor, the length of the window and the road.
@@ -31,8 +31,8 @@ import numpy.typing as npt
 from logger.estimation.car_response import HIGHEST_HZ, golden_car_slope
 from logger.estimation.iri_posterior import reading_noise_psd
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.samples import RATE_HZ
-from logger.estimation.sensor import Sensor
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import RATE_HZ
 from logger.roads.iri import PER_KM
 from logger.vehicle.frequency_response import frequency_response
 from logger.vehicle.structure import Output, Structure

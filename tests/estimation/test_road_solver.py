@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from logger.estimation.block import ENTRY_S, Block, TimeGrid, _fft_length
 from logger.estimation.car_response import CarResponse, golden_car_slope
+from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, _fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
