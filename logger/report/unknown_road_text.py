@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.report import NORMAL_95
-from logger.identification.shared_road import GD_N0, NOISE, OFFSET, RoadFit
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, RoadFit
+from logger.report.identification_text import NORMAL_95
 from logger.vehicle.named_parameters import Free
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}

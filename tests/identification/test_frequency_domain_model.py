@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.prediction import Record, VehicleModel
+from logger.identification.frequency_domain_model import Record, VehicleModel
 from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle

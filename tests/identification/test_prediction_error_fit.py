@@ -8,10 +8,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from logger.identification.fit import Fit, Options, fit, normalised_error, spread_starts
-from logger.identification.noise import Autoregressive, RoadNoise, White
-from logger.identification.prediction import VehicleModel
-from logger.identification.verdict import UNEXPLAINED, NotIdentifiable
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
+from logger.identification.noise_models import Autoregressive, RoadNoise, White
+from logger.identification.prediction_error_fit import Fit, Options, fit, normalised_error, spread_starts
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded

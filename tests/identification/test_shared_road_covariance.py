@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.identification.common_roughness import CommonRoughness, may_have_common, with_common_roughness
-from logger.identification.fit import Options, fit
-from logger.identification.noise import RoadNoise
-from logger.identification.obstacles import Bump
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.noise_models import RoadNoise
+from logger.identification.obstacle_paths import Bump
+from logger.identification.prediction_error_fit import Options, fit
 from logger.identification.record import Record
-from logger.identification.report import common_words
-from logger.identification.road_input import RoadInput, expanded, free_input
+from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
+from logger.identification.unknown_inputs import RoadInput, expanded, free_input
 from logger.profiles.track import Track
+from logger.report.identification_text import common_words
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
 from logger.studies.drives import RATE_HZ, rav4, recorded

@@ -9,7 +9,7 @@ from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
 from logger.dsp.decimating_low_pass import LowPass
-from logger.identification.noise import Autoregressive, RoadNoise, White, Whitening
+from logger.identification.noise_models import Autoregressive, RoadNoise, White, Whitening
 
 Array = npt.NDArray[np.float64]
 

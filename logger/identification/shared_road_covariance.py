@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.fit import Fit
-from logger.identification.noise import ROAD_LEVEL, Whitener
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.noise_models import ROAD_LEVEL, Whitener
+from logger.identification.prediction_error_fit import Fit
 from logger.roads.iso8608 import displacement_psd
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of

@@ -1,8 +1,8 @@
 """The road under the wheels of one run, laid out in time and transformed.
 
-Problem and solution are those of ``prediction``: everything that a linear car answers to is here, and nothing of the
-car but where its wheels stand. The profile's part is kept as long as neither the wheels nor the scale of the speed
-move; what lies on it is laid out anew each time.
+Problem and solution are those of ``frequency_domain_model``: everything that a linear car answers to is here, and
+nothing of the car but where its wheels stand. The profile's part is kept as long as neither the wheels nor the scale of
+the speed move; what lies on it is laid out again each time.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.obstacles import ObstaclePath
+from logger.identification.obstacle_paths import ObstaclePath
 from logger.identification.record import Record
-from logger.identification.road_input import SPEED_SCALE, RoadInput
+from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
 from logger.profiles.track import TirePath
 from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from logger.identification.obstacles import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, Step
+from logger.identification.obstacle_paths import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, Step
 from logger.vehicle.named_parameters import WEAKEST, Free
 
 SPEED_SCALE, EACH = "speed_scale", "each"

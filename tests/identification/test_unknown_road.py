@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.crossing import Crossing, Drive, grid_under
-from logger.identification.shared_road import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
-from logger.identification.verdict import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
+from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
+from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file

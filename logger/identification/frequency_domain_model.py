@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.record import Record
-from logger.identification.road_in_time import RoadInTime
-from logger.identification.road_input import (
+from logger.identification.road_transform import RoadInTime
+from logger.identification.unknown_inputs import (
     RoadInput,
     changed_input,
     check_names,
@@ -75,9 +75,9 @@ class Differentiable(Model, Protocol):
 class VehicleModel:
     """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle`` and ``road``.
 
-    A free number is the car's (``named_parameters.names``) or the road's (``road_input``). The car comes to the first
-    sample of a record at the speed it has there, over the road that the track has there. ValueError for a name that
-    neither has a number of, or that sets what another one sets.
+    A free number is the car's (``named_parameters.names``) or the road's (``unknown_inputs``). The car comes to the
+    first sample of a record at the speed it has there, over the road that the track has there. ValueError for a name
+    that neither has a number of, or that sets what another one sets.
     """
 
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record],

@@ -19,7 +19,7 @@ estimate is then a root of a smooth function, unbiased however few they are, and
 ``last_probes``; the way there takes fewer. Steps are Fisher's, whose matrix comes from the same probes.
 
 Nothing here knows a vehicle: ``LinearCar`` is all that is asked for. Numbers that no such drive can tell (masses, rates
-and dampers all larger by one factor) are refused by ``verdict``.
+and dampers all larger by one factor) are refused (``identifiability``).
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.decimating_low_pass import LowPass
-from logger.identification.crossing import Crossing, Drive, Grid, grid_under
-from logger.identification.noise import RoadNoise
-from logger.identification.verdict import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
+from logger.identification.identifiability import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
+from logger.identification.noise_models import RoadNoise
+from logger.identification.unknown_road.drive_operator import Crossing, Drive, Grid, grid_under
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
 from logger.vehicle.named_parameters import WEAKEST, Free
 

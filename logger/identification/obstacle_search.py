@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput
+from logger.identification.unknown_inputs import RoadInput
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import Vehicle
 

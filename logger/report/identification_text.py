@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.common_roughness import CommonRoughness, may_have_common
-from logger.identification.fit import Fit
-from logger.identification.noise import LEAST_SHARE
-from logger.identification.prediction import VehicleModel
-from logger.identification.whiteness import UNTESTED, Test, autocorrelation, cross_correlation
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.noise_models import LEAST_SHARE
+from logger.identification.prediction_error_fit import Fit
+from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
+from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
 
 NORMAL_95 = 1.959964
 _MENTIONED = 0.7

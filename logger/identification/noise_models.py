@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.linear_prediction import Whitener, burg, ladder, levinson
 
 Array = npt.NDArray[np.float64]
 
@@ -36,35 +37,6 @@ _GRID = 8192
 # The level of the road against that of the sensor is searched over so many powers of e.
 _RATIO_LOGS = 40.0
 _GOLDEN_STEPS = 60
-
-
-@dataclass(frozen=True, eq=False)
-class Whitener:
-    """Takes out of each sample what those before it tell of it, and gives the rest in units of its deviation.
-
-    start    (m, m) lower triangle: the first samples, which have fewer before them
-    taps     (m + 1,) all others, the newest sample first
-    """
-
-    start: Array
-    taps: Array
-
-    def __call__(self, samples: Array) -> Array:
-        """(n, ...) to (n, ...)."""
-        m = min(len(self.start), len(samples))
-        if len(self.taps) == 1:
-            return samples * self.taps[0]
-        length = len(samples) + len(self.taps)
-        shape = (-1,) + (1,) * (samples.ndim - 1)
-        product = np.fft.rfft(samples, length, axis=0) * np.fft.rfft(self.taps, length).reshape(shape)
-        white = np.fft.irfft(product, length, axis=0)[: len(samples)]
-        white[:m] = np.tensordot(self.start[:m, :m], samples[:m], axes=1)
-        return np.asarray(white)
-
-    def log_deviations(self, count: int) -> float:
-        """Sum of the logarithms of the deviations of ``count`` samples."""
-        m = min(len(self.start), count)
-        return float(-np.log(np.diag(self.start)[:m]).sum() - (count - m) * np.log(self.taps[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +85,7 @@ class White:
         shape = Whitener(np.zeros((0, 0)), np.ones(1))
         if low_pass.cutoff_hz is not None:
             memory = min(int(_FILTER_MEMORY_S * low_pass.kept_hz), min(map(len, residuals)) - 1)
-            shape = _levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
+            shape = levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
         deviation = max(_rms([shape(one) for one in residuals]), floor)
         whitener = Whitener(shape.start / deviation, shape.taps / deviation)
         return _whitening("white", [whitener] * len(residuals), residuals, 1,
@@ -130,13 +102,13 @@ class Autoregressive:
         """As ``Noise``. The order is at most 60, and a twentieth of the samples."""
         count = sum(map(len, residuals))
         most = min(_MOST_ORDER, count // _SAMPLES_PER_ORDER) if self.order is None else self.order
-        reflections = _burg(residuals, min(most, min(map(len, residuals)) - 1), floor)
+        reflections = burg(residuals, min(most, min(map(len, residuals)) - 1), floor)
         power = _rms(residuals) ** 2 + floor**2
         powers = power * np.cumprod(np.concatenate([[1.0], 1 - reflections**2]))
         order = len(reflections)
         if self.order is None:
             order = int(np.argmin(count * np.log(powers) + np.arange(len(powers)) * np.log(count)))
-        whitener = _ladder(reflections[:order], power)
+        whitener = ladder(reflections[:order], power)
         deviation = 1 / float(whitener.taps[0])
         return _whitening("ar", [whitener] * len(residuals), residuals, order + 1,
                           f"autoregressive noise of order {order}, innovations of {deviation:.3g} m/s2",
@@ -164,7 +136,7 @@ class RoadNoise:
         whiteners = []
         for road, residual in zip(roads, residuals, strict=True):
             covariance = _covariance(road_power * road + sensor_power * sensor, rate_hz)
-            whiteners.append(_levinson(covariance[: min(memory, len(residual) - 1) + 1]))
+            whiteners.append(levinson(covariance[: min(memory, len(residual) - 1) + 1]))
         deviation = float(np.sqrt(sensor_power))
         return _whitening("road", whiteners, residuals, 2,
                           f"a road of Gd(n0) {road_power:.3g} cm3 that the profile does not contain, and white noise "
@@ -206,53 +178,6 @@ def _whitening(name: str, whiteners: list[Whitener], residuals: Sequence[Array],
 
 def _rms(parts: Sequence[Array]) -> float:
     return float(np.sqrt(sum((part**2).sum() for part in parts) / sum(map(len, parts))))
-
-
-# --- predictors ---
-
-
-def _burg(parts: Sequence[Array], order: int, floor: float) -> Array:
-    """Reflection coefficients (order,) that make forward and backward errors of all parts least (J. P. Burg 1975), with
-    white noise of the deviation ``floor`` added to the parts."""
-    forward, backward = [part[1:] for part in parts], [part[:-1] for part in parts]
-    reflections = np.zeros(order)
-    for k in range(order):
-        energy = sum(float(f @ f + b @ b) + 2 * len(f) * floor**2 for f, b in zip(forward, backward, strict=True))
-        if energy <= 0:
-            break
-        r = -2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / energy
-        reflections[k] = r
-        forward, backward = (
-            [(f + r * b)[1:] for f, b in zip(forward, backward, strict=True)],
-            [(b + r * f)[:-1] for f, b in zip(forward, backward, strict=True)],
-        )
-    return reflections
-
-
-def _ladder(reflections: Array, power: float) -> Whitener:
-    """The predictors of every order up to the last one, from reflection coefficients (m,) and the process's power."""
-    m = len(reflections)
-    start = np.zeros((m, m))
-    taps = np.ones(1)
-    for k, r in enumerate(reflections):
-        start[k, : k + 1] = taps[::-1] / np.sqrt(power)
-        taps = np.append(taps, 0.0) + r * np.append(0.0, taps[::-1])
-        power *= 1 - r * r
-    return Whitener(start, taps / np.sqrt(power))
-
-
-def _levinson(covariance: Array) -> Whitener:
-    """The predictors of a process with these covariances (m + 1,) at lags 0, 1, 2 ... (Levinson and Durbin)."""
-    m = len(covariance) - 1
-    start, taps, power = np.zeros((m, m)), np.zeros(m + 1), float(covariance[0])
-    taps[0] = 1.0
-    for k in range(m):
-        newest_last = taps[k::-1] if k else taps[:1]
-        start[k, : k + 1] = newest_last / np.sqrt(power)
-        r = -float(newest_last @ covariance[1 : k + 2]) / power
-        taps[1 : k + 2] += r * start[k, : k + 1] * np.sqrt(power)
-        power *= 1 - r * r
-    return Whitener(start, taps / np.sqrt(power))
 
 
 # --- the road's level ---

@@ -3,7 +3,7 @@
 Problem: find the numbers for which the model's predictions leave the least, say how certain they are, and say so when
 the data cannot tell. Solution, in this order:
 
-1. ask whether the data could tell at all (``verdict``), before any fit;
+1. ask whether the data could tell at all (``identifiability``), before any fit;
 2. Levenberg and Marquardt's steps, in the logarithm of what can only be positive, within bounds, on residuals as they
    are (output error), from every start that was given; the best goes on; by squares, as far from the end a robust
    loss has hills of its own;
@@ -23,9 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.decimating_low_pass import LowPass
-from logger.identification.noise import LEAST_SHARE, Autoregressive, Noise, White, Whitening
-from logger.identification.prediction import Differentiable, Model
-from logger.identification.verdict import (
+from logger.identification.frequency_domain_model import Differentiable, Model
+from logger.identification.identifiability import (
     NOTHING_BY_DIFFERENCES,
     NOTHING_EXACT,
     Finding,
@@ -34,6 +33,7 @@ from logger.identification.verdict import (
     structural,
     unexplained,
 )
+from logger.identification.noise_models import LEAST_SHARE, Autoregressive, Noise, White, Whitening
 from logger.vehicle.named_parameters import Free
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from logger.identification.obstacles import Bump, Obstacle, ObstaclePath, Step
+from logger.identification.obstacle_paths import Bump, Obstacle, ObstaclePath, Step
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.fit import Options, fit
-from logger.identification.prediction import Record, VehicleModel
-from logger.identification.verdict import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
+from logger.identification.frequency_domain_model import Record, VehicleModel
+from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
+from logger.identification.prediction_error_fit import Options, fit
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.named_parameters import changed, free, names

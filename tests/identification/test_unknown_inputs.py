@@ -8,13 +8,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.fit import Fit, Options, fit
-from logger.identification.locate import located
-from logger.identification.noise import White
-from logger.identification.obstacles import Bump, Step
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import WEAK, NotIdentifiable
+from logger.identification.noise_models import White
+from logger.identification.obstacle_paths import Bump, Step
+from logger.identification.obstacle_search import located
+from logger.identification.prediction_error_fit import Fit, Options, fit
 from logger.identification.record import Record
-from logger.identification.road_input import (
+from logger.identification.unknown_inputs import (
     RoadInput,
     changed_input,
     expanded,
@@ -24,7 +25,6 @@ from logger.identification.road_input import (
     read_input,
     run_and_name,
 )
-from logger.identification.verdict import WEAK, NotIdentifiable
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
