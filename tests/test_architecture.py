@@ -16,7 +16,7 @@ TREES = {
     for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
 }
 FLOORS = (
-    "errors", "units", "records", "chart_data", "printable",
+    "errors", "units", "geodesy", "records", "chart_data", "printable",
     "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
     "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
@@ -26,8 +26,8 @@ NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "units", "records", "printable", "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "files",
-    "shipped", "plugins", "store", "service", "commands",
+    "errors", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "vehicle", "roads",
+    "estimation", "files", "shipped", "plugins", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [

@@ -32,7 +32,7 @@ from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
-    from logger.estimation.sensor import Sensor
+    from logger.estimation.sensor_noise import Sensor
     from logger.vehicle.vehicle import Vehicle
 
 NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
-    from logger.estimation.sensor import Sensor
+    from logger.estimation.sensor_noise import Sensor
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
     from logger.units import WINDOW_M

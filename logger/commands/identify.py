@@ -41,12 +41,12 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.identification.fit import Fit, Options
-    from logger.identification.prediction import VehicleModel
+    from logger.identification.frequency_domain_model import VehicleModel
+    from logger.identification.identifiability import NotIdentifiable
+    from logger.identification.prediction_error_fit import Fit, Options
     from logger.identification.record import Record
-    from logger.identification.road_input import RoadInput
-    from logger.identification.shared_road import RoadFit
-    from logger.identification.verdict import NotIdentifiable
+    from logger.identification.unknown_inputs import RoadInput
+    from logger.identification.unknown_road.marginal_likelihood import RoadFit
     from logger.vehicle.frequency_response import AxleResponse
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
@@ -104,10 +104,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(args: argparse.Namespace) -> int:
     """A fit over roads that are known, but for a few numbers."""
-    from logger.identification.common_roughness import with_common_roughness
-    from logger.identification.report import as_json, common_words, lines, tests
+    from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, error_before, upright_fit
-    from logger.identification.verdict import NotIdentifiable
+    from logger.identification.shared_road_covariance import with_common_roughness
+    from logger.report.identification_text import as_json, common_words, lines, tests
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
 
@@ -150,7 +150,7 @@ def _measured(args: argparse.Namespace) -> int:
 
 def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced: list[str],
            records: list[Record]) -> VehicleModel:
-    from logger.identification.prediction import VehicleModel
+    from logger.identification.frequency_domain_model import VehicleModel
     from logger.identification.session import obstacle_starts
 
     try:
@@ -166,11 +166,11 @@ def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced
 
 def _unmeasured(args: argparse.Namespace) -> int:
     """A fit over roads of which only the kind is known."""
-    from logger.identification.road_input import RoadInput
-    from logger.identification.road_report import as_json, lines
+    from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, drives_of
-    from logger.identification.shared_road import fit_roads
-    from logger.identification.verdict import NotIdentifiable
+    from logger.identification.unknown_inputs import RoadInput
+    from logger.identification.unknown_road.marginal_likelihood import fit_roads
+    from logger.report.unknown_road_text import as_json, lines
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
     from logger.vehicle.frequency_response import AxleResponse
@@ -212,7 +212,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
 
 
 def _road_options(args: argparse.Namespace) -> Any:
-    from logger.identification.shared_road import Options
+    from logger.identification.unknown_road.marginal_likelihood import Options
 
     unused = {"--bump": args.bump, "--step": args.step, "--low-pass": args.low_pass, "--robust": args.robust,
               "--tries": args.tries, "--noise": args.noise != "auto"}
@@ -232,7 +232,7 @@ def _road_options(args: argparse.Namespace) -> Any:
 def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
-    from logger.identification.road_input import EACH, expanded, free_input, is_input, run_and_name
+    from logger.identification.unknown_inputs import EACH, expanded, free_input, is_input, run_and_name
     from logger.vehicle.named_parameters import free
 
     runs = len(args.runs)
@@ -262,8 +262,8 @@ def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: di
 
 def _road(args: argparse.Namespace) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.obstacles import Bump, Step
-    from logger.identification.road_input import RoadInput
+    from logger.identification.obstacle_paths import Bump, Step
+    from logger.identification.unknown_inputs import RoadInput
 
     found: dict[str, Any] = {}
     unplaced = []

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from logger.commands.lab_runs import lab_runs
 from logger.errors import BadInput
+from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.fitting import Problem
@@ -27,7 +28,7 @@ _TOLERANCES = (0.001, 0.5)
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 _LEAST_MPS2 = 1e-4
 _ALIKE, _NEAR = 0.8, 0.3
-_UNITS_MPS2 = {"g": 9.80665, "thousandths of g": 0.00980665, "mm/s2": 0.001}
+_UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "thousandths of g": STANDARD_GRAVITY_MPS2 / 1000, "mm/s2": 0.001}
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
 

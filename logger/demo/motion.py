@@ -22,7 +22,7 @@ LEAD_M = 40.0
 SMOOTHING_S = 1.0
 TURN_M = 20.0
 
-_EARTH_RADIUS_M = 6_371_000.0
+_EARTH_RADIUS_M = 6_371_000.0  # of the sphere that the shipped recording was made on
 _START_LAT_DEG, _START_LON_DEG = 38.9897, -76.9378
 # A made-up road: its heading swings by these angles [rad] over these lengths [m].
 _START_HEADING_RAD = 0.9

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp import kaiser
 from logger.units import US_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -215,14 +216,11 @@ def decimation_taps(factor: int) -> Floats:
     """Linear-phase low-pass for thinning ``factor`` x 100 Hz to 100 Hz: a sinc in a Kaiser window, (2 h + 1,).
 
     Passes 0-38 Hz within 0.01 dB and stops what would fold into that band, from 62 Hz up, by 64 dB; half the
-    amplitude at 50 Hz. h is a multiple of ``factor``. Source: Oppenheim and Schafer, Discrete-Time Signal
-    Processing, 7.6 (Kaiser's formulas).
+    amplitude at 50 Hz. h is a multiple of ``factor``.
     """
     width = 2.0 * math.pi * (STOP_HZ - PASS_HZ) / (SLOW_RATE_HZ * factor)
-    half = factor * math.ceil((STOP_DB - 7.95) / (2.285 * width) / 2.0 / factor)
-    beta = 0.1102 * (STOP_DB - 8.7)
-    taps = np.sinc(np.arange(-half, half + 1) / factor) * np.kaiser(2 * half + 1, beta)
-    return taps / taps.sum()
+    half = factor * math.ceil(kaiser.half_length(STOP_DB, width) / factor)
+    return kaiser.low_pass_taps(half, factor, 1.0, STOP_DB)
 
 
 class Decimator:

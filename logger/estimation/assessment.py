@@ -14,11 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.limit import Limits, pooled_r2
-from logger.estimation.road_profile import RoadProfile
-from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor import Sensor
-from logger.estimation.whole_drive import (
+from logger.estimation.batch import (
     Windows,
     estimated,
     exact_iri,
@@ -28,6 +24,10 @@ from logger.estimation.whole_drive import (
     on_grid,
     score,
 )
+from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.road_profile import RoadProfile
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.sensor_noise import Sensor
 from logger.profiles.track import Track
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point

@@ -21,7 +21,7 @@ from logger.estimation.car_response import (
     CarResponse,
     golden_car_slope,
 )
-from logger.estimation.gaussian import mean_absolute, variance_of_mean_absolute
+from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import PER_KM
 

@@ -12,7 +12,7 @@ ISO 8608; with IRI = 0.5386 Gd(n0)^0.5 (Eq 4.39) that is the ratio.
 
 The ratio is right on the average of a long road of that shape. One window of 7.62 m is a short look: at 31 m/s it lasts
 a quarter of a second, less than one swing of the body, and the estimate scatters by a fifth to a third about the exact
-IRI. ``estimation.stream`` does better.
+IRI. ``estimation.streaming`` does better.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ the whole drive, the one told over at least ``TOLD_OVER`` of the distance at eit
 part of the profile ends and another begins.
 
 A piece says what the sensor's noise leaves of each wavelength, but two more things bound the longest: a wave that
-passes more slowly than ``SLOWEST_HZ`` is taken for drift of the sensor (``block.py``), and beyond ``LONGEST_M`` the
+passes more slowly than ``SLOWEST_HZ`` is taken for drift of the sensor (``road_solver``), and beyond ``LONGEST_M`` the
 estimator expects no more of a road than at it (``RoadSpectrum``), as roads of ISO 8608 end there too.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
-from logger.estimation.stream import RoadPiece
+from logger.estimation.streaming import RoadPiece
 
 Array = npt.NDArray[np.float64]
 

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from logger.identification.crossing import Drive
-from logger.identification.fit import Fit, Options, fit, normalised_error, spread_starts
-from logger.identification.locate import located
-from logger.identification.low_pass import LowPass
-from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
-from logger.identification.prediction import VehicleModel
+from logger.dsp.decimating_low_pass import LowPass
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import NotIdentifiable, upside_down
+from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.obstacle_search import located
+from logger.identification.prediction_error_fit import Fit, Options, fit, normalised_error, spread_starts
 from logger.identification.record import Record
-from logger.identification.road_input import EACH, RoadInput, expanded
-from logger.identification.verdict import NotIdentifiable, upside_down
+from logger.identification.unknown_inputs import EACH, RoadInput, expanded
+from logger.identification.unknown_road.drive_operator import Drive
 from logger.vehicle.vehicle import Vehicle
 
 LEAST_SAMPLES = 50

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.whiteness import autocorrelation
+from logger.identification.residual_whiteness import autocorrelation
 from logger.lab.beside import Beside
 from logger.vehicle.passage import smooth_length
 from logger.vehicle.stepping import force_input

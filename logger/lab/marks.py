@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.whiteness import LAGS, autocorrelation
+from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.alignment import Alignment, aligned, constant, drift
 from logger.lab.beside import BAND_NAMES, Beside, Located, Part, block_means, short_names
 from logger.lab.coherence import Coherence, with_road

@@ -2,7 +2,7 @@
 
 Problem: without a profile there is no prediction to compare a drive with; the road would explain whatever the model
 does not. Solution: drives at different speeds meet the same road, and what one of them says of it the others have to
-agree with. The road, a Gaussian process of free level and waviness, is integrated out (``shared_road``), and models are
+agree with. The road, a Gaussian process of free level and waviness, is integrated out (``unknown_road``); models are
 compared by the likelihood of all drives together. The way is cut into stretches of some seconds, each with a level and
 a waviness of its own and with places that may be a little off, as roads change and distance signals wander.
 
@@ -24,8 +24,8 @@ from itertools import pairwise, permutations
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.crossing import Drive
-from logger.identification.shared_road import Options, RoadState, UnknownRoad
+from logger.identification.unknown_road.drive_operator import Drive
+from logger.identification.unknown_road.marginal_likelihood import Options, RoadState, UnknownRoad
 from logger.lab.candidates import scaled_by
 from logger.lab.fitting import LEAST_SHARE, Move, coordinates_of, moved, moves_of, steps_of
 from logger.lab.linear_response import Tabulated, response_of

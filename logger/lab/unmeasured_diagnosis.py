@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.verdict import NOT_ONE_ROAD, structural
+from logger.identification.identifiability import NOT_ONE_ROAD, structural
 from logger.lab.blind import SEEN
 from logger.lab.candidates import alike_within
 from logger.lab.diagnosis import CHANCE, WORTH, p_value

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, radians
+from math import hypot
 
 import numpy as np
 
+from logger.geodesy import east_and_north_m
 from logger.records import WindowRecord
 from logger.report.charts import WIDTH, nice_step, numbered_mark
 from logger.report.html import Html, concatenated, html
-from logger.report.summary import EARTH_RADIUS_M, Place, ground_distance_m, length_m
+from logger.report.summary import Place, apart_m, length_m
 
 _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
@@ -74,9 +75,9 @@ def joined(records: Sequence[WindowRecord]) -> list[list[WindowRecord]]:
 def _follows(last: WindowRecord, record: WindowRecord) -> bool:
     if last.distance_end_m is None or record.distance_start_m is None or last.drive != record.drive:
         return False
-    apart_m = ground_distance_m(last, record)
+    ground_m = apart_m(last, record)
     near_m = 5 * max(length_m(last), length_m(record))
-    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and apart_m is not None and apart_m < near_m
+    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and ground_m is not None and ground_m < near_m
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,7 @@ class _Projection:
 
     def metres(self, place: WindowRecord | Place) -> Point:
         """East and north of the origin [m]."""
-        east_deg = ((place.lon_deg or 0.0) - self.lon_deg + 180.0) % 360.0 - 180.0
-        north_deg = (place.lat_deg or 0.0) - self.lat_deg
-        return (EARTH_RADIUS_M * radians(east_deg) * cos(radians(self.lat_deg)), EARTH_RADIUS_M * radians(north_deg))
+        return east_and_north_m(place.lat_deg or 0.0, place.lon_deg or 0.0, self.lat_deg, self.lon_deg)
 
     def xy(self, place: WindowRecord | Place) -> Point:
         """In the picture, y downwards."""

@@ -12,16 +12,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from itertools import accumulate
-from math import cos, hypot, radians
 from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
+from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 
 APART_M = 50.0
 PLACES = 5
-EARTH_RADIUS_M = 6_371_008.8
 
 IRI_CLASSES: Mapping[str, str] = {
     "A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor", "F": "extremely poor",
@@ -152,13 +151,11 @@ def along_m(records: Sequence[WindowRecord]) -> list[float]:
     return [end - length / 2 for end, length in zip(accumulate(lengths_m), lengths_m, strict=True)]
 
 
-def ground_distance_m(one: WindowRecord | Place, other: WindowRecord | Place) -> float | None:
-    """Distance between two places some kilometres apart at most [m]; None when one has no position."""
+def apart_m(one: WindowRecord | Place, other: WindowRecord | Place) -> float | None:
+    """Distance on the ground between two places some kilometres apart at most [m]; None when one has no position."""
     if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
         return None
-    east_deg = (other.lon_deg - one.lon_deg + 180.0) % 360.0 - 180.0
-    east = radians(east_deg) * cos(radians((one.lat_deg + other.lat_deg) / 2))
-    return EARTH_RADIUS_M * hypot(east, radians(other.lat_deg - one.lat_deg))
+    return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
 
 
 def end_utc_us(record: WindowRecord) -> int | None:
@@ -229,5 +226,5 @@ def _roughest(records: Sequence[WindowRecord]) -> tuple[Place, ...]:
 
 
 def _apart_m(one: Place, other: Place) -> float:
-    ground_m = ground_distance_m(one, other)
+    ground_m = apart_m(one, other)
     return abs(one.along_m - other.along_m) if ground_m is None else ground_m

@@ -21,12 +21,13 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from math import cos, hypot, inf, nan, radians
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
+from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
 from logger.service.pipeline import longest_wait_us
@@ -39,7 +40,6 @@ SAME_START_M = 1.0
 SAME_START_US = 1_000_000
 OUTSIDE_SHARE = 0.02
 
-_EARTH_RADIUS_M = 6_371_008.8
 _LATE_FLAGS = frozenset({"time_unset"})  # goes from the rows when their file is finished
 
 
@@ -351,12 +351,11 @@ def _class_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
 
 
 def _place_apart_m(wanted: WindowRecord, found: WindowRecord) -> float | None:
-    """On the ground, taken as flat between two places so near."""
-    north_deg, east_deg = _apart(wanted.lat_deg, found.lat_deg), _apart(wanted.lon_deg, found.lon_deg)
-    if north_deg is None or east_deg is None or wanted.lat_deg is None:
-        return north_deg
-    east_deg = min(east_deg, abs(360.0 - east_deg))
-    return radians(1.0) * _EARTH_RADIUS_M * hypot(north_deg, east_deg * cos(radians(wanted.lat_deg)))
+    """On the ground. None: neither side knows; infinite: one side does."""
+    if wanted.lat_deg is None or wanted.lon_deg is None or found.lat_deg is None or found.lon_deg is None:
+        known = (wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
+        return None if known == (None,) * len(known) else inf
+    return ground_distance_m(wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
 
 
 _MEASURES: dict[str, Measure] = {

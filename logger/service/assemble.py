@@ -17,8 +17,8 @@ from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.rms_relation import rms_relation
-from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RoadEstimator
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator
 from logger.service.chain import Axis, SignalChain, recorder_gain
 from logger.service.config import AXES, AccelerometerConfig, Config
 from logger.service.pipeline import Pipeline, PipelineSettings

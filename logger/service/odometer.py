@@ -12,15 +12,14 @@ The distance counts what was travelled with known speed; after a long loss it go
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, hypot, radians
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.geodesy import ground_distance_m
 from logger.service.timebase import TimedFix
 from logger.units import US_PER_S
 
-EARTH_RADIUS_M = 6_371_008.8
 NORMAL_INTERVAL_US = 1_500_000
 ACCELERATION_LIMIT_MPS2 = 15.0
 PLACE_JUMP_M = 80.0
@@ -172,13 +171,7 @@ class Odometer:
         if abs(speed_mps - self._speed_mps[-1]) > ACCELERATION_LIMIT_MPS2 * max(gap_s, 0.2):
             return False
         reach_m = PLACE_JUMP_M + 1.5 * max(speed_mps, self._speed_mps[-1]) * gap_s
-        return chord_m(self._lat_deg[-1], self._lon_deg[-1], lat_deg, lon_deg) <= reach_m
-
-
-def chord_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_deg: float) -> float:
-    """Distance of two near places [m] on a sphere laid flat."""
-    east_deg = (lon1_deg - lon0_deg + 180.0) % 360.0 - 180.0
-    return EARTH_RADIUS_M * hypot(radians(lat1_deg - lat0_deg), radians(east_deg) * cos(radians(lat0_deg)))
+        return ground_distance_m(self._lat_deg[-1], self._lon_deg[-1], lat_deg, lon_deg) <= reach_m
 
 
 def _unknown(count: int) -> Travel:

@@ -17,7 +17,7 @@ from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.rms_relation import RmsRelation
-from logger.estimation.stream import RoadEstimator, WindowEstimate
+from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
 from logger.service.chain import GRID_STEP_US, SignalChain

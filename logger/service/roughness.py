@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.windows import GridSamples, Window
-from logger.estimation.stream import RoadEstimator, WindowEstimate
+from logger.estimation.streaming import RoadEstimator, WindowEstimate
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.service.odometer import chord_m
+from logger.geodesy import ground_distance_m
 from logger.service.timebase import TimedFix
 from logger.units import US_PER_S
 
@@ -150,4 +150,4 @@ def _apart_m(one: TimedFix, other: TimedFix) -> float:
     a, b = one.fix, other.fix
     if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
         return 0.0
-    return chord_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
+    return ground_distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from logger.identification.fit import Fit, Options, fit
-from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
-from logger.identification.obstacles import Bump
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.obstacle_paths import Bump
+from logger.identification.prediction_error_fit import Fit, Options, fit
 from logger.identification.record import Record
-from logger.identification.road_input import SPEED_SCALE, RoadInput, free_input, is_input
+from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput, free_input, is_input
 from logger.studies.drives import RATE_HZ, rav4
 from logger.vehicle.named_parameters import free
 

@@ -12,7 +12,7 @@ from itertools import chain
 
 import numpy as np
 
-from logger.identification.fit import Fit
+from logger.identification.prediction_error_fit import Fit
 from logger.identification.record import Record
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of
 from logger.studies.fitting import FRONT, MASS, REAR, error_percent, fitted, standard_error_percent

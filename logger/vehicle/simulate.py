@@ -15,10 +15,12 @@ samples, by a linear-phase filter whose delay is taken out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp import kaiser
 from logger.profiles.track import Track
 from logger.vehicle.state_space import driven_outputs, straight_step
 from logger.vehicle.structure import Output, Structure
@@ -30,9 +32,7 @@ FINE_RATE_HZ = 1000.0
 PASS_OF_RATE, STOP_OF_RATE = 0.38, 0.5
 """The recorder's filter is flat below the one and silent above the other share of its rate."""
 STOP_DB = 80.0
-# Kaiser's rules for the length of such a filter, and for the shape of its window (J. F. Kaiser 1974).
-_HALF_SAMPLES = int(np.ceil((STOP_DB - 7.95) / (2.285 * 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)) / 2))
-_BETA = 0.1102 * (STOP_DB - 8.7)
+_HALF_SAMPLES = ceil(kaiser.half_length(STOP_DB, 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)))
 # The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
 _GAIN_STEPS, _GAIN_GRID = 4, 16384
 _EVEN = 1e-3
@@ -91,11 +91,7 @@ def drive(
 
 def recorder_taps(steps: int) -> Array:
     """The recorder's filter at ``steps`` times its rate: (2 h + 1,), symmetric, its sum 1."""
-    half = _HALF_SAMPLES * steps
-    tap = np.arange(-half, half + 1) / steps
-    cutoff = PASS_OF_RATE + STOP_OF_RATE
-    taps = np.sinc(cutoff * tap) * np.kaiser(len(tap), _BETA)
-    return np.asarray(taps / taps.sum())
+    return kaiser.low_pass_taps(_HALF_SAMPLES * steps, steps, PASS_OF_RATE + STOP_OF_RATE, STOP_DB)
 
 
 def recorder_gain(f_of_rate: Array) -> Array:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import CornerLaws, Law, Law2
 from logger.vehicle.state_space import straight_step
 from logger.vehicle.structure import Structure
@@ -28,7 +29,6 @@ Array = npt.NDArray[np.float64]
 # Points of the tables; those of two variables have so many on either side of 0.
 _POINTS = 8001
 _TRAVEL_SIDE, _RATE_SIDE = 120, 160
-_GRAVITY_MPS2 = 9.80665
 _RUBS_AT, _GROWS_AT, _SLOW = 0.7, 0.55, 200.0
 
 
@@ -47,7 +47,7 @@ class Motion:
 def static_tire_loads_n(structure: Structure) -> Array:
     """What each tire carries at rest (w,) [N]."""
     rise = np.linalg.solve(structure.stiffness, structure.road.sum(axis=1))  # of all that rises with the road
-    sag = np.linalg.solve(structure.stiffness, -_GRAVITY_MPS2 * (structure.mass @ rise))
+    sag = np.linalg.solve(structure.stiffness, -STANDARD_GRAVITY_MPS2 * (structure.mass @ rise))
     return np.asarray(-structure.tires * (structure.wheels @ sag))
 
 

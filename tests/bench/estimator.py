@@ -41,11 +41,11 @@ from pathlib import Path
 import numpy as np
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
-from logger.estimation.limit import Limits, pooled_r2
+from logger.estimation.error_bound import Limits, pooled_r2
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RoadEstimator
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator
 from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.service import assemble
 from logger.service.chain import GRAVITY_CORNER_HZ, GRID_STEP_US, recorder_gain

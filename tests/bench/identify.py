@@ -16,16 +16,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
-from logger.identification.common_roughness import with_common_roughness
-from logger.identification.crossing import Drive
-from logger.identification.fit import Fit, Options, fit
-from logger.identification.noise import Autoregressive, Noise, RoadNoise, White
-from logger.identification.obstacles import Bump
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import NotIdentifiable
+from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
+from logger.identification.obstacle_paths import Bump
+from logger.identification.prediction_error_fit import Fit, Options, fit
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput, expanded, free_input, is_input
-from logger.identification.shared_road import fit_roads
-from logger.identification.verdict import NotIdentifiable
+from logger.identification.shared_road_covariance import with_common_roughness
+from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
+from logger.identification.unknown_road.drive_operator import Drive
+from logger.identification.unknown_road.marginal_likelihood import fit_roads
 from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.shipped import vehicle_file

@@ -12,7 +12,7 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.identification.verdict import NotIdentifiable
+from logger.identification.identifiability import NotIdentifiable
 from logger.shipped import vehicle_file
 from logger.store.drive_file import write_drive, write_profile
 from logger.store.vehicle_file import read_vehicle

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from logger.estimation.road_profile import TOLD_OVER, band_passed, road_profile
-from logger.estimation.stream import RoadPiece
+from logger.estimation.streaming import RoadPiece
 
 SPACING_M = 0.15
 POINTS = 50

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from logger.estimation.sensor import Sensor
-from logger.estimation.stream import RoadEstimator, WindowEstimate
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump

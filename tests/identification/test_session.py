@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.prediction import VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import NotIdentifiable
 from logger.identification.record import Record
 from logger.identification.session import (
     UnusableRun,
@@ -18,7 +19,6 @@ from logger.identification.session import (
     off_rate,
     upright_fit,
 )
-from logger.identification.verdict import NotIdentifiable
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file

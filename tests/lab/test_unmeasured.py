@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.crossing import Crossing, Drive, grid_under
+from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
 from logger.lab.linear_response import Tabulated, response_of
 from logger.lab.nuisance import Tolerance
 from logger.lab.one_road import apart, in_doubt, likenesses

@@ -8,8 +8,8 @@ import pytest
 from logger.report.summary import (
     IRI_CLASSES,
     along_m,
+    apart_m,
     class_limits_m_per_km,
-    ground_distance_m,
     split_drives,
     summarise,
     summary_json,
@@ -97,8 +97,8 @@ def test_nothing_at_all_is_a_summary_too() -> None:
 def test_ground_distance_is_that_of_the_sphere(drive) -> None:
     one, other = drive(2, {0: {"lat_deg": 60.0, "lon_deg": 179.9}, 1: {"lat_deg": 60.0, "lon_deg": -179.9}})
     quarter_degree_m = 2 * 3.141592653589793 * 6_371_008.8 * 0.2 / 360 * 0.5
-    assert ground_distance_m(one, other) == pytest.approx(quarter_degree_m, rel=1e-5)
-    assert ground_distance_m(*drive(2)) == pytest.approx(10.0, rel=1e-4)
+    assert apart_m(one, other) == pytest.approx(quarter_degree_m, rel=1e-5)
+    assert apart_m(*drive(2)) == pytest.approx(10.0, rel=1e-4)
 
 
 @pytest.mark.parametrize("letter", IRI_CLASSES)

@@ -7,7 +7,8 @@ from math import isclose
 import numpy as np
 
 from drivers.readings import Fix
-from logger.service.odometer import EARTH_RADIUS_M, Odometer
+from logger.geodesy import EARTH_RADIUS_M
+from logger.service.odometer import Odometer
 from logger.service.timebase import TimedFix
 
 NORTH_DEG_PER_M = 180.0 / (np.pi * EARTH_RADIUS_M)

@@ -12,9 +12,9 @@ from drivers.accelerometers.bma220 import Bma220Decoder
 from logger.demo.simulated_drive import Drive
 from logger.dsp.resample import GridResampler
 from logger.dsp.weightings.wk import WEIGHTING
+from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
 from logger.service.config import Config, GpsConfig
-from logger.service.odometer import EARTH_RADIUS_M
 
 from replaying import rows_of
 

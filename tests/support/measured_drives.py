@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
+from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.iri import PER_KM, rectified_slope
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 from logger.vehicle.vehicle import Axle, Vehicle
@@ -32,7 +33,6 @@ GRID_HZ = 100
 FINE_HZ = 2000
 FLAT_HZ, SHUT_HZ = 38.0, 50.0
 _RUN_IN_M = 150.0
-_EARTH_RADIUS_M = 6_371_008.8
 _START_LAT_DEG, _LON_DEG = 50.0, 14.4
 
 
@@ -399,7 +399,7 @@ class Receiver:
         speed = np.abs(np.interp(index, at, drive.speed_mps) + self.speed_noise_mps * rng.standard_normal(len(index)))
         arrival_s = time_s + self.latency_s + self.latency_jitter_s * np.abs(rng.standard_normal(len(time_s)))
         begin_utc_us = 1_780_000_000 * US_PER_S
-        degree_m = np.radians(_EARTH_RADIUS_M)
+        degree_m = np.radians(EARTH_RADIUS_M)
         east_degree_m = degree_m * np.cos(np.radians(_START_LAT_DEG))
         return [
             Fix(
@@ -416,7 +416,7 @@ class Receiver:
 
 def place_of(lat_deg: float) -> float:
     """Place on the road [m] of a latitude that a record tells."""
-    return float(np.radians(lat_deg - _START_LAT_DEG) * _EARTH_RADIUS_M)
+    return float(np.radians(lat_deg - _START_LAT_DEG) * EARTH_RADIUS_M)
 
 
 def block_of(t_us: npt.NDArray[np.int64], readings: Array, clipped: npt.NDArray[np.bool_]) -> AccelerationBlock:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from logger.chart_data import Field
-from logger.identification.obstacles import Bump
+from logger.identification.obstacle_paths import Bump
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput
+from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump
 from logger.studies.study import Column, Effort, Result, Study, Table

@@ -3,9 +3,9 @@
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.identification.obstacles import Step
+from logger.identification.obstacle_paths import Step
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput
+from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, fitted
 from logger.studies.study import Column, Effort, Result, Study, Table

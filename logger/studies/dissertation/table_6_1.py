@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from logger.identification.obstacles import Bump
-from logger.identification.road_input import RoadInput
+from logger.identification.obstacle_paths import Bump
+from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, PS_2119, bump, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.identification.fit import Fit
-from logger.identification.obstacles import Step
+from logger.identification.identifiability import NotIdentifiable
+from logger.identification.obstacle_paths import Step
+from logger.identification.prediction_error_fit import Fit
 from logger.identification.record import Record
-from logger.identification.road_input import RoadInput
-from logger.identification.verdict import NotIdentifiable
+from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BRIDGE_MPS, PS_2119, STEP_M, bridge, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table

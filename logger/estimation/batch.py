@@ -1,0 +1,193 @@
+"""Batch estimation of a complete drive: its windows, their errors, and the errors that are the least possible."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from math import ceil, exp, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.error_bound import Limits
+from logger.estimation.road_profile import RoadProfile, road_profile
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator, RoadPiece
+from logger.estimation.time_grid import RATE_HZ
+from logger.roads.golden_car import START_M
+from logger.roads.iri import rectified_slope, window_iri
+from logger.vehicle.structure import Output, Structure
+
+Array = npt.NDArray[np.float64]
+
+LEVEL_REACH_M = 50.0
+"""A window's road is as rough as the mean of the windows so far to both sides."""
+_SMOOTHEST_M_PER_KM = 0.1
+_COARSEST_M = 0.25
+_SMOOTHED_S = 2.0
+_FINEST_RATIO = 2000
+_STEPS_PER_E = 20  # limits are computed for speeds and levels in steps of 5 %
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows one after the other, n of them, that begin at whole multiples of their length.
+
+    edges_m            (n + 1,) [m]
+    speed_mps          (n,) mean speed over each [m/s]
+    iri_m_per_km       (n,) NaN where it is not known, ``flags`` say why
+    iri_std_m_per_km   (n,) its standard error, NaN likewise
+    told               (n,) share of the variance of the IRI's slope that the readings tell
+    flags              n sets of words
+    """
+
+    edges_m: Array
+    speed_mps: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    told: Array
+    flags: tuple[frozenset[str], ...]
+
+
+def on_grid(
+    sensor: Sensor, rate_hz: float, accel_mps2: Array, distance_m: Array
+) -> tuple[Sensor, Array, Array]:
+    """Sensor, readings and distances, as recorded at some rate, on the grid of 100 Hz; arrays (n,) in, (t,) out.
+
+    What a change of rate leaves of noise and steps is one noise with the same power per hertz. A recorder slower than
+    100 Hz passes less of what is quick than the estimator expects: at 80 Hz its IRI is some 3 % high.
+    """
+    ratio = Fraction(RATE_HZ / rate_hz).limit_denominator(_FINEST_RATIO)
+    if ratio == 1:
+        return sensor, accel_mps2, distance_m
+    from scipy.signal import resample_poly  # takes a while to load
+
+    place = np.arange(ceil(len(accel_mps2) * ratio)) / float(ratio)
+    place = place[place <= len(accel_mps2) - 1]
+    readings = resample_poly(accel_mps2, ratio.numerator, ratio.denominator, padtype="line")[: len(place)]
+    noise_mps2 = sqrt(sensor.variance_mps2_2 * RATE_HZ / rate_hz)
+    return Sensor(noise_mps2, 0.0), readings, np.interp(place, np.arange(len(distance_m)), distance_m)
+
+
+def laid_anew(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
+    """Distances (n,) [m] by the speed (n,) [m/s], not decreasing, that keep to those given: the integral of the speed
+    plus the moving mean over 2 s of what they differ from it."""
+    driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed_mps[1:] + speed_mps[:-1]))]) / rate_hz
+    half = round(_SMOOTHED_S * rate_hz / 2)
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(distance_m - driven, half, mode="edge"))])
+    mean = (sums[2 * half + 1:] - sums[: -2 * half - 1]) / (2 * half + 1)
+    laid: Array = np.maximum.accumulate(driven + mean)
+    return laid
+
+
+def estimated(
+    structure: Structure, output: Output, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
+) -> tuple[Windows, RoadProfile | None]:
+    """Windows and road of a drive on the grid of 100 Hz, arrays (t,) as ``RoadEstimator.push`` takes them."""
+    pieces: list[RoadPiece] = []
+    estimator = RoadEstimator(structure, output, sensor, window_m, on_road=pieces.append)
+    count = len(reading_mps2)
+    found = estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
+    found += estimator.finish()
+    first = found[0].number if found else 0
+    edges_m: Array = window_m * np.arange(first, first + len(found) + 1, dtype=np.float64)
+    starts_m = np.array([piece.start_m for piece in pieces])
+    lengths_m = np.array([(len(piece.elevation_m) - 1) * piece.spacing_m for piece in pieces])
+    return Windows(
+        edges_m,
+        _mean_speed(edges_m[:-1], edges_m[1:], distance_m),
+        np.array([one.iri_m_per_km for one in found]),
+        np.array([one.iri_std_m_per_km for one in found]),
+        np.array([one.told for one in found]),
+        tuple(one.flags for one in found),
+    ), road_profile(pieces, _mean_speed(starts_m, starts_m + lengths_m, distance_m))
+
+
+def _mean_speed(begin_m: Array, end_m: Array, distance_m: Array) -> Array:
+    """Mean speed (n,) [m/s] between places (n,), by distances (t,) at 100 Hz."""
+    passed_s = np.interp([begin_m, end_m], distance_m, np.arange(len(distance_m)) / RATE_HZ)
+    speed_mps: Array = (end_m - begin_m) / (passed_s[1] - passed_s[0])
+    return speed_mps
+
+
+def exact_iri(edges_m: Array, elevation_m: Array, spacing_m: float, start_m: float) -> Array:
+    """IRI (n,) [m/km] between edges (n + 1,) on a profile that begins at ``start_m``; NaN for what is not all on it.
+
+    The Golden Car comes from where the car came from: a flat road before the profile. So the first windows differ from
+    the IRI of the profile alone, for which it starts with the profile's mean slope. A profile too coarse for the IRI
+    is the straight lines between its samples.
+    """
+    if spacing_m > _COARSEST_M:
+        parts = ceil(spacing_m / _COARSEST_M)
+        place = np.arange((len(elevation_m) - 1) * parts + 1) / parts
+        elevation_m, spacing_m = np.interp(place, np.arange(len(elevation_m)), elevation_m), spacing_m / parts
+    lead = ceil(START_M / spacing_m)
+    slope = rectified_slope(np.concatenate([np.full(lead, elevation_m[0]), elevation_m]), spacing_m)
+    begin_m, end_m = start_m - lead * spacing_m, start_m + (len(slope) - lead) * spacing_m
+    exact = np.full(len(edges_m) - 1, np.nan)
+    inside = np.flatnonzero((edges_m >= start_m) & (edges_m <= end_m))
+    if len(inside) > 1:
+        exact[inside[:-1]] = window_iri(slope, spacing_m, edges_m[inside] - begin_m)
+    return exact
+
+
+@dataclass(frozen=True)
+class Score:
+    """How estimates compare with exact values. r2 is 1 - mean(error^2) / var(exact); bias, relative, is of the mean;
+    then the shares of windows within one and two of their standard errors, 0.68 and 0.95 where those are right."""
+
+    windows: int
+    r2: float
+    bias: float
+    within_one: float
+    within_two: float
+
+
+def score(windows: Windows, exact: Array, which: npt.NDArray[np.bool_]) -> Score | None:
+    """For windows that are marked (n,), answered and have an exact IRI (n,); None when these do not differ."""
+    known = which & np.isfinite(windows.iri_m_per_km) & np.isfinite(exact)
+    error, truth = (windows.iri_m_per_km - exact)[known], exact[known]
+    if len(truth) == 0 or np.ptp(truth) == 0:
+        return None
+    in_errors = np.abs(error) / windows.iri_std_m_per_km[known]
+    return Score(
+        len(error),
+        float(1 - np.mean(error**2) / np.var(truth)),
+        float(np.mean(error) / np.mean(truth)),
+        float(np.mean(in_errors <= 1)),
+        float(np.mean(in_errors <= 2)),
+    )
+
+
+def local_level(iri_m_per_km: Array, window_m: float) -> Array:
+    """Mean IRI (n,) of the known ones within ``LEVEL_REACH_M`` of each window; NaN where there is none."""
+    reach = round(LEVEL_REACH_M / window_m)
+    known = np.isfinite(iri_m_per_km)
+    sums, counts = (
+        np.concatenate([[0.0], np.cumsum(row)]) for row in (np.where(known, iri_m_per_km, 0.0), known)
+    )
+    place = np.arange(len(iri_m_per_km))
+    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(iri_m_per_km))
+    count = counts[high] - counts[low]
+    return np.where(count > 0, (sums[high] - sums[low]) / np.maximum(count, 1), np.nan)
+
+
+def least_errors(limits: Limits, speed_mps: Array, level_m_per_km: Array) -> Array:
+    """R.m.s. error (n,) of the best possible IRI at these speeds on roads of these levels, both (n,), waviness 2.
+
+    NaN where the level is not known; no road is smoother than ``_SMOOTHEST_M_PER_KM``.
+    """
+
+    @cache
+    def least(speed_step: int, level_step: int) -> float:
+        spectrum = RoadSpectrum.of_iri(exp(level_step / _STEPS_PER_E))
+        return limits.at(exp(speed_step / _STEPS_PER_E), spectrum).std_m_per_km
+
+    known = np.isfinite(level_m_per_km)
+    level = np.maximum(level_m_per_km, _SMOOTHEST_M_PER_KM)
+    result = np.full(len(speed_mps), np.nan)
+    steps = (np.round(np.log(row[known]) * _STEPS_PER_E).astype(int).tolist() for row in (speed_mps, level))
+    result[known] = [least(speed, level) for speed, level in zip(*steps, strict=True)]
+    return result

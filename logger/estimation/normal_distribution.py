@@ -1,0 +1,91 @@
+"""Normal distribution without scipy: its integral, what rounding leaves of it, and its absolute value.
+
+The service must not import scipy (memory), so the error function is computed here, by the Chebyshev fit of Press et
+al., Numerical Recipes, 6.2: its relative error is below 1.2e-7 everywhere, also far out in the tail.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_CHEBYSHEV = (
+    -1.26551223, 1.00002368, 0.37409196, 0.09678418, -0.18628806, 0.27886807, -1.13520398, 1.48851587, -0.82215223,
+    0.17087277,
+)
+_LEAST_SHARE = 1e-200
+_LEAST_NARROWING = 1e-6
+
+
+def density(u: Array) -> Array:
+    """Standard normal density."""
+    return np.exp(-0.5 * u * u) / sqrt(2 * pi)
+
+
+def _tail(u: Array) -> Array:
+    """Probability beyond u >= 0."""
+    z = u / sqrt(2)
+    t = 1 / (1 + 0.5 * z)
+    series = np.full_like(t, _CHEBYSHEV[-1])
+    for coefficient in _CHEBYSHEV[-2::-1]:
+        series = coefficient + t * series
+    return 0.5 * t * np.exp(-z * z + series)
+
+
+def distribution(u: Array) -> Array:
+    """Standard normal distribution function, with a small relative error in the lower tail too."""
+    tail = _tail(np.abs(u))
+    return np.where(u > 0, 1 - tail, tail)
+
+
+def within(mean: Array, variance: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Mean and variance of a normal variable that is known to lie between two bounds; arrays of one shape.
+
+    The bounds may be infinite. The variance is never more than ``variance`` and never zero.
+    """
+    deviation = np.sqrt(variance)
+    below, above = (low - mean) / deviation, (high - mean) / deviation
+    mirrored = below > 0  # take the tail where the distribution function is small, not near one
+    below, above = np.where(mirrored, -above, below), np.where(mirrored, -below, above)
+    share = distribution(above) - distribution(below)
+    far = share < _LEAST_SHARE  # so far out that the variable sits at the near bound
+    share = np.where(far, 1.0, share)
+    at_below, at_above = density(below), density(above)
+    shift = np.where(far, above, (at_below - at_above) / share)
+    moment = np.where(np.isfinite(below), below, 0.0) * at_below - np.where(np.isfinite(above), above, 0.0) * at_above
+    narrowed = np.where(far, _LEAST_NARROWING, 1 + moment / share - shift * shift)
+    shift = np.where(mirrored, -shift, shift)
+    return mean + deviation * shift, variance * np.clip(narrowed, _LEAST_NARROWING, 1.0)
+
+
+def mean_absolute(mean: Array, deviation: Array) -> Array:
+    """Mean of |x| of a normal x (the folded normal distribution)."""
+    u = mean / deviation
+    return 2 * deviation * density(u) + mean * (2 * distribution(u) - 1)
+
+
+def variance_of_mean_absolute(mean: Array, deviation: Array, correlation: Array, weight: Array) -> float:
+    """Variance of the sum of weight_i |x_i| for jointly normal x in a row.
+
+    mean, deviation, weight    (n,)
+    correlation                (n,) of x_i and x_j, by their lag |i - j|
+
+    By the expansion of |x| in Hermite polynomials of its normal part: what is of order k goes with the correlation to
+    the power k. Orders 1 and 2 are exact; all that is left goes with the third power, so that no variance is lost.
+    """
+    u = mean / deviation
+    first = deviation * (2 * distribution(u) - 1)
+    second = sqrt(2) * deviation * density(u)
+    whole = mean**2 + deviation**2 - (sqrt(2) * second + u * first) ** 2  # its mean is as in mean_absolute
+    third = np.sqrt(np.maximum(whole - first**2 - second**2, 0.0))
+    total = 0.0
+    for power, term in enumerate((first, second, third), start=1):
+        weighted = weight * term
+        by_lag = np.correlate(weighted, weighted, mode="full")[len(weighted) - 1:]
+        by_lag[1:] *= 2  # a lag counts ahead and behind
+        total += float(by_lag @ correlation**power)
+    return max(total, 0.0)

@@ -1,0 +1,79 @@
+"""Quantisation: readings rounded to coarse steps, as readings with Gaussian noise that hold as much information.
+
+Problem. A BMA220 at +-2 g rounds to 0.61 m/s2, more than a smooth road shakes a car. Its error is not noise: a reading
+that stays on one step says that the acceleration stayed within it, one that toggles says that it is at the edge; taken
+as noise of step / sqrt(12), the first reads as no road and the second as a rough one, depending on where gravity
+happens to lie between two steps.
+
+Solution. Expectation propagation (Minka 2001; Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.6).
+What all other readings say of one acceleration is a Gaussian; with the bounds of its own reading it is a truncated
+one, whose mean and variance are known; the Gaussian reading that would have led to the same mean and variance takes
+its place. A few rounds with the solution of the whole stretch settle it. A reading at the end of the range is a bound
+on one side only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.normal_distribution import within
+from logger.estimation.sensor_noise import Sensor
+
+Array = npt.NDArray[np.float64]
+
+_KEPT = 0.3  # of the last round, so that rounds do not overshoot
+_MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
+
+
+@dataclass(frozen=True)
+class Readings:
+    """As Gaussian readings: values [m/s2] and variances [(m/s2)2], both (t,)."""
+
+    value_mps2: Array
+    variance: Array
+
+
+def first_guess(reading_mps2: Array, sensor: Sensor) -> Readings:
+    """Rounding as if it were noise."""
+    return Readings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
+
+
+def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array, Array]:
+    """Bounds of what was rounded; ``at_end`` (t,) is 1 for a reading at the top of the range, -1 at the bottom."""
+    low = np.where(at_end < 0, -np.inf, reading_mps2 - 0.5 * step_mps2)
+    high = np.where(at_end > 0, np.inf, reading_mps2 + 0.5 * step_mps2)
+    return low, high
+
+
+def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> float:
+    """Variance by which a solution misses its bounds (t,) more than noise would [(m/s2)2]: it is not settled yet, or
+    the car is not the one in the file. Without it such a solution would take every bound that it misses for a sharp
+    reading, and settle ever less."""
+    missed = np.maximum(np.maximum(low - fitted_mps2, fitted_mps2 - high), 0.0)
+    return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
+
+
+def improved(
+    readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: float, sensor: Sensor
+) -> Readings:
+    """One round.
+
+    low, high          (t,) bounds of each reading [m/s2]
+    fitted_mps2        (t,) what the solution with ``readings`` says of each acceleration
+    fitted_variance    of that [(m/s2)2]
+    """
+    noise = sensor.noise_rms_mps2**2
+    own = 1 / readings.variance
+    taken_out = np.minimum(own, _MOST_OWN / fitted_variance)
+    others = 1 / fitted_variance - taken_out
+    expected = (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others
+    spread = 1 / others + noise
+    mean, variance = within(expected, spread, low, high)
+    precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)
+    value = (mean / variance - expected / spread) / precision
+    new = 1 / (1 / precision + noise)
+    total = (1 - _KEPT) * new + _KEPT * own
+    return Readings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

@@ -1,0 +1,274 @@
+"""Streaming estimation of the road and its IRI while the car drives: blocks of readings, a few seconds behind.
+
+A block of 20 s is solved every 2 s (``road_solver``), with what was learnt of road and sensor so far
+(``recursive_road``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
+the body's slow swing, still tell of a road already driven; windows longer than 10 m are made of several stretches.
+Splitting the readings differently changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import ceil, hypot, nan, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.iri_posterior import (
+    SlopeErrors,
+    WindowIri,
+    raised,
+    reading_noise_psd,
+    told_share,
+    unseen_share,
+    window_iri,
+)
+from logger.estimation.recursive_road import FollowedRoad
+from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import RATE_HZ, Samples
+from logger.vehicle.structure import Output, Structure
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+BLOCK_SAMPLES = 2048
+HOP_SAMPLES = 200
+LAG_S = 4.0
+FAINT_BELOW = 0.2
+VEHICLE_ERROR = 0.05
+SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
+_LONGEST_PIECE_M = 10.0
+_REMEMBERED_M = 6.0
+_SPACING_M = 0.155
+_FIRST_SAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class WindowEstimate:
+    """IRI of one window of travelled distance, [number, number + 1) windows from 0.
+
+    iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
+                        this speed, ``unsettled`` next to the start of the readings or a hole in them
+    iri_std_m_per_km    its standard error [m/km], NaN likewise
+    told                share of the variance of the IRI's slope that the readings tell, 0 to 1
+    """
+
+    number: int
+    iri_m_per_km: float
+    iri_std_m_per_km: float
+    told: float
+    flags: frozenset[str]
+
+
+@dataclass(frozen=True)
+class RoadPiece:
+    """Estimated elevations (p,) [m] at ``start_m + k spacing_m``; the last point is the next piece's first.
+
+    The elevations of two pieces may differ by a slow wave that the readings do not tell. Waves from ``shortest_m`` to
+    ``longest_m`` are told by the readings for more than half of their variance; both are NaN if none is.
+    """
+
+    start_m: float
+    spacing_m: float
+    elevation_m: Array
+    shortest_m: float
+    longest_m: float
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """What a stretch of road that is at most 10 m long gave; ``missing`` says why nothing."""
+
+    iri: WindowIri
+    told: float
+    missing: str = ""
+
+
+class RoadEstimator:
+    """Readings of a body accelerometer in, IRI of windows out, some seconds late.
+
+    structure    the car
+    output       the motion of it that is read: an acceleration
+    sensor       noise and step of the readings
+    window_m     length of a window [m]
+    place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
+    vehicle_error    share that each axle's gain may be off: readings are not trusted beyond it, which keeps waves that
+                 lift one axle while the other sinks from being made too much of
+    on_road      is given each piece of estimated road
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        output: Output,
+        sensor: Sensor,
+        window_m: float,
+        place_std_m: float = 0.0,
+        vehicle_error: float = VEHICLE_ERROR,
+        on_road: Callable[[RoadPiece], None] | None = None,
+    ) -> None:
+        self._car = CarResponse(structure, output)
+        self._sensor = sensor
+        self._place_std_m = place_std_m
+        self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
+        self._piece_m = window_m / self._pieces_per_window
+        self._points = ceil(self._piece_m / _SPACING_M)
+        self._spacing_m = self._piece_m / self._points
+        self._on_road = on_road
+        self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
+        self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
+        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error)
+        self._start_anew()
+
+    def _start_anew(self) -> None:
+        self._waiting = Samples.unread(0, 0.0, 0.0)
+        self._heard = 0
+        self._samples: Samples | None = None
+        self._road.start_anew()
+        self._next = 0
+        self._gathered: list[_Piece] = []
+
+    def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
+        """More readings, arrays (n,) on an unbroken grid of 100 Hz.
+
+        reading_mps2    up positive; gravity may be in it; anything where it is not usable
+        usable          there is a reading
+        at_end          1 where it is at the top of the sensor's range, -1 at the bottom, else 0
+        distance_m      where the front axle is [m], not decreasing
+
+        Returns the windows that have become certain, in order and without gaps, from the first whole one on.
+        """
+        waiting = self._waiting.then(self._readable(reading_mps2, usable, at_end, distance_m))
+        estimates: list[WindowEstimate] = []
+        taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
+        for low in range(0, taken, HOP_SAMPLES):
+            estimates += self._hop(waiting.part(low, low + HOP_SAMPLES))
+        self._waiting = waiting.part(taken, len(waiting))
+        return estimates
+
+    def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> Samples:
+        """What is not usable may be any number, NaN too; it has no weight. Nor has what stands at an end of the range,
+        unless readings are taken as bounds."""
+        if not self._sensor.is_coarse:
+            usable = usable & (at_end == 0)
+        return Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
+
+    def finish(self) -> list[WindowEstimate]:
+        """The end of a drive: the windows that were driven to their end. What is pushed later is another drive."""
+        last = self._waiting if len(self._waiting) else self._samples
+        estimates: list[WindowEstimate] = []
+        if last is not None:
+            count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
+            after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
+            self._heard = _FIRST_SAMPLES
+            estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
+        self._start_anew()
+        return estimates
+
+    def _hop(self, fresh: Samples) -> list[WindowEstimate]:
+        if self._samples is None:
+            self._samples = Samples.unread(BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m)
+            windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
+            self._next = windows * self._pieces_per_window
+        self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
+        self._road.move_on(fresh)
+        self._heard += len(fresh)
+        if not self._road.begun and self._heard < _FIRST_SAMPLES:
+            return []
+        due = list(self._due(self._samples))
+        return self._estimates(self._samples, due) if due else []
+
+    def _due(self, samples: Samples) -> Iterator[int]:
+        """Numbers of the pieces that the car is far enough past."""
+        passed_m = samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
+        while (self._next + 1) * self._piece_m <= passed_m:
+            yield self._next
+            self._next += 1
+
+    def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
+        """Solve the block and take the pieces that are due."""
+        block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
+        read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
+        if block.seen_points(read) < self._points:
+            unread = [_nothing(self._why_none(samples, number)) for number in due]
+            return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
+        solved = self._road.solved(block, samples, read)
+        slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
+        elevation = np.fft.irfft(solved.road, block.count)
+        unseen = unseen_share(block.seen(read), self._spacing_m)
+        estimates: list[WindowEstimate] = []
+        for number in due:
+            low = round((number * self._piece_m - block.start_m) / self._spacing_m)
+            inside = slice(low, low + self._points + 1)
+            speed_mps = self._speed_mps(samples, number)
+            if low < 0 or speed_mps is None:
+                piece = _nothing(self._why_none(samples, number))
+            else:
+                # The slope remembers the road shortly before a piece.
+                back = round(_REMEMBERED_M / self._spacing_m)
+                level = self._road.level_at(number * self._points - back, back + self._points + 1)
+                piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
+                self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
+            estimates += self._window(number, piece)
+        return estimates
+
+    def _speed_mps(self, samples: Samples, number: int) -> float | None:
+        return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
+
+    def _why_none(self, samples: Samples, number: int) -> str:
+        """The flag of a piece without an estimate: driven before the block began, or too slowly, or not read."""
+        gone = (number + 1) * self._piece_m <= samples.distance_m[0]
+        return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"
+
+    def _piece(
+        self,
+        slope: Array,
+        unseen: Array,
+        speed_mps: float,
+        variance: float,
+        spectrum: RoadSpectrum,
+        log_level_std: float,
+    ) -> _Piece:
+        knowledge = self._errors.at(speed_mps, spectrum, variance)
+        louder = self._errors.at(speed_mps, raised(spectrum), variance)
+        told = knowledge.told * (1 - float(unseen.mean()))
+        missing = "" if told >= FAINT_BELOW else "faint" if knowledge.told < FAINT_BELOW else "unsettled"
+        return _Piece(window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m), told, missing)
+
+    def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
+        """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
+        road's level, which they share, adds."""
+        self._gathered.append(piece)
+        if len(self._gathered) < self._pieces_per_window:
+            return []
+        pieces, self._gathered = self._gathered, []
+        told = sum(one.told for one in pieces) / len(pieces)
+        flags = frozenset(one.missing for one in pieces if one.missing)
+        if flags:
+            return [WindowEstimate(number // self._pieces_per_window, nan, nan, told, flags)]
+        iri = [one.iri for one in pieces]
+        own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
+        shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
+        mean = sum(one.iri_m_per_km for one in iri) / len(iri)
+        misplaced = self._place_std_m * sum(one.change_per_m for one in iri) / len(iri)
+        std = hypot(own, shared, misplaced)
+        return [WindowEstimate(number // self._pieces_per_window, mean, std, told, flags)]
+
+    def _give_road(
+        self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum
+    ) -> None:
+        if self._on_road is None:
+            return
+        noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
+        seen = told_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
+        told = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
+        shortest_m, longest_m = (1 / told[-1], 1 / told[0]) if len(told) else (nan, nan)
+        self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
+
+
+def _nothing(missing: str) -> _Piece:
+    return _Piece(WindowIri(nan, nan, nan, nan), 0.0, missing)

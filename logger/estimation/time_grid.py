@@ -1,0 +1,54 @@
+"""Time grid of the estimator: readings at even instants, cut and joined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+RATE_HZ = 100.0
+SLOWEST_MPS = 1.0
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Arrays (n,) as ``RoadEstimator.push`` takes them."""
+
+    reading_mps2: Array
+    usable: Bools
+    at_end: Array
+    distance_m: Array
+
+    def __len__(self) -> int:
+        return len(self.usable)
+
+    def part(self, low: int, high: int) -> Samples:
+        """Samples ``low`` ... ``high - 1``."""
+        return Samples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
+
+    def then(self, later: Samples) -> Samples:
+        """These and the ones after them."""
+        both = ((getattr(self, name), getattr(later, name)) for name in self.__dataclass_fields__)
+        return Samples(*(np.concatenate(pair) for pair in both))
+
+    @classmethod
+    def unread(cls, count: int, until_m: float, step_m: float) -> Samples:
+        """Nothing was read while the car came up to ``until_m``, ``step_m`` further with each sample."""
+        distance_m = until_m - step_m * np.arange(count, 0, -1.0)
+        return cls(np.zeros(count), np.zeros(count, dtype=np.bool_), np.zeros(count), distance_m)
+
+    @property
+    def mean_step_m(self) -> float:
+        """From sample to sample [m]; 0 for a single one."""
+        return float(self.distance_m[-1] - self.distance_m[0]) / max(len(self) - 1, 1)
+
+    def speed_mps(self, begin_m: float, end_m: float) -> float | None:
+        """Mean speed between two places while the car moved; None when it is slower than anything can be told at."""
+        low, high = np.searchsorted(self.distance_m, [begin_m, end_m])
+        steps_m = np.diff(self.distance_m[max(low - 1, 0):high + 1])
+        moving = steps_m > SLOWEST_MPS / RATE_HZ
+        return float(steps_m[moving].mean()) * RATE_HZ if moving.sum() > 0.5 * len(steps_m) else None

@@ -1,0 +1,25 @@
+"""Places on the ground some kilometres apart at most: the sphere laid flat where the first one is."""
+
+from __future__ import annotations
+
+from math import cos, hypot, radians
+
+EARTH_RADIUS_M = 6_371_008.8
+"""Mean radius of the Earth, (2 a + b) / 3 of its ellipsoid (IUGG; H. Moritz, Geodetic Reference System 1980)."""
+
+
+def east_deg(from_lon_deg: float, lon_deg: float) -> float:
+    """How far east one longitude lies of another, the short way round: -180 up to 180 [degrees]."""
+    return (lon_deg - from_lon_deg + 180.0) % 360.0 - 180.0
+
+
+def ground_distance_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_deg: float) -> float:
+    """Distance of two near places [m]."""
+    east_rad = radians(east_deg(lon0_deg, lon1_deg)) * cos(radians(lat0_deg))
+    return EARTH_RADIUS_M * hypot(radians(lat1_deg - lat0_deg), east_rad)
+
+
+def east_and_north_m(lat_deg: float, lon_deg: float, lat0_deg: float, lon0_deg: float) -> tuple[float, float]:
+    """How far east and north of a near place 0 another one lies [m]."""
+    return (EARTH_RADIUS_M * radians(east_deg(lon0_deg, lon_deg)) * cos(radians(lat0_deg)),
+            EARTH_RADIUS_M * radians(lat_deg - lat0_deg))

@@ -1,0 +1,140 @@
+"""What drives over one and the same obstacle have in common beside it, and what that does to the standard errors.
+
+Problem: three drives over one bump meet the same roughness around it three times. Each residual looks like that of a
+road of its own, and a fit that takes the three for independent believes its average too much: at one speed its standard
+errors are too small by the root of three.
+
+Solution: the noise model says what a road leaves in each drive, so it also says what one and the same road leaves in
+two of them, at whatever speeds: between drives i and j, a way dx apart on the road,
+
+    C_ij(dx) = Re int Gd(n) H_i(n v_i) H_j(n v_j)* exp(2 pi j n dx) dn.
+
+How much of that the whitened residuals really have in common is asked of them (a share from 0 to 1), and the
+covariance of the estimates is the one that correlated residuals give: A (sum S_i' R_ij S_j) A, with R_ij the share of
+whitened C_ij and A the covariance of independent ones. The estimates themselves stay what they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.noise_models import ROAD_LEVEL, Whitener
+from logger.identification.prediction_error_fit import Fit
+from logger.roads.iso8608 import displacement_psd
+from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.models import structure_of
+from logger.vehicle.simulate import recorder_gain
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_MOST_SAMPLES, _BEFORE_SAMPLES = 1500, 300
+_GRID_STEP_M, _GRID_SAMPLES = 0.02, 32_768
+_SLOWEST_MPS = 0.5
+_CERTAIN = 4.0  # standard deviations of what independent roads have in common by chance
+
+
+@dataclass(frozen=True, eq=False)
+class CommonRoughness:
+    """What drives have in common.
+
+    fit       the fit, its covariance and standard errors those of drives that have this in common
+    share     of the roughness that one road would give them in common: 0 for roads of their own
+    growth    the largest ratio of a standard error to that of roads of their own
+    """
+
+    fit: Fit
+    share: float
+    growth: float
+
+
+def with_common_roughness(model: VehicleModel, fit: Fit) -> CommonRoughness:
+    """A fit whose standard errors count what its drives have in common, where they are several over one obstacle, or
+    one profile, and what is left is a road's."""
+    alone = CommonRoughness(fit, 0.0, 1.0)
+    level = fit.noise.levels.get(ROAD_LEVEL, 0.0)
+    if level <= 0 or not may_have_common(model):
+        return alone
+    values = np.array(list(fit.parameters.values()))
+    slopes = np.split(fit.sensitivities, np.cumsum([len(one) for one in fit.white])[:-1])
+    drives = [_drive(model, fit, values, run, slopes[run]) for run in range(len(model.records))]
+    likeness = size = 0.0
+    crossed = np.zeros((len(values), len(values)))
+    for second, other in enumerate(drives):
+        for one in drives[:second]:
+            common = level * _common(one, other)
+            likeness += float(one.white @ common @ other.white)
+            size += float((common**2).sum())
+            part = one.slopes.T @ common @ other.slopes
+            crossed += part + part.T
+    if likeness < _CERTAIN * np.sqrt(size):
+        return alone
+    share = min(likeness / size, 1.0)
+    scale = np.array([value if one.by_factors else (one.high - one.low) / 2
+                      for one, value in zip(fit.free, values, strict=True)])
+    independent = np.linalg.pinv(fit.sensitivities.T @ fit.sensitivities, hermitian=True)
+    wider = fit.covariance + share * np.outer(scale, scale) * (independent @ crossed @ independent)
+    variances = np.maximum(np.diag(wider), np.diag(fit.covariance))
+    np.fill_diagonal(wider, variances)
+    errors = np.sqrt(variances)
+    growth = float((errors / np.sqrt(np.diag(fit.covariance))).max())
+    told = replace(fit, covariance=wider, correlation=wider / np.outer(errors, errors),
+                   standard_errors=dict(zip(fit.parameters, errors.tolist(), strict=True)))
+    return CommonRoughness(told, share, growth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Drive:
+    """The stretch of a drive that is looked at: true way from the obstacle [m], whitened residuals (n,), whitened
+    derivatives (n, p), what whitens, and the sensor's response (k,) to waves of the road."""
+
+    way_m: Array
+    white: Array
+    slopes: Array
+    whitener: Whitener
+    response: Complex
+
+
+def may_have_common(model: VehicleModel) -> bool:
+    """Whether there are several drives whose roads are told to be alike."""
+    first = model.records[0].track
+    alike = [one.track.start_m == first.start_m and np.array_equal(one.track.elevation_m, first.elevation_m)
+             for one in model.records]
+    return len(alike) > 1 and all(alike)
+
+
+def _drive(model: VehicleModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Drive:
+    record, road = model.records[run], model.road_with(values, run)
+    start_m = min((one.start_m for one in road.obstacles.values()), default=0.0)
+    way_m = fit.low_pass.apply(record.distance_m[record.first:]) / road.speed_scale - start_m
+    first = max(0, int(np.argmax(way_m >= 0)) - _BEFORE_SAMPLES) if road.obstacles else 0
+    stretch = slice(first, first + _MOST_SAMPLES)
+    speed_mps = max(float(np.median(record.speed_mps[record.first:])) / road.speed_scale, _SLOWEST_MPS)
+    vehicle = model.vehicle_with(values)
+    f_hz = np.maximum(_waves_cpm() * speed_mps, 1e-3)
+    response = body_acceleration_response(structure_of(vehicle), f_hz, speed_mps, vehicle.sensor)
+    gain = recorder_gain(f_hz / record.rate_hz) * fit.low_pass.gain(np.minimum(f_hz, record.rate_hz / 2))
+    return _Drive(way_m[stretch], fit.white[run][stretch], slopes[stretch], fit.noise.whiteners[run], response * gain)
+
+
+def _common(one: _Drive, other: _Drive) -> Array:
+    """What a road of Gd(n0) = 1 cm3 gives the whitened residuals of two drives in common: covariances (n, m)."""
+    n = _waves_cpm()
+    psd = np.append(0.0, displacement_psd(n[1:], 1.0))
+    by_distance = np.fft.irfft(psd * one.response * other.response.conj()) / (2 * _GRID_STEP_M)
+    apart = (one.way_m[:, None] - other.way_m) / _GRID_STEP_M
+    cell = np.floor(apart)
+    part = apart - cell
+    index = cell.astype(int) % len(by_distance)
+    following = (index + 1) % len(by_distance)
+    plain = (1 - part) * by_distance[index] + part * by_distance[following]
+    return other.whitener(one.whitener(plain).T).T
+
+
+def _waves_cpm() -> Array:
+    """Wave numbers up to what the grid holds [1/m]."""
+    return np.asarray(np.fft.rfftfreq(_GRID_SAMPLES, _GRID_STEP_M), dtype=np.float64)

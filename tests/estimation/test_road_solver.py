@@ -1,0 +1,313 @@
+"""The solution of a block against time-domain simulation, dense linear algebra and the textbook Wiener filter."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from logger.estimation.car_response import CarResponse, golden_car_slope
+from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, _fft_length
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.shipped import vehicle_file
+from logger.store.vehicle_file import read_vehicle
+from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import Structure, body_point
+
+RATE_HZ, SPACING_M, ALIGN_M = 100.0, 0.1524, 7.62
+ROAD = RoadSpectrum.of_iri(3.0)
+
+
+def car(name: str) -> Structure:
+    return structure_of(read_vehicle(vehicle_file(name)))
+
+
+@cache
+def time_grid(name: str, count: int, ahead_m: float = 0.0) -> TimeGrid:
+    structure = car(name)
+    return TimeGrid(CarResponse(structure, body_point(structure, ahead_m)), count, RATE_HZ)
+
+
+def way(count: int, speeds_mps: list[float], rate_hz: float = RATE_HZ) -> np.ndarray:
+    """Distances of a drive whose speed is a smooth curve through values spread evenly over it, from 1234.5 m on."""
+    time_s = np.arange(count) / rate_hz
+    speed = np.polyval(np.polyfit(np.linspace(0, time_s[-1], len(speeds_mps)), speeds_mps, len(speeds_mps) - 1), time_s)
+    return 1234.5 + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) / rate_hz)])
+
+
+def a_block(name: str = "rav4-2009", count: int = 1024, speeds_mps: list[float] | None = None) -> Block:
+    return Block(time_grid(name, count), way(count, speeds_mps or [20.0, 20.0]), SPACING_M, ALIGN_M)
+
+
+def a_road(block: Block, rng: np.random.Generator, spectrum: RoadSpectrum = ROAD) -> np.ndarray:
+    """rfft of a random road of the spectrum on the block's grid."""
+    white = np.fft.rfft(rng.standard_normal(block.count))
+    return white * block.wave_factors(spectrum)
+
+
+def even(block: Block) -> np.ndarray:
+    """As rough everywhere."""
+    return np.ones(block.count)
+
+
+def uneven(block: Block) -> np.ndarray:
+    """Relative variances of a road with smooth and rough stretches and a pothole."""
+    place = SPACING_M * np.arange(block.count)
+    variance = 4.0 ** np.sin(place / 9.0)
+    variance[(place > 60) & (place < 61)] = 300.0
+    return variance
+
+
+def weights(count: int, deviation: float = 0.06) -> np.ndarray:
+    weight = np.full(count, deviation**-2.0)
+    weight[:round(ENTRY_S * RATE_HZ)] = 0.0
+    return weight
+
+
+@pytest.mark.parametrize(
+    ("name", "ahead_m"), [("golden-car", 0.0), ("rav4-2009", 0.0), ("rav4-2009", 1.1), ("rav4-2009-full", -0.6)]
+)
+@pytest.mark.parametrize("speeds_mps", [[20.0, 20.0], [8.0, 14.0, 25.0], [22.0, 12.0, 16.0]])
+def test_driving_against_a_simulation_in_time(name: str, ahead_m: float, speeds_mps: list[float]) -> None:
+    """The car's state equations integrated by scipy at 2 kHz, on a road of some sines that is known between samples."""
+    count, finer = 1024, 20
+    structure = car(name)
+    grid = time_grid(name, count, ahead_m)
+    block = Block(grid, way(count, speeds_mps), SPACING_M, ALIGN_M)
+    harmonics = np.round(block.count * SPACING_M / np.array([31.0, 11.0, 4.3, 2.1, 1.3])).astype(int)
+    amplitudes, phases = np.array([20e-3, 8e-3, 3e-3, 1e-3, 0.3e-3]), np.array([0.3, 1.1, 2.7, 4.0, 5.5])
+    road = np.zeros(block.count // 2 + 1, dtype=complex)
+    road[harmonics] = 0.5 * block.count * amplitudes * np.exp(1j * phases)
+
+    fine = np.interp(np.arange((count - 1) * finer + 1) / finer, np.arange(count), way(count, speeds_mps))
+    n = harmonics / (block.count * SPACING_M)
+    patch = amplitudes * np.sinc(n * structure.contact_patch_m)
+    under = np.stack([
+        (patch * np.cos(2 * np.pi * n * (fine[:, None] - behind - block.start_m) + phases)).sum(axis=1)
+        for behind in structure.behind_m
+    ], axis=1)
+    a, b = structure.state_space()
+    c, d = structure.output_matrices([body_point(structure, ahead_m)])
+    exact = lsim((a, b, c, d), under, np.arange(len(fine)) / (RATE_HZ * finer))[1].reshape(len(fine))[::finer]
+    found = block.driven(road)
+    settled = slice(450, count - 50)  # both start in a way of their own, and a block's end meets its beginning
+    assert np.abs(found - exact)[settled].max() < 0.015 * np.abs(exact[settled]).max()
+    assert (found - exact)[settled].std() < 0.005 * exact[settled].std()
+
+
+@pytest.mark.parametrize("name", ["golden-car", "rav4-2009", "rav4-2009-full"])
+def test_the_transpose_is_one(name: str) -> None:
+    """<A r, v> = <r, A' v> for random r and v, with a halt in between."""
+    rng = np.random.default_rng(0)
+    distance_m = way(1024, [25.0, 4.0, 12.0])
+    distance_m[500:700] = distance_m[500]
+    distance_m[700:] = distance_m[500] + distance_m[700:] - distance_m[700]
+    block = Block(time_grid(name, 1024), distance_m, SPACING_M, ALIGN_M)
+    road, row = rng.standard_normal(block.count), rng.standard_normal(1024)
+    back = np.fft.irfft(block.transposed(row), block.count)
+    assert block.driven(np.fft.rfft(road)) @ row == pytest.approx(road @ back, rel=1e-10)
+
+
+def dense(block: Block, spectrum: RoadSpectrum) -> np.ndarray:
+    """B (t, count) by driving over every unit of white road."""
+    factor = block.wave_factors(spectrum)
+    unit = np.fft.rfft(np.eye(block.count), axis=1)
+    return np.array([block.driven(row * factor) for row in unit]).T
+
+
+@cache
+def small_problem() -> tuple[Block, np.ndarray, np.ndarray, np.ndarray]:
+    """A block of 6.4 s at changing speed, its dense matrix, readings with gravity and tilt, weights with a hole."""
+    rng = np.random.default_rng(5)
+    block = a_block(count=640, speeds_mps=[9.0, 14.0, 12.0])
+    matrix = dense(block, ROAD)
+    reading = matrix @ rng.standard_normal(block.count) + 9.81 + 0.05 * np.linspace(-1, 1, 640)
+    weight = weights(640) * rng.uniform(0.5, 2.0, 640)
+    weight[400:430] = 0.0
+    return block, matrix, reading + rng.normal(0, 0.06, 640), weight
+
+
+@pytest.mark.parametrize(("variance_of", "steps"), [(even, 200), (uneven, 700)])
+def test_the_solution_is_that_of_dense_algebra_with_drift(
+    variance_of: Callable[[Block], np.ndarray], steps: int
+) -> None:
+    block, matrix, reading, weight = small_problem()
+    variance = variance_of(block)
+    grid = time_grid("rav4-2009", 640)
+    both = np.hstack([matrix, grid.drift])
+    precision = np.concatenate([1 / variance, grid.drift_precision])
+    exact = np.linalg.solve(both.T @ (weight[:, None] * both) + np.diag(precision), both.T @ (weight * reading))
+    found = block.solve(reading, weight, ROAD, variance, steps)
+    assert np.fft.irfft(found.waves, block.count) == pytest.approx(exact[:block.count], abs=1e-6)
+    assert found.drift_mps2 == pytest.approx(grid.drift @ exact[block.count:], abs=1e-6)
+    assert found.fitted_mps2 == pytest.approx(both @ exact, abs=1e-6)
+    assert found.road == pytest.approx(found.waves * block.wave_factors(ROAD))
+
+
+def test_more_steps_get_nearer_and_going_on_is_no_start_anew() -> None:
+    """In the Golden Car's slope on the whole block, against the settled solution."""
+    block, _, reading, weight = small_problem()
+    exact = block.solve(reading, weight, ROAD, even(block), 200)
+
+    def off(waves: np.ndarray) -> float:
+        slopes = (waves - exact.waves) * block.wave_factors(ROAD) * golden_car_slope(block.wave_number_cpm)
+        return float(np.linalg.norm(slopes))
+
+    few, more, most = (block.solve(reading, weight, ROAD, even(block), steps).waves for steps in (8, 16, 40))
+    further = block.solve(reading, weight, ROAD, even(block), 8, few).waves
+    none = off(np.zeros_like(few))
+    assert 0.25 * none > off(few) > off(more) > off(most) and off(most) < 0.02 * none
+    assert off(further) < 0.7 * off(few)
+
+
+def test_a_change_of_spectrum_keeps_the_road() -> None:
+    block = a_block()
+    waves = np.fft.rfft(np.random.default_rng(1).standard_normal(block.count))
+    other = RoadSpectrum.of_iri(9.0, 1.7)
+    there = block.same_road(waves, ROAD, other)
+    assert there * block.wave_factors(other) == pytest.approx(waves * block.wave_factors(ROAD), rel=1e-12)
+
+
+def test_an_innovation_is_a_step_where_it_stands() -> None:
+    """Where the waviness is 2, slopes are white: a spectrum G n^-2 is that of steps of sqrt(G (2 pi)^2 spacing / 2)."""
+    block = a_block(speeds_mps=[8.0, 8.0])  # slow enough for all waves of the grid
+    white = np.zeros(block.count)
+    white[500] = 1.0
+    elevation = np.fft.irfft(np.fft.rfft(white) * block.wave_factors(ROAD), block.count)
+    step_m = np.sqrt(ROAD.psd(np.ones(1))[0] * (2 * np.pi) ** 2 * SPACING_M / 2)
+    assert elevation[503:508].mean() - elevation[493:498].mean() == pytest.approx(step_m, rel=0.05)
+    assert np.argmax(np.abs(np.gradient(elevation))) == 500
+
+
+@pytest.mark.parametrize("hop", [100, 200])
+def test_what_an_earlier_block_found_is_a_head_start(hop: int) -> None:
+    rng = np.random.default_rng(8)
+    count, distance_m = 2048, way(2048 + hop, [6.0, 15.0, 10.0, 14.0])
+    parts = [slice(0, count), slice(hop, hop + count)]
+    earlier, later = (Block(time_grid("rav4-2009", count), distance_m[part], SPACING_M, ALIGN_M) for part in parts)
+    whole = Block(time_grid("rav4-2009", count + hop), distance_m, SPACING_M, ALIGN_M)
+    reading = whole.driven(a_road(whole, rng)) + rng.normal(0, 0.06, count + hop)
+    found = [block.solve(reading[part], weights(count), ROAD, even(block), 60).waves
+             for block, part in zip((earlier, later), parts, strict=True)]
+    start = later.carried_over(earlier, found[0])
+    assert start.shape == found[1].shape
+    inside = slice(*((distance_m[[hop + 500, hop + count - 300]] - later.start_m) / SPACING_M).astype(int))
+
+    def slope(waves: np.ndarray) -> np.ndarray:
+        golden = golden_car_slope(later.wave_number_cpm) * later.wave_factors(ROAD)
+        return np.fft.irfft(waves * golden, later.count)[inside]
+
+    cold, warm = (
+        later.solve(reading[parts[1]], weights(count), ROAD, even(later), 4, one).waves for one in (None, start)
+    )
+    assert np.std(slope(warm) - slope(found[1])) < 0.5 * np.std(slope(cold) - slope(found[1]))
+
+
+def test_blocks_that_do_not_overlap_hand_nothing_over() -> None:
+    near = a_block()
+    far = Block(time_grid("rav4-2009", 1024), way(1024, [20.0, 20.0]) + 5000.0, SPACING_M, ALIGN_M)
+    waves = np.fft.rfft(np.ones(near.count))
+    assert not far.carried_over(near, waves).any()
+    assert not near.carried_over(far, np.fft.rfft(np.ones(far.count))).any()
+
+
+@pytest.mark.parametrize("garbage", [0.0, 1e3, -1e6])
+def test_readings_without_weight_change_no_bit(garbage: float) -> None:
+    block, _, reading, weight = small_problem()
+    other = np.where(weight > 0, reading, garbage)
+    one, two = (block.solve(row, weight, ROAD, uneven(block), 6) for row in (reading, other))
+    assert (one.waves == two.waves).all() and (one.fitted_mps2 == two.fitted_mps2).all()
+
+
+def test_no_readings_give_the_flat_road() -> None:
+    block, _, reading, _ = small_problem()
+    found = block.solve(reading, np.zeros(640), ROAD, uneven(block), 6)
+    assert not found.waves.any() and not found.fitted_mps2.any() and not found.gain.any()
+
+
+@pytest.mark.parametrize("speed_mps", [6.0, 14.0, 31.0, 45.0])
+def test_at_a_steady_speed_it_is_the_wiener_filter(speed_mps: float) -> None:
+    """Where both ends are far, the slope of the Golden Car on the road as estimated wave by wave."""
+    rng = np.random.default_rng(2)
+    count = 2048 if speed_mps > 10 else 8192  # the wheelbase's notches are filled from far along the road
+    block = Block(time_grid("rav4-2009", count), way(count, [speed_mps] * 2), SPACING_M, ALIGN_M)
+    reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, count)
+    found = block.solve(reading, np.full(count, 0.06**-2), ROAD, even(block), 40)
+
+    f_hz = np.fft.rfftfreq(count, 1 / RATE_HZ)
+    seen = (f_hz > 0) & (f_hz <= 42.0)
+    gain = np.zeros(len(f_hz), dtype=complex)
+    gain[seen] = body_acceleration_response(car("rav4-2009"), f_hz[seen], speed_mps)
+    psd = ROAD.psd(f_hz / speed_mps)
+    noise_psd = 2 * 0.06**2 / RATE_HZ * speed_mps
+    wiener = np.conj(gain) * psd / (np.abs(gain) ** 2 * psd + noise_psd)
+    golden = golden_car_slope(f_hz / speed_mps)
+    expected = np.fft.irfft(np.fft.rfft(reading) * wiener * golden, count)
+    slope = np.fft.irfft(found.road * golden_car_slope(block.wave_number_cpm), block.count)
+    place = (way(count, [speed_mps] * 2) - block.start_m) / SPACING_M
+    middle = slice(count // 3, 2 * count // 3)
+    there = np.interp(place[middle], np.arange(block.count), slope)
+    assert (there - expected[middle]).std() < 0.03 * expected[middle].std()
+
+
+def test_gain_is_the_information_of_a_steady_speed() -> None:
+    """Signal over noise of each wave, |H|^2 S / N."""
+    block = a_block(speeds_mps=[20.0, 20.0])
+    gain = block.solve(np.zeros(1024), np.full(1024, 0.06**-2), ROAD, even(block), 1).gain
+    middle = (block.wave_number_cpm > 0.01) & (block.wave_number_cpm < 1.5)
+    n = block.wave_number_cpm[middle]
+    power = np.abs(body_acceleration_response(car("rav4-2009"), n * 20.0, 20.0)) ** 2
+    exact = power * ROAD.psd(n) / (2 * 0.06**2 / RATE_HZ * 20.0)
+    assert np.sum(gain[middle] / (1 + gain[middle])) == pytest.approx(np.sum(exact / (1 + exact)), rel=0.02)
+
+
+def test_seen_points_and_seen_places() -> None:
+    distance_m = way(640, [10.0, 10.0])
+    block = Block(time_grid("rav4-2009", 640), distance_m, SPACING_M, ALIGN_M)
+    read = np.zeros(640, dtype=bool)
+    read[250:600] = True
+    read[400:500] = False
+    seen = block.seen(read)
+    places = block.start_m + SPACING_M * np.arange(block.count)
+    inside = ((places > distance_m[250]) & (places < distance_m[399])) | (
+        (places > distance_m[500]) & (places < distance_m[599])
+    )
+    assert np.abs(seen - inside).sum() <= 6
+    passed_m = distance_m[599] - distance_m[500] + distance_m[399] - distance_m[250]
+    assert block.seen_points(read) == pytest.approx(passed_m / SPACING_M, abs=2)
+    assert block.seen_points(np.zeros(640, dtype=bool)) == 0 and not block.seen(np.zeros(640, dtype=bool)).any()
+
+
+def test_a_car_that_stands_all_the_time() -> None:
+    block = Block(time_grid("rav4-2009", 640), np.full(640, 50.0), SPACING_M, ALIGN_M)
+    assert not block.moving.any()
+    found = block.solve(np.full(640, 9.81), weights(640), ROAD, even(block), 6)
+    assert np.isfinite(found.road).all() and found.fitted_mps2 == pytest.approx(np.full(640, 9.81), abs=1e-3)
+
+
+def test_a_place_that_jumps_costs_no_short_waves() -> None:
+    """A single step of 4 m in the distance, as after a correction, leaves the rest of the road as it was."""
+    rng = np.random.default_rng(4)
+    distance_m = way(2048, [15.0, 15.0])
+    block = Block(time_grid("rav4-2009", 2048), distance_m, SPACING_M, ALIGN_M)
+    reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, 2048)
+    jumped = Block(time_grid("rav4-2009", 2048), distance_m + 4.0 * (np.arange(2048) > 1200), SPACING_M, ALIGN_M)
+    roads = [one.solve(reading, weights(2048), ROAD, even(one), 30).road for one in (block, jumped)]
+    slopes = [
+        np.fft.irfft(road * golden_car_slope(one.wave_number_cpm), one.count)
+        for one, road in zip((block, jumped), roads, strict=True)
+    ]
+    before = slice(*((distance_m[[500, 1000]] - block.start_m) / SPACING_M).astype(int))
+    assert np.std(slopes[0][before] - slopes[1][before]) < 0.05 * np.std(slopes[0][before])
+
+
+@pytest.mark.parametrize("least", [9.0, 100.2, 1024.0, 1025.0, 4700.0, 6000.5, 123_456.7])
+def test_lengths_are_even_long_enough_and_quick(least: float) -> None:
+    length = _fft_length(least)
+    assert least <= length <= 1.26 * least and length % 2 == 0
+    for prime in (2, 3, 5, 7):
+        while length % prime == 0:
+            length //= prime
+    assert length == 1
