@@ -28,17 +28,12 @@ RATE_ROUNDING = 1e-3
 SHORTEST_S = 1.0
 METHOD = "formula of the standard, magnitude and phase, by Fourier transform of the whole record"
 
-VERTICAL_AT_SEAT = "wk"
-HORIZONTAL_AT_SEAT = "wd"
-MOTION_SICKNESS = "wf"
-# Up to where a weighting's input counts (ISO 2631-1 clause 1): health and comfort, motion sickness [Hz].
-COUNTS_UP_TO_HZ = 80.0
-SICKNESS_UP_TO_HZ = 0.5
+USUAL = "wk"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="CSV with t_s,accel_z_mps2[,accel_x_mps2,accel_y_mps2]")
-    parser.add_argument("--weighting", default=VERTICAL_AT_SEAT, metavar="NAME",
+    parser.add_argument("--weighting", default=USUAL, metavar="NAME",
                         help="weighting of accel_z_mps2: wk (default), wd, wf, wc, we, wj or wb. With wk, accel_x_mps2 "
                              "and accel_y_mps2 are weighted by wd and combined with it")
     parser.add_argument("--daily-hours", type=float, metavar="H",
@@ -58,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
         raise BadInput(f"--daily-hours: expected more than 0 and at most 24 hours, found {args.daily_hours:g}")
     record = read_record(args.file)
     _check(record, str(args.file))
-    result = measure(record, weightings[args.weighting], weightings[HORIZONTAL_AT_SEAT], args.daily_hours)
+    weighting = weightings[args.weighting]
+    result = measure(record, weighting, weightings.get(weighting.horizontal), args.daily_hours)
     if args.json:
         print(json.dumps(as_json(result), allow_nan=False))
     else:
@@ -75,13 +71,17 @@ def _check(record: AccelerationRecord, file: str) -> None:
 
 @dataclass(frozen=True)
 class Measured:
-    """Figures by axis: ``z`` always, ``x`` and ``y`` where all three are combined."""
+    """Figures by axis, and what each was weighted by: ``z`` always, ``x`` and ``y`` where all three are combined."""
 
-    weighting: str
     rate_hz: float
     daily_hours: float
     axes: dict[str, AxisFigures]
+    by: dict[str, Weighting]
     left_out: bool
+
+    @property
+    def weighting(self) -> Weighting:
+        return self.by["z"]
 
     @property
     def vertical(self) -> AxisFigures:
@@ -90,21 +90,18 @@ class Measured:
     @property
     def health_factors(self) -> dict[str, float]:
         """By axis (ISO 2631-1 clause 7.2.3); empty where the weighting is none of health."""
-        from logger.comfort.iso2631 import HEALTH_FACTORS
-
-        if self.weighting == VERTICAL_AT_SEAT:
-            return {axis: k for axis, k in zip("xyz", HEALTH_FACTORS, strict=True) if axis in self.axes}
-        return {"z": HEALTH_FACTORS[0]} if self.weighting == HORIZONTAL_AT_SEAT else {}
+        if self.weighting.health_factor is None:
+            return {}
+        return {axis: k for axis in "xyz" if axis in self.by and (k := self.by[axis].health_factor) is not None}
 
     @property
     def unseen_from_hz(self) -> float | None:
         """Where the record ends and the weighting does not [Hz]; None when the record holds all that counts."""
-        counts_up_to_hz = SICKNESS_UP_TO_HZ if self.weighting == MOTION_SICKNESS else COUNTS_UP_TO_HZ
-        return self.rate_hz / 2 if self.rate_hz / 2 < counts_up_to_hz else None
+        return self.rate_hz / 2 if self.rate_hz / 2 < self.weighting.counts_up_to_hz else None
 
 
 def measure(
-    record: AccelerationRecord, weighting: Weighting, horizontal: Weighting, daily_hours: float | None
+    record: AccelerationRecord, weighting: Weighting, horizontal: Weighting | None, daily_hours: float | None
 ) -> Measured:
     """Weigh the axes of a record that belong together and take their figures."""
     from logger.comfort.iso2631 import axis_figures
@@ -112,23 +109,25 @@ def measure(
     axes = {"z": axis_figures(weighting.weigh(record.accel_z_mps2, record.rate_hz), record.rate_hz)}
     others = {"x": record.accel_x_mps2, "y": record.accel_y_mps2}
     measured = {axis: accel for axis, accel in others.items() if accel is not None}
-    combined = weighting.name == VERTICAL_AT_SEAT and len(measured) == len(others)
-    if combined:
+    by = {"z": weighting}
+    combined = horizontal is not None and len(measured) == len(others)
+    if horizontal is not None and combined:
         for axis, accel in measured.items():
             axes[axis] = axis_figures(horizontal.weigh(accel, record.rate_hz), record.rate_hz)
+            by[axis] = horizontal
     hours = daily_hours if daily_hours is not None else record.duration_s / 3600.0
-    return Measured(weighting.name, record.rate_hz, hours, axes, left_out=bool(measured) and not combined)
+    return Measured(record.rate_hz, hours, axes, by, left_out=bool(measured) and not combined)
 
 
 def as_json(result: Measured) -> dict[str, Any]:
     """The agreed fields of the vertical axis first, then what else there is; null where there is no such value."""
     vertical = _axis_json(result.vertical)
     first = ("a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor")
-    agreed = {"weighting": result.weighting, **{name: vertical.pop(name) for name in first},
+    agreed = {"weighting": result.weighting.name, **{name: vertical.pop(name) for name in first},
               "comfort": _word(result, result.vertical.a_w_mps2)}
     more = {"rate_hz": result.rate_hz, "duration_s": result.vertical.duration_s, **vertical,
             "method": METHOD, "unseen_from_hz": result.unseen_from_hz}
-    if result.weighting == MOTION_SICKNESS:
+    if result.weighting.is_sickness:
         more["msdv_mps15"] = _sickness_dose(result.vertical)
         more["report_beside_a_w"] = ["msdv"]
     if len(result.axes) > 1:
@@ -157,7 +156,7 @@ def _word(result: Measured, a_w_mps2: float) -> str | None:
     """Table 2.5 has no words for motion sickness."""
     from logger.comfort.iso2631 import comfort_word
 
-    return None if result.weighting == MOTION_SICKNESS else comfort_word(a_w_mps2)
+    return None if result.weighting.is_sickness else comfort_word(a_w_mps2)
 
 
 def _sickness_dose(figures: AxisFigures) -> float:
@@ -211,7 +210,7 @@ def _zone(zone: CautionZone, value: float, unit: str) -> dict[str, Any]:
 def screen(result: Measured, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
     lines = [f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
-             f"weighting {result.weighting.capitalize()}", ""]
+             f"weighting {result.weighting.name.capitalize()}", ""]
     heads = ("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4")
     lines.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
     for axis in sorted(result.axes):
@@ -224,27 +223,27 @@ def screen(result: Measured, name: str) -> list[str]:
               f"Method: {METHOD}; the mean is taken off."]
     if result.unseen_from_hz is not None:
         lines.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
-                     f"up to {COUNTS_UP_TO_HZ:g} Hz: the values are of what was recorded.")
+                     f"up to {result.weighting.counts_up_to_hz:g} Hz: the values are of what was recorded.")
     if result.left_out:
-        lines.append(f"Other axes are combined only with {VERTICAL_AT_SEAT.capitalize()}, x and y together; left out.")
+        lines.append(f"Other axes are combined only with {USUAL.capitalize()}, x and y together; left out.")
     return lines
 
 
 def _conclusions(result: Measured) -> list[str]:
     """What the figures come to: how it feels, which of them to use, what it does to health."""
     lines = []
-    if result.weighting == MOTION_SICKNESS:
+    if result.weighting.is_sickness:
         lines.append(f"Motion sickness dose: {_sickness_dose(result.vertical):.3f} m/s1.5.")
     elif len(result.axes) > 1:
         totals = _totals(result)
         lines.append(f"Feels {_spoken(totals['total_comfort'])}: {totals['total_a_w_mps2']:.3f} m/s2 over three axes.")
     else:
         lines.append(f"Feels {_spoken(_word(result, result.vertical.a_w_mps2))}.")
-    if result.weighting != MOTION_SICKNESS:
+    if not result.weighting.is_sickness:
         lines.append(_which_to_use(result))
     health = _health(result)
     if health is None:
-        return [*lines, f"Health: {result.weighting.capitalize()} is not a weighting of health."]
+        return [*lines, f"Health: {result.weighting.name.capitalize()} is not a weighting of health."]
     n2, n4, dose = (health["caution_zone"][name] for name in ("n2", "n4", "vdv"))
     return [
         *lines,

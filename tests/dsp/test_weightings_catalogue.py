@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from logger.comfort.iso2631 import HEALTH_FACTORS
 from logger.dsp.design import design_error, design_sections
 from logger.dsp.weightings.weighting import Weighting
 from logger.plugins import catalogue
@@ -141,3 +142,13 @@ def test_sections_for_other_rates_are_within_0_02_db(name: str, rate_hz: float) 
     error = design_error(weighting, design_sections(weighting, rate_hz), rate_hz, band_hz)
     print(f"{name} at {rate_hz:g} Hz: {error.magnitude_db:.4f} dB")
     assert error.magnitude_db < 0.02
+
+
+def test_each_says_itself_what_its_values_stand_for() -> None:
+    """ISO 2631-1 clauses 1, 7.2.3 and 9: which are of health, which of motion sickness, and up to where they count."""
+    assert {name: one.health_factor for name, one in WEIGHTINGS.items() if one.health_factor is not None} == {
+        "wk": HEALTH_FACTORS[2], "wd": HEALTH_FACTORS[0]}
+    assert [name for name, one in WEIGHTINGS.items() if one.is_sickness] == ["wf"]
+    assert {name: one.counts_up_to_hz for name, one in WEIGHTINGS.items() if one.counts_up_to_hz != 80.0} == {"wf": 0.5}
+    assert {name: one.horizontal for name, one in WEIGHTINGS.items() if one.horizontal} == {"wk": "wd"}
+    assert all(one.horizontal in WEIGHTINGS for one in WEIGHTINGS.values() if one.horizontal)

@@ -188,10 +188,10 @@ def test_nothing_waits_for_a_clock_or_a_network() -> None:
     assert not {"time-sync.target", "time-set.target", "network.target", "network-online.target"} & set(ordered.split())
 
 
-def test_devices_are_those_of_i2c_and_serial_ports() -> None:
+def test_devices_are_those_of_i2c_iio_and_serial_ports() -> None:
     assert settings(SERVICE)["DevicePolicy"] == settings(EXPORT)["DevicePolicy"] == ["closed"]
     assert {value.split()[0] for value in settings(SERVICE)["DeviceAllow"]} == {
-        "char-i2c", "char-ttyAMA", "char-ttyS", "char-ttyUSB", "char-ttyACM", "char-rfcomm"}
+        "char-i2c", "char-iio", "char-ttyAMA", "char-ttyS", "char-ttyUSB", "char-ttyACM", "char-rfcomm"}
 
 
 def rules() -> list[list[tuple[str, str, str]]]:

@@ -5,4 +5,4 @@ Source: ISO 2631-1:1997 Tables 1 and A.1; Table 2.7 of Blum (2015).
 
 from logger.dsp.weightings.weighting import Weighting
 
-WEIGHTING = Weighting("wd", f1_hz=0.4, f2_hz=100.0, f3_hz=2.0, f4_hz=2.0, q4=0.63)
+WEIGHTING = Weighting("wd", f1_hz=0.4, f2_hz=100.0, f3_hz=2.0, f4_hz=2.0, q4=0.63, health_factor=1.4)

@@ -39,6 +39,10 @@ class Weighting:
     f5, q5       zeros of the upward step; f6, q6 its poles
     sections     per sample rate [Hz], digital sections within 0.02 dB of the formula, DELAY_SAMPLES behind it
     gain         factor over all
+    is_sickness  its values are of motion sickness: the words for comfort do not fit them (clause 9)
+    health_factor    k of its axis for health (clause 7.2.3); None: it is none of health
+    horizontal   name of the weighting of x and y that are combined with a z weighted by this one; empty: none are
+    counts_up_to_hz    what lies above is no part of what it stands for (clause 1)
 
     A part whose frequencies are infinite is absent (f3 alone infinite: a transition without zero). Source: ISO
     2631-1:1997 Annex A; Eq 2.13-2.17 of Blum (2015). Eq 2.16 is misprinted there: the denominator of the upward step
@@ -57,6 +61,10 @@ class Weighting:
     q6: float = 1.0
     sections: Mapping[int, Sections] = field(default_factory=dict)
     gain: float = 1.0
+    is_sickness: bool = False
+    health_factor: float | None = None
+    horizontal: str = ""
+    counts_up_to_hz: float = 80.0
 
     def factors(self) -> tuple[tuple[Polynomial, Polynomial], ...]:
         """The weighting as a product of (numerator, denominator), polynomials in s [rad/s], highest power first.

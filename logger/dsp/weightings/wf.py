@@ -9,4 +9,5 @@ WEIGHTING = Weighting("wf",
     f1_hz=0.08, f2_hz=0.63,
     f4_hz=0.25, q4=0.86,
     f5_hz=0.0625, q5=0.80, f6_hz=0.1, q6=0.80,
+    is_sickness=True, counts_up_to_hz=0.5,
 )
