@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS
 from logger.vehicle.named_parameters import Free
 
@@ -22,8 +23,6 @@ Complex = npt.NDArray[np.complex128]
 GD_N0, WAVINESS, NOISE, OFFSET, SCALE = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m", "distance_scale"
 HUNDREDTH = 0.01
 """A scale of distances moves by hundredths."""
-_PIVOT_CPM = 0.2
-_FLATTENED_BELOW_CPM = 0.01
 
 
 class LinearCar(Protocol):
@@ -88,16 +87,16 @@ class RoadState:
 
 def displacement_psd_m3(level: float, waviness: float, wave_number_cpm: Array) -> Array:
     """Spectrum (k,) [m3] of a road whose level is given as in ``RoadState``; nothing at the first wave number, 0."""
-    psd = np.exp(level) * CM3_M3 * (np.maximum(wave_number_cpm, _FLATTENED_BELOW_CPM) / _PIVOT_CPM) ** -waviness
+    psd = np.exp(level) * CM3_M3 * (np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM) ** -waviness
     psd[0] = 0.0
     return np.asarray(psd)
 
 
 def by_waviness(wave_number_cpm: Array) -> Array:
     """Derivative (k,) of the logarithm of the spectrum by the waviness."""
-    return np.asarray(-np.log(np.maximum(wave_number_cpm, _FLATTENED_BELOW_CPM) / _PIVOT_CPM))
+    return np.asarray(-np.log(np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM))
 
 
 def at_n0(waviness: float) -> float:
     """Gd at n0 over Gd at the pivot."""
-    return float((REFERENCE_N0_CPM / _PIVOT_CPM) ** -waviness)
+    return float((REFERENCE_N0_CPM / PIVOT_CPM) ** -waviness)
