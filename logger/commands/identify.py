@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from logger.identification.prediction_error_fit import Fit, Options
     from logger.identification.record import Record
     from logger.identification.unknown_inputs import RoadInput
-    from logger.identification.unknown_road.marginal_likelihood import RoadFit
+    from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.vehicle.frequency_response import AxleResponse
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
@@ -169,7 +169,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, drives_of
     from logger.identification.unknown_inputs import RoadInput
-    from logger.identification.unknown_road.marginal_likelihood import fit_roads
+    from logger.identification.unknown_road.road_fit import fit_roads
     from logger.report.unknown_road_text import as_json, lines
     from logger.shipped import vehicle_path
     from logger.store.vehicle_file import read_vehicle
@@ -212,7 +212,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
 
 
 def _road_options(args: argparse.Namespace) -> Any:
-    from logger.identification.unknown_road.marginal_likelihood import Options
+    from logger.identification.unknown_road.road_state import Options
 
     unused = {"--bump": args.bump, "--step": args.step, "--low-pass": args.low_pass, "--robust": args.robust,
               "--tries": args.tries, "--noise": args.noise != "auto"}

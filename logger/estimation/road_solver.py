@@ -93,9 +93,7 @@ class Block:
         speed_mps = np.gradient(distance_m) * rate_hz
         # Not the highest speed: a single place that is wrong by metres must not cost the short waves of the block.
         self._highest_cpm = HIGHEST_HZ / max(float(np.quantile(speed_mps, _FAST_SHARE)), SLOWEST_MPS)
-        # Reading between two points by a straight line weakens short waves; the division makes up for it.
-        n = self.wave_number_cpm
-        self._averaged = np.sinc(n * car.contact_patch_m) / np.sinc(n * spacing_m) ** 2
+        self._averaged = patch_gain(self.wave_number_cpm, car.contact_patch_m, spacing_m)
         place = (distance_m - car.behind_m[:, None] - self.start_m) / spacing_m
         low = np.floor(place).astype(np.int64)
         self._front = low[0]
@@ -222,6 +220,14 @@ class Block:
         back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.by_axle), len(row))
         elevation = np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count)
         return np.fft.rfft(elevation) * self._averaged
+
+
+def patch_gain(wave_number_cpm: Array, contact_patch_m: float, spacing_m: float) -> Array:
+    """Gain (k,) from elevations on a grid to their mean over a contact patch, read by a straight line between points.
+
+    Such a reading weakens short waves; the division makes up for it.
+    """
+    return np.asarray(np.sinc(wave_number_cpm * contact_patch_m) / np.sinc(wave_number_cpm * spacing_m) ** 2)
 
 
 def _product(one: ComplexArray, other: ComplexArray) -> float:

@@ -18,7 +18,9 @@ from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, gd_n0_from_iri
 Array = npt.NDArray[np.float64]
 
 PIVOT_CPM = 0.2
+"""Where a level is counted: in the middle of the waves that shake a car."""
 FLATTENED_BELOW_CPM = 0.01
+"""Longer waves than ISO 8608 has (0.011 cycle/m) are as high as this one."""
 
 
 @dataclass(frozen=True)

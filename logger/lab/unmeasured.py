@@ -25,7 +25,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.unknown_road.drive_operator import Drive
-from logger.identification.unknown_road.marginal_likelihood import Options, RoadState, UnknownRoad
+from logger.identification.unknown_road.marginal_likelihood import UnknownRoad
+from logger.identification.unknown_road.road_state import Options, RoadState
 from logger.lab.candidates import scaled_by
 from logger.lab.fitting import LEAST_SHARE, Move, coordinates_of, moved, moves_of, steps_of
 from logger.lab.linear_response import Tabulated, response_of

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, RoadFit
+from logger.identification.unknown_road.fisher_scoring import RoadFit
+from logger.identification.unknown_road.road_state import GD_N0, NOISE, OFFSET
 from logger.report.identification_text import NORMAL_95
 from logger.vehicle.named_parameters import Free
 

@@ -25,7 +25,7 @@ from logger.identification.record import Record
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.drive_operator import Drive
-from logger.identification.unknown_road.marginal_likelihood import fit_roads
+from logger.identification.unknown_road.road_fit import fit_roads
 from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.shipped import vehicle_file

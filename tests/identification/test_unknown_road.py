@@ -10,7 +10,9 @@ import pytest
 
 from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, Options, RoadFit, _Problem, fit_roads
+from logger.identification.unknown_road.fisher_scoring import Problem, RoadFit
+from logger.identification.unknown_road.road_fit import fit_roads
+from logger.identification.unknown_road.road_state import GD_N0, NOISE, Options
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
@@ -97,13 +99,13 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     road = track(120.0, 2)
     drives = [driven(HALF, road, 12.0, 25.0, 1), driven(HALF, road, 20.0, 25.0, 2, 0.4)]
     options = Options(free_waviness=True, probes=40, scale_off=0.01)
-    problem = _Problem(response(HALF, MASS, DAMPERS), [drives], options)
+    problem = Problem(response(HALF, MASS, DAMPERS), [drives], options)
     x = problem.start()
     x[-2] = 0.3
     one = problem.roads[0]
 
     def covariance(at: Array) -> Array:
-        model = one._model(problem._at(at, problem.places[0]))
+        model = one.model(problem.state(at, problem.places[0]))
         unit = np.eye(one.grid.count)
         maps = [crossing.readings(crossing.under_axles(unit, waves), gains).T for crossing, waves, gains in
                 zip(one.crossings, model.waves, model.responses, strict=True)]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.road_solver import patch_gain
 from logger.vehicle.passage import smooth_length
 
 Array = npt.NDArray[np.float64]
@@ -87,9 +88,7 @@ class Crossing:
         self.speed_mps = np.maximum(np.abs(np.gradient(drive.distance_m)) * drive.rate_hz, _SLOWEST_MPS)
         n = grid.wave_number_cpm
         self.seen_cpm = _HIGHEST_OF_RATE * drive.rate_hz / float(np.quantile(self.speed_mps, _FAST_SHARE))
-        # Reading between two places by a straight line weakens short waves; the division makes up for it.
-        averaged = np.sinc(n * contact_patch_m) / np.sinc(n * grid.spacing_m) ** 2
-        self._averaged = np.where(n <= self.seen_cpm, averaged, 0.0)
+        self._averaged = np.where(n <= self.seen_cpm, patch_gain(n, contact_patch_m, grid.spacing_m), 0.0)
         self._lay(1.0)
 
     def laid(self, scale: float) -> Crossing:

@@ -1,0 +1,111 @@
+"""The equations of the most probable road, solved by conjugate gradients.
+
+Drives y = B w + noise over a road of innovations w: (1 + B' B / variance) w = B' y / variance. B is never formed: a
+drive is applied to a road, and back, by transforms. Preconditioned as if the drives were endless and their speeds even,
+or by a factor of the matrix itself, taken nearby.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.unknown_road.drive_operator import Crossing
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Preconditioner = Callable[[Array], Array]
+
+MOST_ROUNDS, _AT_ONCE = 150, 256
+
+
+@dataclass(frozen=True, eq=False)
+class DrivesModel:
+    """Drives over one road at one place of all numbers.
+
+    crossings      the drives
+    waves          (k,) for each: what makes a road as it lies under the drive out of innovations
+    responses      (x, k) for each, and their derivatives (p, x, k)
+    spectral       (k,) of the preconditioner for endless drives
+    variance       of the noise [(m/s2)2]
+    """
+
+    crossings: list[Crossing]
+    waves: list[Complex]
+    responses: list[Complex]
+    derivatives: list[Complex]
+    spectral: Array
+    variance: float
+
+    def of(self, drives: Sequence[int]) -> DrivesModel:
+        """Some of the drives."""
+        return DrivesModel([self.crossings[one] for one in drives], [self.waves[one] for one in drives],
+                           [self.responses[one] for one in drives], [self.derivatives[one] for one in drives],
+                           self.spectral, self.variance)
+
+    def readings(self, white: Array) -> list[Array]:
+        """Readings (b, n) of each drive over roads of innovations (b, count)."""
+        return [one.readings(one.under_axles(white, waves), response) for one, waves, response in
+                zip(self.crossings, self.waves, self.responses, strict=True)]
+
+    def back(self, readings: Sequence[Array], count: int) -> Array:
+        """The transpose of ``readings`` (b, count), over the variance."""
+        total = np.zeros((len(readings[0]), count))
+        for one, part, waves, response in zip(self.crossings, readings, self.waves, self.responses, strict=True):
+            total += one.back(part, waves, response)
+        return total / self.variance
+
+    def filtered(self, residual: Array) -> Array:
+        """About what solves the equations for a residual (b, count), were the drives endless and their speeds even."""
+        return np.asarray(np.fft.irfft(np.fft.rfft(residual) * self.spectral, residual.shape[1]))
+
+
+def factored(model: DrivesModel, count: int) -> Preconditioner:
+    """What solves the equations of a model, for those of a place nearby."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    normal = np.eye(count, dtype=np.float32)
+    for one, waves, response in zip(model.crossings, model.waves, model.responses, strict=True):
+        unit = np.eye(count)
+        rows = np.concatenate([one.readings(one.under_axles(unit[first : first + _AT_ONCE], waves), response)
+                               for first in range(0, count, _AT_ONCE)]).astype(np.float32)
+        rows /= np.float32(np.sqrt(model.variance))
+        normal += rows @ rows.T
+    factor = cho_factor(normal, lower=True, overwrite_a=True, check_finite=False)
+    return lambda residual: np.asarray(cho_solve(factor, residual.T.astype(np.float32), check_finite=False).T, float)
+
+
+def solve(model: DrivesModel, readings: Sequence[Array], count: int, solved: float, rounds: int | None = None,
+          preconditioner: Preconditioner | None = None) -> tuple[Array, list[Array], int]:
+    """Innovations (b, count) of the most probable roads, inv(C) times the readings (b, n) of each drive, and how many
+    rounds that took.
+
+    For all b at once, until what is left is ``solved`` of what it began with, or so many ``rounds``: slopes at
+    neighbouring places can be compared only if they come from as many.
+    """
+    condition = model.filtered if preconditioner is None else preconditioner
+    residual = model.back(readings, count)
+    white = np.zeros_like(residual)
+    unexplained = [one.copy() for one in readings]
+    direction, before = np.zeros_like(residual), np.full(len(residual), np.inf)
+    first, done = None, 0
+    while done < (MOST_ROUNDS if rounds is None else rounds):
+        conditioned = condition(residual)
+        size = (residual * conditioned).sum(axis=1)
+        first = size if first is None else first
+        if rounds is None and (size <= solved**2 * first).all():
+            break
+        done += 1
+        direction = conditioned + (size / before)[:, None] * direction
+        image = model.readings(direction)
+        curve = (direction**2).sum(axis=1) + sum((one**2).sum(axis=1) for one in image) / model.variance
+        step = (size / np.maximum(curve, 1e-300))[:, None]
+        white += step * direction
+        for one, part in zip(unexplained, image, strict=True):
+            one -= step * part
+        residual -= step * (direction + model.back(image, count))
+        before = np.maximum(size, 1e-300)
+    return white, [one / model.variance for one in unexplained], done
