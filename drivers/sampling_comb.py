@@ -34,7 +34,7 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
     longest_gap_us   usual time between two of the arrivals [us]
     lost_most        largest share of samples that may be lost
     """
-    if count < 2:
+    if count < 2 or slope_us <= 0:  # all of them at one moment have no period
         return None
     step_us = slope_us / count / STEPS_PER_CYCLE
     tried = int(slope_us * lost_most / step_us) - STEPS_PER_CYCLE

@@ -207,7 +207,7 @@ def test_what_was_flushed_can_be_read_while_recording(tmp_path: Path) -> None:
         ("9" * 30 + ".000000 bma220 000440\n", "six decimals"),
         ("9" * 5000 + ".000000 bma220 000440\n", "six decimals"),
         ("nan bma220 000440\n", "six decimals"),
-        ("0.020000 radar 000440\n", "bma220, pasco, nmea"),
+        ("0.020000 radar 000440\n", "bma220, iio, pasco, nmea"),
         ("0.020000 bma220 00044\n", "pairs of hex digits"),
         ("0.020000 bma220 00 440\n", "<t_s> <source> <hex>"),
         ("0.020000 bma220 0004zz\n", "pairs of hex digits"),
