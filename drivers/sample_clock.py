@@ -339,7 +339,8 @@ class SampleClock:
             slope_us = came_us
             off_us = [point.arrival_us - came_us * point.number for point in self._points]
             is_whole = len(off_us) == self.BLOCKS and max(off_us) - min(off_us) <= self._step_least_us
-            if is_whole and not self._shortest_us <= came_us <= self._longest_us:
+            is_rate = self._nominal_us / self.FASTEST <= came_us  # as all at one moment is none
+            if is_whole and is_rate and not self._shortest_us <= came_us <= self._longest_us:
                 self._expect(came_us, self.OTHER_TOLERANCE)
         elif spread_us > self._step_least_us and len(self._points) == self.BLOCKS:
             if self._found_us != self._nominal_us and came_us < self._nominal_us:
