@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.residual_whiteness import LAGS, autocorrelation
-from logger.lab.alignment import Alignment, aligned, constant, drift
+from logger.lab.likelihood.lag import Lags, constant, drift, lags
 from logger.lab.beside import BAND_NAMES, Beside, Located, Part, block_means, short_names
 from logger.lab.coherence import Coherence, with_road
 from logger.lab.force_map import Curve, ForceMap, Term, force_map
@@ -75,7 +75,7 @@ class Marks:
     marks: tuple[Mark, ...]
     coherence: Coherence
     forces: ForceMap
-    alignment: Alignment
+    alignment: Lags
 
     @property
     def found(self) -> tuple[Mark, ...]:
@@ -89,7 +89,7 @@ def read_marks(beside: Beside, where: Located, unmoved: Beside) -> Marks:
     where      where it sits
     unmoved    the same car on the distances as they were recorded, which alignment is asked of
     """
-    coherence, forces, alignment = with_road(beside), force_map(beside), aligned(unmoved)
+    coherence, forces, alignment = with_road(beside), force_map(beside), lags(unmoved.runs, unmoved.predictions)
     drifting = _drift(alignment)
     marks = (
         drifting, _shift(alignment, drifting), _whiteness(beside), _frequency(beside, where),
@@ -187,7 +187,7 @@ def _gain(beside: Beside) -> Mark:
                 f"(standard error {error:.1g}).")
 
 
-def _shift(alignment: Alignment, drifting: Mark) -> Mark:
+def _shift(alignment: Lags, drifting: Mark) -> Mark:
     """The same shift all the way; none where it grows on the way."""
     time, length, is_time = constant(alignment)
     ahead = "behind" if time.value > 0 else "ahead of"
@@ -203,7 +203,7 @@ def _shift(alignment: Alignment, drifting: Mark) -> Mark:
                 f"The measurement comes {ahead} the model by {words}.")
 
 
-def _drift(alignment: Alignment) -> Mark:
+def _drift(alignment: Lags) -> Mark:
     trend = drift(alignment)
     in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
     words = "ahead" if trend.value > 0 else "behind"

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.beside import Beside
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
@@ -29,7 +28,7 @@ _SLOWEST_MPS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Alignment:
+class Lags:
     """Windows (k,) of all runs in which the model and the measurement are alike.
 
     run           which run it is in
@@ -62,30 +61,26 @@ class Trend:
 UNKNOWN = Trend(float("nan"), float("nan"), float("nan"))
 
 
-def aligned(beside: Beside) -> Alignment:
-    """The windows of a model beside its measurements."""
-    return _aligned(beside.runs, beside.predictions)
-
-
-def _aligned(runs: Sequence[Run], predictions: Sequence[Array]) -> Alignment:
+def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
+    """The windows of runs beside a model's predictions (n,)."""
     rows: list[tuple[float, ...]] = []
     for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
         rows += _windows(number, run, prediction)
     table = np.array(rows).reshape(-1, 5).T
-    return Alignment(table[0].astype(np.intp), *table[1:])
+    return Lags(table[0].astype(np.intp), *table[1:])
 
 
 def followed_m(run: Run, prediction: Array) -> Array:
     """By how much the car seems to have been farther than a model of it (n,) [m], straight between windows in which
     both are alike; nothing where there are none."""
-    windows = _aligned([run], [prediction])
+    windows = lags([run], [prediction])
     if not len(windows.run):
         return np.zeros(run.count)
     places_m = np.maximum.accumulate(windows.along_m)
     return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))
 
 
-def drift(windows: Alignment) -> Trend:
+def drift(windows: Lags) -> Trend:
     """By how much the model gets ahead per length of road [m/m], each run beginning where it will."""
     runs = np.unique(windows.run)
     freedom = len(windows.run) - len(runs) - 1
@@ -95,7 +90,7 @@ def drift(windows: Alignment) -> Trend:
     return _slope(lag_m, along_m, freedom)
 
 
-def constant(windows: Alignment) -> tuple[Trend, Trend, bool | None]:
+def constant(windows: Lags) -> tuple[Trend, Trend, bool | None]:
     """By how much the model is ahead all the way [s], [m], and whether it is rather the one time (True) or the one
     length (False); None: the speeds do not tell."""
     freedom = len(windows.run) - 1

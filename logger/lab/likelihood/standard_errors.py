@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import Problem, Slopes, State, Weighed
+from logger.lab.likelihood.map_fit import MapFit, effect_slopes
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
 
@@ -22,24 +22,21 @@ _TINY_STEP = 1e-4
 _SINGULAR = 1e-10
 
 
-def with_spread(problem: Problem, state: State, slopes: Slopes) -> tuple[tuple[Chosen, ...], Array]:
-    """The effects of a fitted state with standard errors, and those of the logarithms of the car's numbers (p,), by
-    slopes that were taken near it.
+def standard_errors(found: MapFit) -> tuple[tuple[Chosen, ...], Array]:
+    """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
 
-    Both hold what was granted beforehand: a number that the runs say nothing of is as uncertain as it was.
+    Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
+    linear, state = found.linear, found.state
     moves = moves_of(state.effects)
-    weighed = Weighed(problem, slopes.around(state), problem.whiteners(state))
-    information = weighed.information
-    if moves:
-        information = weighed.bordered(information, weighed.effect_slopes(state, moves))
-    size = np.sqrt(np.diag(information))
+    own = linear.whitened(effect_slopes(linear, state.effects, state.logs, moves, state.predictions)) if moves else None
+    information = linear.information(np.zeros_like(state.logs), own)  # the prior's width, not its wall's
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
     scale = np.where(seen, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=_SINGULAR, hermitian=True)
     deviations = np.where(seen, np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale, np.inf)
-    return (with_errors(state.effects, moves, deviations[weighed.count:]),
-            deviations[: len(problem.nuisance.names)])
+    return with_errors(state.effects, moves, deviations[linear.count:]), deviations[: linear.count]
 
 
 def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array) -> tuple[Chosen, ...]:

@@ -1,0 +1,254 @@
+"""Effects tried on a model without a fit: would this one explain the residuals, and with which numbers?
+
+Problem: most effects do nothing at their null and something quite different at each of their values, so that a slope at
+zero strength says little about them (a shape such as a knee or a frequency has no meaning there). Solution: each is
+simulated at a few trial values; what the car's own numbers and the distance errors could do as well is projected out
+(a score test), and the trial that explains most, at the strength at which it does, is where a fit begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import MapFit, aligned
+from logger.lab.likelihood.noise_floor import gain_of_an_explanation
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.runs import Run
+from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved
+from logger.vehicle.named_parameters import read
+
+Array = npt.NDArray[np.float64]
+
+# How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
+# next to nothing.
+_STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
+_WORTH_ALIGNING = 0.004
+"""Of an alignment that only has to tell which start is likelier, a round that gains a smaller share is the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A fitted model that effects are tried on.
+
+    found             the fit
+    score             minus twice the log of its evidence
+    rough             predictions of a rough simulation, for comparing with others
+    residuals         whitened (kept,) per run
+    objective         their squares, and the cost of what is off
+    covariance        (p, p) of the car's numbers
+    newton_step       (p,) what is left of the way to where these fit best
+    explanation       what a full explanation of the residuals would gain
+    """
+
+    found: MapFit
+    score: float
+    rough: list[Array]
+    residuals: list[Array]
+    objective: float
+    covariance: Array
+    newton_step: Array
+    explanation: float
+
+    @staticmethod
+    def of(found: MapFit) -> Baseline:
+        """From a fit."""
+        linear, state = found.linear, found.state
+        here = linear.eliminated(state.predictions)
+        # The wall's force is in the gradient; its curvature is left out, or no trial could bring a number back from it.
+        covariance = np.linalg.inv(linear.information(np.zeros_like(state.logs)))
+        return Baseline(found, linear.score, _roughly(linear, state.effects, state.logs), here.residuals,
+                        here.squares + found.posterior.prior.cost(state.logs), covariance,
+                        covariance @ linear.gradient(here.residuals, state.logs),
+                        gain_of_an_explanation(found.posterior, state))
+
+    @property
+    def posterior(self) -> Posterior:
+        """That which was fitted."""
+        return self.found.posterior
+
+    @property
+    def linear(self) -> LinearModel:
+        """The model beside its state."""
+        return self.found.linear
+
+    @property
+    def state(self) -> State:
+        """The model."""
+        return self.found.state
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect at one set of values, and what it would do.
+
+    gain      by how much minus twice the log of the evidence would fall, its numbers not counted
+    logs      (p,) where the car's numbers are then
+    change    what it does to the predictions at its values (n,), per run [m/s2]
+    start     where a fit begins, if the runs lie elsewhere with it; None: beside the baseline
+    """
+
+    one: Chosen
+    gain: float
+    logs: Array
+    change: list[Array]
+    start: State | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves."""
+
+    effect: Effect
+    trials: tuple[Trial, ...]
+
+    @property
+    def gain(self) -> float:
+        """Of the most promising one."""
+        return self.trials[0].gain
+
+
+def screened(base: Baseline, effect: Effect, seen: Misalignment) -> Screened:
+    """Trials of an effect on a model."""
+    trials = effect.trials(seen)
+    prior = base.posterior.prior
+    known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
+    if known:  # where a fit has brought the car's own numbers is worth a trial
+        car = prior.vehicle(base.posterior.vehicle, base.state.logs)
+        trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
+    nominal = np.zeros_like(base.state.logs)
+    bent = prior.at_the_wall(base.state.logs)
+    best: dict[tuple[float, ...], Trial] = {}
+    for values in trials:
+        choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
+        one = chosen(effect, values)
+        found = [_beside(base, one, base.state.logs) if effect.replaces else _trial(base, one)]
+        if bent:  # numbers that are bent towards what an effect does say little of what it does
+            found.append(_beside(base, one, nominal))
+        if not effect.reshapes and values is not trials[0]:
+            found.append(_aligned_anew(base, one, found[0]))
+        trial = max(found, key=lambda one: one.gain)
+        if choice not in best or trial.gain > best[choice].gain:
+            best[choice] = trial
+    return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)))
+
+
+def _roughly(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
+    return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
+
+
+def _trial(base: Baseline, one: Chosen) -> Trial:
+    """A trial at the strength at which it explains most."""
+    linear, state = base.linear, base.state
+    there = _roughly(linear, (*state.effects, one), state.logs)
+    change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    white = linear.whitened(change)
+    here = state.logs + base.newton_step
+    mixed, own = linear.mixed(white)
+    absorbed = base.covariance @ mixed
+    along = sum(float(c @ r) for c, r in zip(white, base.residuals, strict=True)) - float(mixed @ base.newton_step)
+    own -= float(mixed @ absorbed)
+    if not own > 0:
+        return Trial(one, 0.0, here, change)
+    strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
+    strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
+    scaled = scaled_by(one, strength)
+    whole = Trial(one, 2 * along - own, here - absorbed, change)
+    if scaled is None:
+        return whole
+    shared = Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed,
+                   change)
+    if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
+        return shared
+    # A resonance that is half as strong lies elsewhere, and may do something else altogether.
+    return max((_as_predicted(base, trial) for trial in (shared, whole)), key=lambda trial: trial.gain)
+
+
+def _as_predicted(base: Baseline, trial: Trial) -> Trial:
+    """The same with the gain that it truly has, the car's numbers counted to first order: sensors are tried on one body
+    then."""
+    linear, state = base.linear, base.state
+    there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
+    step = trial.logs - state.logs
+    moved_there = [one + step @ columns for one, columns in zip(there, base.found.numbers, strict=True)]
+    return replace(trial, gain=base.objective - linear.objective(moved_there, trial.logs))
+
+
+def _beside(base: Baseline, one: Chosen, logs: Array) -> Trial:
+    """A trial as it is, in a car with these numbers (p,), which then take one step of Newton's; those that the effect
+    sets are held at their nominal values."""
+    prior = base.posterior.prior
+    linear = base.linear.holding(one.effect.replaces)
+    logs = np.where(np.isin(prior.names, one.effect.replaces), 0.0, logs)
+    there = _roughly(linear, (*base.state.effects, one), logs)
+    found = linear.eliminated(there)
+    pull = linear.gradient(found.residuals, logs)
+    step = np.linalg.solve(linear.information(np.zeros_like(logs)), pull)
+    change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    gain = base.objective - found.squares - prior.cost(logs) + float(pull @ step)
+    return Trial(one, gain, logs + step, change)
+
+
+def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
+    """A trial with the distance errors fitted anew from the distances as they were recorded: where positions are wrong,
+    those that were fitted without it are worth nothing."""
+    posterior = base.posterior
+    start = aligned(posterior, posterior.at((*base.state.effects, one), base.state.logs), _WORTH_ALIGNING)
+    return replace(trial, one=one, gain=base.score - LinearModel(posterior, start).score, logs=start.logs, start=start)
+
+
+def scaled_by(one: Chosen, strength: float) -> Chosen | None:
+    """The effect at a share of its strength: of the way from its null to where it stands; None if it has no null."""
+    for place, parameter in enumerate(one.effect.parameters):
+        if parameter.null is None or not parameter.moves:
+            continue
+        move = Move(0, place)
+        null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
+        here = float(coordinates_of([one], [move])[0])
+        return moved([one], [move], np.array([null + strength * (here - null)]))[0]
+    return None
+
+
+def misalignment(posterior: Posterior, state: State) -> Misalignment:
+    """How the runs would have to be moved against the model to fit it best: all of them by one factor of their
+    distance, or by one time. Both are looked for in the slow part of the motion, whose waves are long."""
+    pairs: list[tuple[Run, Array, Array]] = []
+    for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
+        size = max(1, round(_SMOOTH_S * run.rate_hz))
+        hat = np.hanning(size + 2)[1:-1]
+        slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, predicted)]
+        pairs.append((run, slow[0], slow[1]))
+
+    def alike(scale: float, delay_s: float) -> float:
+        """Products of the measurement and the model, moved, over what they are at most."""
+        both = of = 0.0
+        for run, measured, predicted in pairs:
+            time_s = np.arange(run.count) / run.rate_hz
+            rising = np.maximum.accumulate(run.distance_m) + 1e-9 * time_s
+            at_s = np.interp(run.distance_m / scale, rising, time_s) - delay_s
+            moved_mps2 = np.interp(at_s, time_s, predicted)[run.first:]
+            kept = measured[run.first:]
+            both += float(kept @ moved_mps2)
+            of += float(np.sqrt((kept @ kept) * (moved_mps2 @ moved_mps2)))
+        return both / of if of > 0 else 0.0
+
+    still = alike(1.0, 0.0)
+    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), _WIDEST, _SCALE_STEP)
+    delay_s = _scanned(lambda off: alike(1.0, off), _LATEST_S, _DELAY_STEP_S)
+    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0)
+
+
+_SMOOTH_S = 0.2
+_WIDEST, _SCALE_STEP, _LATEST_S, _DELAY_STEP_S = 0.08, 5e-4, 1.5, 0.02
+
+
+def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:
+    """Where something is largest between -reach and reach, looked for in steps and then in tenths of a step."""
+    count = round(reach / step)
+    middle = max((step * k for k in range(-count, count + 1)), key=alike)
+    return max((middle + 0.1 * step * k for k in range(-10, 11)), key=alike)

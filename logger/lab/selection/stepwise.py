@@ -1,0 +1,171 @@
+"""The search for effects that a model lacks: add, swap, drop, while the evidence gains.
+
+Problem: something differs, and twenty effects, alone or together, might be why; or none of them; or nothing. Solution:
+every effect is screened beside the model, the promising ones are fitted, and the one with the most evidence is added if
+noise alone would hardly gain as much in so many trials and imitations do not. Then each of the others is taken out:
+whatever gains most in its place stays, or nothing. The next round begins on that model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
+from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
+from logger.lab.selection.screening import Baseline, Screened, screened
+from logger.vehicle.effect import Effect, Misalignment
+
+Progress = Callable[[str], None]
+
+MOST_EFFECTS = 4
+"""No more than so many are looked for."""
+_MOST_FITTED, _MOST_REFINED = 6, 3
+_WORTH_FITTING, _WORTH_REFINING = 0.03, 0.7
+"""Of the gain of the best one: an effect that promises less is not fitted, or not with slopes of its own."""
+_WORTH_A_ROUND = 0.02
+"""A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
+where much is still to be found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """All effects tried on a model: those that were fitted, best first, and what the others promised."""
+
+    fits: tuple[CandidateFit, ...]
+    promises: tuple[Screened, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What the search came to.
+
+    before     the model without effects that it lacks
+    now        with those that were chosen
+    gains      what each of these gains beside the others, by name, the most first
+    rivals     effects that explain as well in the place of each, by name
+    first      the first round
+    steps      names of the effects that were added, with the model as it was then
+    """
+
+    before: Baseline
+    now: Baseline
+    gains: dict[str, float]
+    rivals: dict[str, tuple[str, ...]]
+    first: Round
+    steps: tuple[tuple[str, Baseline], ...]
+
+
+@dataclass(eq=False)
+class Search:
+    """A search among effects, on models that have ``present`` others before them."""
+
+    effects: Sequence[Effect]
+    present: int
+    seen: Misalignment
+    progress: Progress = lambda words: None
+    workers: int = 2
+    _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def run(self, before: Baseline) -> Selection:
+        """From a model without effects that it lacks."""
+        now, first = before, None
+        steps: list[tuple[str, Baseline]] = []
+        while len(now.state.effects) - self.present < MOST_EFFECTS:
+            self.progress(f"round {len(steps) + 1}")
+            tried = self.round(now, [one for one in self.effects if one.name not in now.state.names])
+            first = first or tried
+            best = next((one for one in tried.fits if self.accepted(now, one)), None)
+            if best is None:
+                break
+            self.progress(f"{best.effect.name} is missing; fitting the car with it")
+            self._rivals[best.effect.name] = self._alike(best.gain, best.effect.name, tried)
+            now = self._refit(best)
+            earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
+            steps.append((best.effect.name, now))
+            for name in earlier:
+                now, _ = self._reconsidered(now, name)
+        now, gains = self._needed(before, now)
+        assert first is not None
+        rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
+        return Selection(before, now, gains, rivals, first, tuple(steps))
+
+    def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
+        """Every effect tried on a model."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            promises: list[Screened] = []
+            for done, one in enumerate(pool.map(lambda effect: screened(now, effect, self.seen), effects), 1):
+                self.progress(f"screened {done} of {len(effects)} effects")
+                promises.append(one)
+            promises.sort(key=lambda one: -one.gain)
+            least = _WORTH_FITTING * promises[0].gain if promises else 0.0
+            worth = [one for one in promises[:_MOST_FITTED] if one.gain > least]
+            self.progress(f"fitting {len(worth)} of them")
+            rough = [tries[0] for tries in pool.map(lambda one: roughly_fitted(now, one), worth)]
+            rough.sort(key=lambda one: -one.gain)
+            near = [one for one in rough[:_MOST_REFINED] if one.gain > _WORTH_REFINING * rough[0].gain]
+            self.progress(f"refining {len(near)} of them")
+            fine = list(pool.map(lambda one: refined(now, one, _WORTH_A_ROUND * now.explanation), near))
+        fits = sorted([*fine, *(one for one in rough if one not in near)], key=lambda one: -one.gain)
+        fitted = {one.effect.name for one in fits}
+        return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
+
+    def accepted(self, now: Baseline, one: CandidateFit) -> bool:
+        """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
+        return (one.gain > max(least_gain(len(self.effects)), IMITATION * now.explanation)
+                and not one.chosen.at_an_end)
+
+    def without(self, now: Baseline, name: str) -> Baseline:
+        """A model without one of its effects, fitted."""
+        rest = tuple(one for one in now.state.effects if one.effect.name != name)
+        away = next(one for one in now.state.effects if one.effect.name == name)
+        posterior = now.posterior
+        if away.effect.realigns:
+            return Baseline.of(fit(posterior, aligned(posterior, posterior.at(rest, now.state.logs))))
+        start = posterior.at(rest, now.state.logs, now.state.record, now.state.size)
+        return Baseline.of(fit(posterior, start, now.found.numbers, worth=_WORTH_A_ROUND * now.explanation))
+
+    def _refit(self, one: CandidateFit) -> Baseline:
+        posterior = one.found.posterior
+        return Baseline.of(fit(posterior, aligned(posterior, one.found.state), one.found.numbers))
+
+    def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
+        """The model with whatever gains most in the place of an effect, which may be the same effect elsewhere; and
+        what it gains."""
+        self.progress(f"is {name} still what it was?")
+        without = self.without(now, name)
+        gain = without.score - now.score
+        tried = self.round(without, [one for one in self.effects
+                                     if one.name == name or one.name not in now.state.names])
+        best = next((one for one in tried.fits if self.accepted(without, one)), None)
+        if best is not None and best.gain > gain + CONFUSED:
+            now, gain = self._refit(best), best.gain
+            self._rivals.pop(name, None)
+            name = best.effect.name
+        self._rivals[name] = self._alike(gain, name, tried)
+        return now, gain
+
+    def _alike(self, gain: float, name: str, tried: Round) -> tuple[str, ...]:
+        """Effects that explain as well as one that gains so much."""
+        return tuple(one.effect.name for one in tried.fits
+                     if one.effect.name != name and abs(one.gain - gain) < CONFUSED and not one.chosen.at_an_end)
+
+    def _needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
+        """The model without effects that are not needed beside the others, and what each of these gains."""
+        names = list(now.state.names[self.present:])
+        if len(names) == 1:
+            return now, {names[0]: before.score - now.score}
+        gains: dict[str, float] = {}
+        while names:
+            self.progress(f"are all of {', '.join(names)} needed?")
+            with ThreadPoolExecutor(self.workers) as pool:
+                others = dict(zip(names, pool.map(lambda name: self.without(now, name), names), strict=True))
+            gains = {name: other.score - now.score for name, other in others.items()}
+            least = min(gains, key=lambda name: gains[name])
+            if len(names) == 1 or gains[least] > least_gain(len(self.effects)):
+                break
+            now = others[least]
+            names.remove(least)
+        return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
