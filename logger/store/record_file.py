@@ -53,6 +53,11 @@ class AccelerationRecord:
         """Every sample stands for one step of time [s]."""
         return len(self.accel_z_mps2) / self.rate_hz
 
+    @property
+    def by_axis(self) -> dict[str, Array | None]:
+        """The accelerations by axis: ``z``, ``x``, ``y``."""
+        return {"z": self.accel_z_mps2, "x": self.accel_x_mps2, "y": self.accel_y_mps2}
+
 
 def read_record(path: Path | str) -> AccelerationRecord:
     """Read a CSV record with the columns ``t_s`` and ``accel_z_mps2``, perhaps ``accel_x_mps2`` and ``accel_y_mps2``.
