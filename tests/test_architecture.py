@@ -17,7 +17,7 @@ TREES = {
 }
 FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable",
-    "dsp", "comfort", "profiles", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
+    "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
     "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
 )
@@ -26,7 +26,7 @@ NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "vehicle", "roads",
+    "errors", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle", "roads",
     "estimation", "files", "shipped", "plugins", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""

@@ -18,8 +18,8 @@ from logger.commands.lab_runs import check_record, thinned_runs
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
-    from logger.lab.prediction import Run
     from logger.lab.unmeasured_diagnosis import Found
+    from logger.runs import Run
     from logger.store.drive_file import Drive
 
 _SHOWN = 8
@@ -62,8 +62,8 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
     """The drives in some folders. BadInput for fewer than two, or one that the others cannot be used with."""
     import numpy as np
 
-    from logger.lab.prediction import Run
     from logger.profiles.track import Track
+    from logger.runs import Run
     from logger.store.drive_file import DRIVE, read_drive
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:

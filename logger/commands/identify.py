@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from logger.identification.frequency_domain_model import VehicleModel
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.prediction_error_fit import Fit, Options
-    from logger.identification.record import Record
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
+    from logger.runs import Run
     from logger.vehicle.frequency_response import AxleResponse
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
@@ -149,7 +149,7 @@ def _measured(args: argparse.Namespace) -> int:
 
 
 def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced: list[str],
-           records: list[Record]) -> VehicleModel:
+           records: list[Run]) -> VehicleModel:
     from logger.identification.frequency_domain_model import VehicleModel
     from logger.identification.session import obstacle_starts
 
@@ -294,7 +294,7 @@ def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
     return name, values
 
 
-def _records(args: argparse.Namespace, flat_will_do: bool) -> list[Record]:
+def _records(args: argparse.Namespace, flat_will_do: bool) -> list[Run]:
     """The runs, on their roads or where that will do on a flat one. BadInput for files that are not what they should
     be, runs too short, and rates that differ."""
     from logger.identification.session import UnusableRun, check_records, off_rate
@@ -311,24 +311,25 @@ def _records(args: argparse.Namespace, flat_will_do: bool) -> list[Record]:
     return records
 
 
-def _record(path: Path, skip_s: float, flat_will_do: bool) -> Record:
+def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     import numpy as np
 
-    from logger.identification.record import Record
     from logger.identification.session import LEAST_SAMPLES
     from logger.profiles.track import Track
-    from logger.store.drive_file import DRIVE, PROFILE, Run, read_drive, read_run
+    from logger.runs import Run
+    from logger.store.drive_file import DRIVE, PROFILE, read_drive, read_run
+    from logger.store.drive_file import Run as DriveOnRoad
 
     folder = path.is_dir()
     if flat_will_do and not (folder and (path / PROFILE).exists()):
         drive = read_drive(path / DRIVE if folder else path)
     else:
         drive = read_run(path)
-    track = drive.track if isinstance(drive, Run) else Track(1.0, np.zeros(2))
+    track = drive.track if isinstance(drive, DriveOnRoad) else Track(1.0, np.zeros(2))
     if not 0 <= skip_s < len(drive.time_s) / drive.rate_hz - LEAST_SAMPLES / drive.rate_hz:
         raise BadInput(f"{path}: expected at least {LEAST_SAMPLES} samples after the first {skip_s:g} s, which are "
                        f"left out (--skip), found {len(drive.time_s) / drive.rate_hz:g} s in all")
-    return Record(drive.time_s, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
+    return Run(str(path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
 
 
 def _options(args: argparse.Namespace, model: VehicleModel) -> Options:

@@ -18,7 +18,8 @@ from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.fitting import Problem
-    from logger.lab.prediction import Array, Runs
+    from logger.runs import Array
+    from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
@@ -45,7 +46,7 @@ class Bench:
 
     word: str
     model: Model
-    runs: Runs
+    runs: SimulatedRuns
     effects: Mapping[str, Effect]
     files: Mapping[str, str]
     numbers: float
@@ -58,9 +59,9 @@ class Bench:
         """
         from logger.lab.fitting import Problem
         from logger.lab.nuisance import Tolerance
-        from logger.lab.prediction import Runs
+        from logger.simulation.simulated_runs import SimulatedRuns
 
-        runs = self.runs if whole else Runs(self.runs.runs, fine_hz=_SEARCH_HZ)
+        runs = self.runs if whole else SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ)
         model = self.model
         return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle,
                        firm)
@@ -159,7 +160,7 @@ def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect]
     return effects, own
 
 
-def check_model(word: str, model: Model, runs: Runs) -> None:
+def check_model(word: str, model: Model, runs: SimulatedRuns) -> None:
     """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
     the road moves no car, or the sensor was upside down or reads in another unit; say so first where it takes long.
 
@@ -174,7 +175,7 @@ def check_model(word: str, model: Model, runs: Runs) -> None:
     _check_sensor(runs, _predicted(word, model, runs, model.effects))
 
 
-def _check_sensor(runs: Runs, predictions: Sequence[Array]) -> None:
+def _check_sensor(runs: SimulatedRuns, predictions: Sequence[Array]) -> None:
     """Raise BadInput where no road moves the car, or what was measured is the model upside down or in another unit."""
     import numpy as np
 
@@ -200,7 +201,7 @@ def _check_sensor(runs: Runs, predictions: Sequence[Array]) -> None:
                        "profile is flat, or it stood still")
 
 
-def _predicted(word: str, model: Model, runs: Runs, effects: Sequence[Chosen]) -> list[Array]:
+def _predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
     """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
     from logger.vehicle.compose import bounded, compose
 

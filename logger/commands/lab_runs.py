@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from logger.errors import BadInput
 
 if TYPE_CHECKING:
-    from logger.lab.prediction import Run, Runs
+    from logger.runs import Run
+    from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.drive_file import Drive
     from logger.store.drive_file import Run as DriveOnRoad
 
@@ -21,21 +22,21 @@ LEAST_S = 5.0
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
-_SKIP_S = 2.0  # what the lab leaves out of each run
 _MOST_MEAN_MPS2 = 2.0
 _LEAST_MPS2 = 1e-5  # no sensor is so quiet
 _BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
-def lab_runs(folders: Sequence[Path], thin: bool = True) -> Runs:
+def lab_runs(folders: Sequence[Path], thin: bool = True) -> SimulatedRuns:
     """The runs in some folders, of one sample rate; of about 100 samples a second if they have many more and may be
     thinned (``thin``).
 
     Raises BadInput for one that cannot be read, is there twice, is not what ``check_record`` asks for, or stands
     nowhere on its own profile.
     """
-    from logger.lab.prediction import Run, Runs
+    from logger.runs import Run
+    from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.drive_file import DRIVE, read_run
 
     drives: list[DriveOnRoad] = []
@@ -51,7 +52,7 @@ def lab_runs(folders: Sequence[Path], thin: bool = True) -> Runs:
         drives.append(drive)
     runs = [Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
             for one in drives]
-    return Runs(thinned_runs(runs) if thin else runs)
+    return SimulatedRuns(thinned_runs(runs) if thin else runs)
 
 
 def thinned_runs(runs: Sequence[Run]) -> list[Run]:
@@ -70,6 +71,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     others, recorded nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed."""
     import numpy as np
 
+    from logger.runs import SKIP_S
     from logger.store.drive_file import MAX_SPEED_MPS
 
     if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
@@ -81,10 +83,10 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
-    counted = drive.accel_z_mps2[int(_SKIP_S * drive.rate_hz):]
+    counted = drive.accel_z_mps2[int(SKIP_S * drive.rate_hz):]
     if np.ptp(counted) == 0:
         found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"
-        raise BadInput(f"{file}: expected accelerations after the first {_SKIP_S:g} s, found {found}")
+        raise BadInput(f"{file}: expected accelerations after the first {SKIP_S:g} s, found {found}")
     if counted.std() < _LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     if abs(counted.mean()) > _MOST_MEAN_MPS2:

@@ -1,6 +1,6 @@
 """Vehicle parameters from drives: grey-box identification.
 
-In the order of reading: ``record`` (data), ``unknown_inputs``, ``obstacle_paths``, ``road_transform`` (the road under
+In the order of reading: ``unknown_inputs``, ``obstacle_paths``, ``road_transform`` (the road under
 the wheels), ``frequency_domain_model`` (predictions and their derivatives), ``noise_models``, ``prediction_error_fit``,
 ``identifiability`` and ``residual_whiteness`` (what to believe), ``shared_road_covariance`` (standard errors of several
 drives over one road), ``obstacle_search`` and ``session`` (around a fit), ``unknown_road`` (no profile at all).

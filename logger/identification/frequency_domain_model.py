@@ -22,7 +22,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.record import Record
 from logger.identification.road_transform import RoadInTime
 from logger.identification.unknown_inputs import (
     RoadInput,
@@ -33,6 +32,7 @@ from logger.identification.unknown_inputs import (
     run_and_name,
 )
 from logger.roads.iso8608 import displacement_psd
+from logger.runs import Run
 from logger.vehicle.frequency_response import (
     SensedCar,
     Sensitivity,
@@ -80,7 +80,7 @@ class VehicleModel:
     that neither has a number of, or that sets what another one sets.
     """
 
-    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Record],
+    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
                  road: RoadInput | None = None) -> None:
         self.vehicle, self.parameters, self.records = vehicle, list(parameters), list(records)
         self.road = road or RoadInput()

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.frequency_domain_model import VehicleModel
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import RoadInput
+from logger.runs import Run
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import Vehicle
 
@@ -26,7 +26,7 @@ _MOST_PLACES = 4000
 _REFINED = 9
 
 
-def located(vehicle: Vehicle, record: Record, road: RoadInput, part: str) -> float:
+def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
     """Where the ``part`` ("bump" or "step") of a road begins in a record, as true distance [m].
 
     Everything else is as ``vehicle`` and ``road`` have it; the height only has to have the right sign. ValueError for a

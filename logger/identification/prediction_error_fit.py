@@ -34,6 +34,7 @@ from logger.identification.identifiability import (
     unexplained,
 )
 from logger.identification.noise_models import LEAST_SHARE, Autoregressive, Noise, White, Whitening
+from logger.runs import normalised_rms
 from logger.vehicle.named_parameters import Free
 
 Array = npt.NDArray[np.float64]
@@ -162,12 +163,6 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
                 start[one.name] = one.low + share * (one.high - one.low)
         starts.append(start)
     return starts
-
-
-def normalised_error(measured: Sequence[Array], residuals: Sequence[Array]) -> float:
-    """rms(residuals) / rms(measured) over all records, which are not all zeros."""
-    left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))
-    return float(np.sqrt(left / whole))
 
 
 # --- the problem in the coordinates that steps are taken in ---
@@ -374,7 +369,7 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
     if not findings:
         findings = (problem.structural_findings(point.x)
                     or statistical(names, relative, np.array([one.weakest for one in problem.free]))
-                    or unexplained(normalised_error(problem.observed, point.plain)))
+                    or unexplained(normalised_rms(point.plain, problem.observed)))
         if findings and problem.options.refuse:
             raise NotIdentifiable(findings)
     values = problem.values(point.x)
@@ -390,8 +385,8 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
         free=problem.free, parameters=dict(zip(names, values.tolist(), strict=True)),
         standard_errors=dict(zip(names, errors.tolist(), strict=True)), covariance=covariance,
         correlation=covariance / np.maximum(np.outer(errors, errors), 1e-300),
-        error_before=normalised_error(problem.measured, before),
-        error_after=normalised_error(problem.measured, after), residuals=after,
+        error_before=normalised_rms(before, problem.measured),
+        error_after=normalised_rms(after, problem.measured), residuals=after,
         white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
         sensitivities=point.slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
         iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.obstacle_paths import ObstaclePath
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
 from logger.profiles.track import TirePath
+from logger.runs import Run
 from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure
@@ -39,7 +39,7 @@ class RoadInTime:
     s    (f,) where the transform is taken [1/s]
     """
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Run) -> None:
         rate_hz = record.rate_hz
         self._track = record.track
         self._steps = int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN))

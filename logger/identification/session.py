@@ -17,10 +17,10 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_search import located
-from logger.identification.prediction_error_fit import Fit, Options, fit, normalised_error, spread_starts
-from logger.identification.record import Record
+from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.drive_operator import Drive
+from logger.runs import Run, normalised_rms
 from logger.vehicle.vehicle import Vehicle
 
 LEAST_SAMPLES = 50
@@ -39,7 +39,7 @@ class UnusableRun(ValueError):
         self.run = run
 
 
-def check_records(records: Sequence[Record]) -> None:
+def check_records(records: Sequence[Run]) -> None:
     """``UnusableRun`` for an acceleration that never changes, or that gravity is in, and for rates that differ."""
     for run, record in enumerate(records):
         if not np.ptp(record.kept_mps2) > 0:
@@ -55,7 +55,7 @@ def off_rate(rates_hz: Sequence[float]) -> int | None:
     return next((run for run, rate_hz in enumerate(rates_hz) if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE), None)
 
 
-def drives_of(records: Sequence[Record]) -> list[Drive]:
+def drives_of(records: Sequence[Run]) -> list[Drive]:
     """The records without their roads. ``UnusableRun`` for a way that is too short or too long."""
     drives = []
     for run, record in enumerate(records):
@@ -67,7 +67,7 @@ def drives_of(records: Sequence[Record]) -> list[Drive]:
 
 
 def obstacle_starts(
-    vehicle: Vehicle, records: Sequence[Record], road: RoadInput, unplaced: Sequence[str]
+    vehicle: Vehicle, records: Sequence[Run], road: RoadInput, unplaced: Sequence[str]
 ) -> dict[str, float]:
     """Where obstacles that were given no start ("bump", "step") begin in each run [m], by the names of these numbers.
 
@@ -99,11 +99,11 @@ def fit_options(model: VehicleModel, noise: str, low_pass_hz: float | None, robu
 
 
 def upright_fit(
-    model_of: Callable[[list[Record]], VehicleModel], records: list[Record], options: Callable[[VehicleModel], Options]
+    model_of: Callable[[list[Run]], VehicleModel], records: list[Run], options: Callable[[VehicleModel], Options]
 ) -> Fit:
     """The fit of the model of records. NotIdentifiable for what they do not tell, or tell only when they are turned
     over; ValueError as ``fit``."""
-    def fitted(of: list[Record]) -> Fit:
+    def fitted(of: list[Run]) -> Fit:
         model = model_of(of)
         return fit(model, model.measured, options(model))
 
@@ -128,5 +128,5 @@ def upright_fit(
 def error_before(model: VehicleModel) -> float:
     """rms(measured - model) / rms(measured) with every free number where it starts."""
     predictions = model.predict(np.array([one.start for one in model.parameters]))
-    return normalised_error(model.measured, [measured - one for measured, one in
-                                             zip(model.measured, predictions, strict=True)])
+    return normalised_rms([measured - one for measured, one in zip(model.measured, predictions, strict=True)],
+                          model.measured)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.beside import Beside
-from logger.lab.prediction import Run
+from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.prediction import Run
+from logger.runs import Run
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz

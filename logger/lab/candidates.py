@@ -15,23 +15,13 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import (
-    Move,
-    Problem,
-    Slopes,
-    State,
-    Weighed,
-    coordinates_of,
-    improved,
-    located,
-    moved,
-    moves_of,
-)
+from logger.lab.fitting import Problem, Slopes, State, Weighed, improved, located
 from logger.lab.noise import left_to_explain
-from logger.lab.prediction import Run
 from logger.lab.settling import WORTH_ALIGNING, aligned, settled
 from logger.lab.wandering import far
+from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of
 from logger.vehicle.named_parameters import read
 
 Array = npt.NDArray[np.float64]

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.beside import Beside, frequencies, segments
-from logger.lab.prediction import Run
+from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 

@@ -20,8 +20,9 @@ from logger.lab.beside import Beside, Located, Part, located
 from logger.lab.fitting import LEAST_SHARE, Problem
 from logger.lab.marks import Mark, Marks, read_marks
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Runs, error
 from logger.lab.settling import settled
+from logger.runs import normalised_rms_error
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -81,7 +82,7 @@ class Comparison:
         return bool(self.far) or any(mark.road for mark in self.marks_found)
 
 
-def compare(runs: Runs, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
+def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
             tolerance: Tolerance | None = None) -> Comparison:
     """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
 
@@ -127,7 +128,7 @@ def _refitted(
 
 
 def _standing(beside: Beside) -> Standing:
-    return Standing(beside, error(beside.runs, beside.predictions), located(beside))
+    return Standing(beside, normalised_rms_error(beside.runs, beside.predictions), located(beside))
 
 
 # --- in words ---
@@ -199,7 +200,7 @@ def _standing_json(standing: Standing) -> dict[str, Any]:
     beside, where = standing.beside, standing.where
     return {
         "error": standing.error,
-        "runs": [{"run": run.name, "error": _finite(error([run], [prediction])),
+        "runs": [{"run": run.name, "error": _finite(normalised_rms_error([run], [prediction])),
                   "samples": run.count - run.first}
                  for run, prediction in zip(beside.runs, beside.predictions, strict=True)],
         "where": {

@@ -36,11 +36,12 @@ from logger.lab.candidates import (
     settled_further,
     simpler,
 )
-from logger.lab.fitting import Problem, Slopes, State, located, steps_apart
+from logger.lab.fitting import Problem, Slopes, State, located
 from logger.lab.noise import UNEXPLAINED, Noise, floor_error, left_to_explain, noise_of
 from logger.lab.settling import settled
 from logger.lab.wandering import ASTRAY, aligned_anew, lying, moved_m, relaid
 from logger.vehicle.effect import Chosen, Effect, Misalignment
+from logger.vehicle.effect_parameters import steps_apart
 
 Progress = Callable[[str], None]
 

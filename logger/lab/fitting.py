@@ -19,19 +19,18 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.nuisance import Nuisance, Tolerance, Wander, WanderSlopes, nuisance_of, wander_of
-from logger.lab.prediction import Runs, error
 from logger.lab.stretches import Cells, Stretches, Whitener, deviance, unseen_in
+from logger.runs import normalised_rms_error
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import Car, compose
-from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved, steps_of
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_LOG_STEP = 0.01
 # Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
 _STEP_IN_DEVIATIONS = 5.0
-_SHARE_STEP = 0.02
-_LEAST_SHARE = 0.1
 # Far off, steps are damped; near the end they are hardly, or nothing would move along with what makes up for it.
 FIRST_DAMPING, LAST_DAMPING, _LARGEST_DAMPING, _MORE_DAMPING = 1e-3, 1e-9, 100.0, 30.0
 _LEAST_THAT_DAMPS = 1e-4
@@ -94,7 +93,7 @@ class Problem:
     size_mps2 is the r.m.s. of what was measured, by which errors are divided; least_mps2 what a model leaves at least.
     """
 
-    def __init__(self, runs: Runs, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
+    def __init__(self, runs: SimulatedRuns, vehicle: Vehicle, tolerance: Tolerance, whole: bool = False,
                  stands: Vehicle | None = None, firm: bool = False) -> None:
         self.runs, self.vehicle, self.tolerance, self.whole = runs, vehicle, tolerance, whole
         self.nuisance: Nuisance = nuisance_of(vehicle, tolerance, firm)
@@ -111,13 +110,13 @@ class Problem:
     def entire(self) -> Problem:
         """All of the runs, finely simulated, by a car that is not held, so that it shows when it has to bend too far.
         """
-        return Problem(Runs(self.runs.runs), self.vehicle, self.tolerance, True, self._stands)
+        return Problem(SimulatedRuns(self.runs.runs), self.vehicle, self.tolerance, True, self._stands)
 
     def granting(self, tolerance: Tolerance) -> Problem:
         """All of the runs, with another tolerance."""
         return Problem(self.runs, self.vehicle, tolerance, True, self._stands, self.nuisance.firm)
 
-    def over(self, runs: Runs) -> Problem:
+    def over(self, runs: SimulatedRuns) -> Problem:
         """The same over other runs."""
         return Problem(runs, self.vehicle, self.tolerance, self.whole, self._stands, self.nuisance.firm)
 
@@ -172,7 +171,7 @@ class Problem:
 
     def error(self, state: State) -> float:
         """Of all samples."""
-        return error(self.runs.runs, state.predictions)
+        return normalised_rms_error(self.runs.runs, state.predictions)
 
     def judged_error(self, state: State) -> float:
         """Of the samples that no fit saw; of all, where nothing was kept from the fits."""
@@ -338,70 +337,6 @@ class Weighed:
         diagonal = np.arange(len(state.logs))
         information[diagonal, diagonal] += self.problem.nuisance.firmness(state.logs)[1]
         return information
-
-
-@dataclass(frozen=True)
-class Move:
-    """A number of an effect that a fit moves: which effect of the model, and which of its parameters."""
-
-    effect: int
-    parameter: int
-
-
-def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
-    """Every number that can be moved, of all effects or of some."""
-    chosen = range(len(effects)) if which is None else which
-    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.moves]
-
-
-def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
-    """The effects with other values, given on the scales of their parameters (m,)."""
-    found = list(effects)
-    for move, coordinate in zip(moves, coordinates, strict=True):
-        one = found[move.effect]
-        parameter = one.effect.parameters[move.parameter]
-        found[move.effect] = replace(one, values={**one.values, parameter.name: parameter.value(float(coordinate))})
-    return tuple(found)
-
-
-def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
-    """Where the numbers stand, on the scales of their parameters (m,)."""
-    places = []
-    for move in moves:
-        one = effects[move.effect]
-        parameter = one.effect.parameters[move.parameter]
-        places.append(parameter.coordinate(one.values[parameter.name]))
-    return np.array(places)
-
-
-def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float = _LOG_STEP,
-             share_step: float = _SHARE_STEP) -> Array:
-    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound.
-
-    log_step      on logarithmic scales
-    share_step    on others, as a share; both where a parameter has no step of its own
-    """
-    steps = []
-    for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
-        step = parameter.step
-        if step is None:
-            size = max(abs(here), _LEAST_SHARE * parameter.usual_way())
-            step = log_step if parameter.scale is Scale.LOG else share_step * size
-        forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
-        steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
-    return np.array(steps)
-
-
-def steps_apart(one: Chosen, other: Chosen) -> float:
-    """How far the numbers of an effect are apart at two sets of values, at most, in steps of their differences;
-    infinitely far where another choice was made."""
-    choices = [parameter.name for parameter in one.effect.parameters if parameter.choices]
-    if any(one.values[name] != other.values[name] for name in choices):
-        return np.inf
-    moves = moves_of([one])
-    here, there = (coordinates_of([each], moves) for each in (one, other))
-    return float(np.max(np.abs(there - here) / np.abs(steps_of([one], moves)), initial=0.0))
 
 
 def improved(weighed: Weighed, state: State, moves: Sequence[Move], most: int, laid_out: bool = False,

@@ -13,10 +13,10 @@ from typing import Any
 
 from logger.lab import wandering
 from logger.lab.addition import Added
-from logger.lab.fitting import moves_of
 from logger.lab.noise import floor_error, noise_of
 from logger.lab.quantities import chance, finite, numbers_of
 from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_parameters import moves_of
 
 CHANCE = 0.001
 """What noise does more often than this is no evidence of an effect."""

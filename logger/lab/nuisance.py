@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.prediction import Run
+from logger.runs import Run
 from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.vehicle import Vehicle
 

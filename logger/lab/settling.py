@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.lab.fitting import (
-    FIRST_DAMPING,
-    LAST_DAMPING,
-    Problem,
-    Slopes,
-    State,
-    Weighed,
-    improved,
-    located,
-    moves_of,
-)
+from logger.lab.fitting import FIRST_DAMPING, LAST_DAMPING, Problem, Slopes, State, Weighed, improved, located
 from logger.lab.noise import left_to_explain
+from logger.vehicle.effect_parameters import moves_of
 
 _STEPS, _SETTLED = 5, 2.0
 _ALIGNING_ROUNDS = 60

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.fitting import Move, Problem, Slopes, State, Weighed, coordinates_of, moves_of
+from logger.lab.fitting import Problem, Slopes, State, Weighed
 from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
 
 Array = npt.NDArray[np.float64]
 

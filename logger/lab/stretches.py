@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.prediction import Run
+from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

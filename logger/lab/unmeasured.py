@@ -28,14 +28,15 @@ from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.marginal_likelihood import UnknownRoad
 from logger.identification.unknown_road.road_state import Options, RoadState
 from logger.lab.candidates import scaled_by
-from logger.lab.fitting import LEAST_SHARE, Move, coordinates_of, moved, moves_of, steps_of
+from logger.lab.fitting import LEAST_SHARE
 from logger.lab.linear_response import Tabulated, response_of
 from logger.lab.noise import Noise, sensor_noise
 from logger.lab.nuisance import Nuisance, Tolerance, nuisance_of
-from logger.lab.prediction import Run
 from logger.lab.stretches import Stretches
+from logger.runs import Run
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]

@@ -21,8 +21,9 @@ import numpy.typing as npt
 from logger.lab.alignment import followed_m
 from logger.lab.fitting import Problem, State, wander_seen
 from logger.lab.nuisance import Tolerance, Wander
-from logger.lab.prediction import Run, Runs
 from logger.lab.settling import WORTH_ALIGNING, aligned
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 
 Array = npt.NDArray[np.float64]
 
@@ -158,7 +159,7 @@ def _over(problem: Problem, farther_m: Sequence[Array]) -> Problem:
 def _at(problem: Problem, distances_m: Sequence[Array]) -> Problem:
     """The problem with other distances (n,) of its runs [m]."""
     runs = [replace(run, distance_m=one) for run, one in zip(problem.runs.runs, distances_m, strict=True)]
-    return problem.over(Runs(runs, problem.runs.fine_hz))
+    return problem.over(SimulatedRuns(runs, problem.runs.fine_hz))
 
 
 def moved_m(recorded: Problem, problem: Problem) -> float:

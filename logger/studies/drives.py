@@ -15,11 +15,11 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.record import Record
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import gd_n0_from_iri, generate
 from logger.roads.obstacles import step
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
@@ -75,7 +75,7 @@ def bridge(start_m: float, height_m: float = STEP_M) -> Shape:
 
 def record_of(
     obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None
-) -> Record:
+) -> Run:
     """A drive over an obstacle at a steady speed, with the obstacle as its known profile. None: that of Table 4.2."""
     time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     distance_m = speed_mps * time_s
@@ -91,19 +91,19 @@ def record_of(
     if conditions.step_mps2:
         sensed = conditions.step_mps2 * np.round(sensed / conditions.step_mps2)
     track = Track(SPACING_M, known, float(place_m[0]))
-    return Record(time_s, sensed, distance_m, np.full(len(time_s), speed_mps), track, skip_s=0.0)
+    return Run("simulated", RATE_HZ, sensed, distance_m, np.full(len(time_s), speed_mps), track, skip_s=0.0)
 
 
-def without_profile(record: Record, speed_scale: float = 1.0) -> Record:
+def without_profile(record: Run, speed_scale: float = 1.0) -> Run:
     """The same readings, nothing known of the road; recorded speed and distance are so many times the true ones."""
     return replace(record, track=Track(1.0, np.zeros(2)), distance_m=speed_scale * record.distance_m,
                    speed_mps=speed_scale * record.speed_mps)
 
 
-def until(record: Record, distance_m: float) -> Record:
+def until(record: Run, distance_m: float) -> Run:
     """The part of a record up to where the front tires are at a place."""
     kept = slice(int(np.searchsorted(record.distance_m, distance_m)))
-    return replace(record, time_s=record.time_s[kept], measured_mps2=record.measured_mps2[kept],
+    return replace(record, measured_mps2=record.measured_mps2[kept],
                    distance_m=record.distance_m[kept], speed_mps=record.speed_mps[kept])
 
 

@@ -12,8 +12,8 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, Options, fit
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput, free_input, is_input
+from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4
 from logger.vehicle.named_parameters import free
 
@@ -23,7 +23,7 @@ TRUTH = {MASS: 875.0, FRONT: 23_088.0, REAR: 23_088.0}
 """Table 4.2."""
 
 
-def fitted(record: Record, start: Mapping[str, float], ours: bool, road: RoadInput | None = None,
+def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput | None = None,
            low_pass_hz: float | None = None) -> Fit:
     """The numbers in ``start``, of the car or of ``road``, from one record, starting there.
 
@@ -39,7 +39,7 @@ def fitted(record: Record, start: Mapping[str, float], ours: bool, road: RoadInp
     return fit(model, model.measured, Options(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))
 
 
-def mass_and_bump(record: Record, taken: Bump, low_pass_hz: float | None = None) -> Fit:
+def mass_and_bump(record: Run, taken: Bump, low_pass_hz: float | None = None) -> Fit:
     """Our way where the bump is not known for certain: mass, bump and speed together, beginning with what is taken."""
     start = {MASS: TRUTH[MASS], "bump.start_m": taken.start_m, "bump.height_m": taken.height_m,
              "bump.width_m": taken.width_m, SPEED_SCALE: 1.0}

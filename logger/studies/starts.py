@@ -13,7 +13,7 @@ from itertools import chain
 import numpy as np
 
 from logger.identification.prediction_error_fit import Fit
-from logger.identification.record import Record
+from logger.runs import Run
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of
 from logger.studies.fitting import FRONT, MASS, REAR, error_percent, fitted, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Table
@@ -60,7 +60,7 @@ def from_25_starts(effort: Effort, name: str, printed: Sequence[Sequence[float]]
 
 
 @cache
-def _drive(seed: int) -> Record:
+def _drive(seed: int) -> Run:
     return record_of(bump(_BUMP_AT_M), BUMP_MPS, _SECONDS, Conditions(iri_m_per_km=_IRI, seed=seed))
 
 

@@ -21,13 +21,13 @@ from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, Options, fit
-from logger.identification.record import Record
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.road_fit import fit_roads
 from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
@@ -68,13 +68,13 @@ def main() -> int:
     return 1 if figures.missed else 0
 
 
-def fitted(record: Record, start: dict[str, float], noise: str = "auto") -> Fit:
+def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
     model = VehicleModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return fit(model, model.measured, Options(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
 
 
-def rough(seed: int) -> Record:
+def rough(seed: int) -> Run:
     return bump_record(CAR, SECONDS, NOISE_MPS2, seed, IRI, start_m=BUMP_AT_M)
 
 
@@ -137,7 +137,7 @@ def draws(figures: Figures) -> None:
               f"{(100 * fuller).round(2)} %")
 
 
-def bounds(record: Record) -> tuple[Array, Array]:
+def bounds(record: Run) -> tuple[Array, Array]:
     """Relative Cramer-Rao bounds: from the response to the bump alone, in noise whose spectrum is known; and with what
     that spectrum says of the car as well, the levels of road and sensor being unknown."""
     model = VehicleModel(CAR, [free(CAR, name) for name in TABLE], [record])
@@ -233,7 +233,7 @@ def passes(figures: Figures) -> None:
             records = []
             for number in range(3):
                 clean = bump_record(CAR, SECONDS, 0.0, seed + step * number, IRI, start_m=BUMP_AT_M)
-                noise = np.random.default_rng(10_000 + 3 * seed + number).standard_normal(len(clean.time_s))
+                noise = np.random.default_rng(10_000 + 3 * seed + number).standard_normal(clean.count)
                 records.append(replace(clean, track=flat, measured_mps2=clean.measured_mps2 + NOISE_MPS2 * noise))
             numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
@@ -343,7 +343,7 @@ def no_answer_without_a_road(figures: Figures) -> None:
         print(f"   {words}")
 
 
-def fitted_input(car: Vehicle, record: Record, road: RoadInput, wanted: list[str]) -> Fit:
+def fitted_input(car: Vehicle, record: Run, road: RoadInput, wanted: list[str]) -> Fit:
     numbers = [free_input(road, name) if is_input(name) else free(car, name) for name in wanted]
     model = VehicleModel(car, numbers, [record], road)
     return fit(model, model.measured, Options(noise=[White()]))
@@ -353,7 +353,7 @@ def response_of(wanted: list[str]) -> AxleResponse:
     return AxleResponse(CAR, [free(CAR, name) for name in wanted], RATE_HZ)
 
 
-def refused(car: Vehicle, record: Record, wanted: list[str]) -> str:
+def refused(car: Vehicle, record: Run, wanted: list[str]) -> str:
     model = VehicleModel(car, [free(car, name) for name in wanted], [record])
     try:
         fit(model, model.measured)

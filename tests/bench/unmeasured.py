@@ -14,10 +14,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Run
 from logger.lab.unmeasured import SameRoad
 from logger.lab.unmeasured_diagnosis import Found, diagnose_same_road
 from logger.profiles.track import Track
+from logger.runs import Run
 from logger.store.drive_file import read_drive
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.frequency_domain_model import Record, VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
 from logger.profiles.track import Track
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
@@ -46,7 +47,7 @@ def test_a_car_with_little_damping_on_a_road_that_climbs() -> None:
     distance = np.arange(2000) * 0.12
     track = Track(0.05, 0.05 * np.arange(6000) * 0.05 + 0.01 * np.sin(np.arange(6000) * 0.05))
     measured = recorded(car, track, distance, 0.0, 0)
-    model = VehicleModel(car, [], [Record(np.arange(2000) / 100, measured, distance, np.full(2000, 12.0), track)])
+    model = VehicleModel(car, [], [Run("run", 100.0, measured, distance, np.full(2000, 12.0), track)])
     assert rms(model.predict(np.empty(0))[0] - model.measured[0]) < 1e-4 * rms(model.measured[0])
 
 
@@ -56,9 +57,9 @@ def test_two_tracks_and_another_rate() -> None:
     car = replace(AWAY, sensor=SensorPlace(0.0, 0.5))
     distance = 2 + 14 * np.arange(200) / 100
     measured = recorded(car, track, distance, 0.0, 0)
-    record = Record(np.arange(200) / 100, measured, distance, np.full(200, 14.0), track, skip_s=0.0)
+    record = Run("run", 100.0, measured, distance, np.full(200, 14.0), track, skip_s=0.0)
     assert rms(VehicleModel(car, [], [record]).predict(np.empty(0))[0] - measured) < 1e-4 * rms(measured)
-    half_rate = Record(record.time_s[::2], measured[::2], distance[::2], record.speed_mps[::2], track, skip_s=0.0)
+    half_rate = Run("half", 50.0, measured[::2], distance[::2], record.speed_mps[::2], track, skip_s=0.0)
     slow = VehicleModel(car, [], [half_rate]).predict(np.empty(0))[0]
     spectrum, slow_spectrum = (np.fft.rfft(one * np.hanning(len(one)))[2:30] for one in (measured, slow))
     assert np.abs(slow_spectrum * 2 - spectrum).max() < 0.02 * np.abs(spectrum).max()

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.frequency_domain_model import Record, VehicleModel
+from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
 from logger.identification.prediction_error_fit import Options, fit
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.named_parameters import changed, free, names
@@ -24,7 +25,7 @@ EVERYTHING = [name for name in names(CAR) if not name.startswith("both") and not
 INERTIA, DAMPER = "pitch_inertia_kg_m2", "rear.suspension_damping_n_s_per_m"
 
 
-def refusal(car: Vehicle, record: Record, *wanted: str) -> NotIdentifiable:
+def refusal(car: Vehicle, record: Run, *wanted: str) -> NotIdentifiable:
     model = VehicleModel(car, [free(car, name) for name in wanted], [record])
     with pytest.raises(NotIdentifiable) as caught:
         fit(model, model.measured)

@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White
-from logger.identification.prediction_error_fit import Fit, Options, fit, normalised_error, spread_starts
+from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
+from logger.runs import normalised_rms
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
@@ -59,7 +60,7 @@ def test_scipy_on_the_stepping_simulation_says_the_same() -> None:
         return np.asarray(recorded(car, BUMP.track, BUMP.distance_m, 0.0, 0) - BUMP.measured_mps2)
 
     theirs = least_squares(residuals, [0.9, 1.1], diff_step=1e-4)
-    deviation = np.sqrt(2 * theirs.cost / (len(BUMP.time_s) - 2))
+    deviation = np.sqrt(2 * theirs.cost / (BUMP.count - 2))
     errors = deviation * np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
     model = VehicleModel(CAR, [free(CAR, MASS, 790), free(CAR, RATE, 25_000)], [BUMP])
     ours = fit(model, model.measured, Options(noise=WHITE))
@@ -80,7 +81,7 @@ def test_errors_are_those_of_the_formats() -> None:
     found = mass_fit()
     assert found.error_after == pytest.approx(
         np.sqrt(np.mean(found.residuals[0] ** 2) / np.mean(BUMP.measured_mps2**2)))
-    assert normalised_error([np.ones(4), np.ones(2)], [np.ones(4), np.zeros(2)]) == pytest.approx(np.sqrt(2 / 3))
+    assert normalised_rms([np.ones(4), np.zeros(2)], [np.ones(4), np.ones(2)]) == pytest.approx(np.sqrt(2 / 3))
 
 
 def test_bounds_hold_and_are_told() -> None:

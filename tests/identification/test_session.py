@@ -9,7 +9,6 @@ import pytest
 
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.record import Record
 from logger.identification.session import (
     UnusableRun,
     check_records,
@@ -21,6 +20,7 @@ from logger.identification.session import (
 )
 from logger.profiles.track import Track
 from logger.roads import iso8608
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
@@ -32,16 +32,16 @@ CAR = read_vehicle(vehicle_file("rav4-2009"))
 ROAD = Track(0.05, iso8608.generate(64.0, 150.0, 0.05, 5))
 
 
-def record(mass_kg: float = 875.0, rate_hz: float = 100.0, seconds: float = 8.0) -> Record:
+def record(mass_kg: float = 875.0, rate_hz: float = 100.0, seconds: float = 8.0) -> Run:
     """15 m/s over the road in a car of this mass, a little noise on it."""
     structure = structure_of(changed(CAR, {"sprung_mass_kg": mass_kg}))
     time_s = np.arange(round(seconds * rate_hz)) / rate_hz
     accel = drive(structure, [body_point(structure, 0.0, 0.0)], ROAD, time_s, 15.0 * time_s)[:, 0]
     noise = 0.05 * np.random.default_rng(1).standard_normal(len(accel))
-    return Record(time_s, accel + noise, 15.0 * time_s, np.full(len(time_s), 15.0), ROAD)
+    return Run("run", rate_hz, accel + noise, 15.0 * time_s, np.full(len(time_s), 15.0), ROAD)
 
 
-def model_of(records: list[Record]) -> VehicleModel:
+def model_of(records: list[Run]) -> VehicleModel:
     return VehicleModel(CAR, [free(CAR, "sprung_mass_kg")], records)
 
 

@@ -9,13 +9,13 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.noise_models import RoadNoise
 from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Options, fit
-from logger.identification.record import Record
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input
 from logger.profiles.track import Track
 from logger.report.identification_text import common_words
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
+from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4, recorded
 from logger.vehicle.named_parameters import free
 
@@ -23,7 +23,7 @@ CAR, MASS, SPACING_M = rav4(), "sprung_mass_kg", 0.05
 FLAT = Track(1.0, np.zeros(2))
 
 
-def drive_over(speed_mps: float, road_seed: int, seed: int, off_m: float) -> Record:
+def drive_over(speed_mps: float, road_seed: int, seed: int, off_m: float) -> Run:
     """Over a bump of 8 cm on a road of class A that the record knows nothing of."""
     place_m = np.arange(-30.0, 80.0, SPACING_M)
     rough = generate(16.0, SPACING_M * (len(place_m) + 1), SPACING_M, road_seed)[: len(place_m)]
@@ -31,7 +31,7 @@ def drive_over(speed_mps: float, road_seed: int, seed: int, off_m: float) -> Rec
     way_m = speed_mps * time_s
     road = Track(SPACING_M, speed_bump(place_m, 20.0, 0.08, 3.6) + rough, -30.0)
     readings = recorded(CAR, road, way_m, 0.05, seed)
-    return Record(time_s, readings, way_m + off_m, np.full(len(time_s), speed_mps), FLAT)
+    return Run("run", 100.0, readings, way_m + off_m, np.full(len(time_s), speed_mps), FLAT)
 
 
 def fitted(speeds_mps: tuple[float, ...], roads: tuple[int, ...]) -> tuple[VehicleModel, CommonRoughness, float]:

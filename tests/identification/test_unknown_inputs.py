@@ -14,7 +14,6 @@ from logger.identification.noise_models import White
 from logger.identification.obstacle_paths import Bump, Step
 from logger.identification.obstacle_search import located
 from logger.identification.prediction_error_fit import Fit, Options, fit
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import (
     RoadInput,
     changed_input,
@@ -27,6 +26,7 @@ from logger.identification.unknown_inputs import (
 )
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
@@ -44,11 +44,11 @@ TRUTH = {MASS: 875.0, HEIGHT: 0.15, WIDTH: 2.6, START: 2.0, SPEED: 1.0}
 GUESS = RoadInput(bump=Bump(2.2, 0.12, 3.0))
 
 
-def on_flat_road(car: Vehicle, seed: int = 0) -> Record:
+def on_flat_road(car: Vehicle, seed: int = 0) -> Run:
     return replace(bump_record(car, seed=seed), track=FLAT)
 
 
-def step_record(car: Vehicle, height_m: float, speed_mps: float = 13.4, track: Track | None = None) -> Record:
+def step_record(car: Vehicle, height_m: float, speed_mps: float = 13.4, track: Track | None = None) -> Run:
     time_s = np.arange(600) / 100
     way = speed_mps * time_s
     place = np.arange(-20.0, way[-1] + 20, 0.01)
@@ -56,16 +56,16 @@ def step_record(car: Vehicle, height_m: float, speed_mps: float = 13.4, track: T
     if track is not None:
         road = road + track.averaged(place, 0.0)
     measured = recorded(car, Track(0.01, road, place[0]), way, 0.05, 3)
-    return Record(time_s, measured, way, np.full(600, speed_mps), track or FLAT, 0.0)
+    return Run("run", 100.0, measured, way, np.full(600, speed_mps), track or FLAT, 0.0)
 
 
-def model(car: Vehicle, records: list[Record], road: RoadInput, *names: str, **start: float) -> VehicleModel:
+def model(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **start: float) -> VehicleModel:
     numbers = [free_input(road, name, start.get(name)) if is_input(name) else free(car, name, start.get(name))
                for name in names]
     return VehicleModel(car, numbers, records, road)
 
 
-def found(car: Vehicle, records: list[Record], road: RoadInput, *names: str, **start: float) -> Fit:
+def found(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **start: float) -> Fit:
     one = model(car, records, road, *names, **start)
     return fit(one, one.measured)
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from logger.lab.beside import Part, located, paired, short_names
-from logger.lab.prediction import Run
+from logger.runs import Run
 
 from compared import CAR, RATE_HZ, a_run, beside_with
 

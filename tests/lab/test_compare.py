@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
-from logger.lab.prediction import Runs
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Vehicle
@@ -99,7 +99,7 @@ def test_one_short_run() -> None:
     run = beside_with(recorded_by([], NOISE_MPS2), lasts_s=14.0).runs[0]
     short = replace(run, measured_mps2=run.measured_mps2[:500], distance_m=run.distance_m[:500],
                     speed_mps=run.speed_mps[:500])
-    found = compare(Runs([short]), CAR)
+    found = compare(SimulatedRuns([short]), CAR)
     assert np.isfinite(found.refitted.error)
     json.dumps(as_json(found), allow_nan=False)
 

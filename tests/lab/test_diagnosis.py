@@ -9,9 +9,10 @@ from logger.lab import diagnosis, wandering
 from logger.lab.fitting import Problem
 from logger.lab.noise import UNEXPLAINED, Noise
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import Cells
 from logger.profiles.track import Track
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -21,7 +22,7 @@ EFFECTS = shipped_effects()
 
 
 def problem() -> Problem:
-    return Problem(Runs([a_run("run", 10.0, 20.0, 1)], 500.0), CAR, Tolerance())
+    return Problem(SimulatedRuns([a_run("run", 10.0, 20.0, 1)], 500.0), CAR, Tolerance())
 
 
 def test_effects_that_cannot_be_tried_are_named_with_the_reason() -> None:
@@ -54,4 +55,4 @@ def test_runs_too_long_to_be_followed_are_named() -> None:
     assert wandering.too_long(problem()) == []
     zeros = np.zeros(60_000)
     long = Run("long", 100.0, zeros, np.arange(60_000) * 0.1, zeros + 10.0, Track(1.0, np.zeros(3)))
-    assert "too long" in wandering.too_long(Problem(Runs([long], 500.0), CAR, Tolerance()))[0]
+    assert "too long" in wandering.too_long(Problem(SimulatedRuns([long], 500.0), CAR, Tolerance()))[0]

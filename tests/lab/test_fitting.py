@@ -1,6 +1,7 @@
 """Fits of the lab, on runs of the examination's own simulator: what was off is found, with errors that hold."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,14 +12,16 @@ import pytest
 
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
-from logger.lab.fitting import Problem, located, moves_of, steps_apart, steps_of
+from logger.lab.fitting import Problem, located
 from logger.lab.nuisance import Tolerance, wander_of
-from logger.lab.prediction import Run, Runs
 from logger.lab.settling import settled
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.drive_file import read_run
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.effect_parameters import moves_of, steps_apart, steps_of
 from logger.vehicle.named_parameters import read
 from logger.vehicle.vehicle import Vehicle
 
@@ -27,7 +30,9 @@ EFFECTS = shipped_effects()
 
 
 @cache
-def examined(kind: str, seed: int, effect: str | None = None, fine_hz: float = 500.0) -> tuple[Vehicle, Runs, dict]:
+def examined(
+    kind: str, seed: int, effect: str | None = None, fine_hz: float = 500.0
+) -> tuple[Vehicle, SimulatedRuns, dict]:
     """A case of the examination: its nominal vehicle, two of its runs, and the truth."""
     import subprocess
     import sys
@@ -44,7 +49,7 @@ def examined(kind: str, seed: int, effect: str | None = None, fine_hz: float = 5
             kept = slice(0, 3200)
             runs.append(Run(one.name, run.rate_hz, run.accel_z_mps2[kept], run.distance_m[kept], run.speed_mps[kept],
                             run.track))
-        return read_vehicle(case / "vehicle.yaml"), Runs(runs, fine_hz), truth
+        return read_vehicle(case / "vehicle.yaml"), SimulatedRuns(runs, fine_hz), truth
 
 
 def true_number(truth: dict, name: str) -> float:
@@ -96,8 +101,7 @@ def test_a_distance_that_wandered_is_put_right() -> None:
     vehicle, runs, _ = examined("none", 3)
     time_s = np.arange(runs.runs[0].count) / runs.runs[0].rate_hz
     off_m = 0.02 * np.sin(2 * np.pi * time_s / 30.0)
-    moved = Runs([Run(one.name, one.rate_hz, one.measured_mps2, one.distance_m - off_m[: one.count], one.speed_mps,
-                      one.track) for one in runs.runs], 500.0)
+    moved = SimulatedRuns([replace(one, distance_m=one.distance_m - off_m[: one.count]) for one in runs.runs], 500.0)
     problem = Problem(moved, vehicle, Tolerance(), whole=True)
     still = Problem(runs, vehicle, Tolerance(), whole=True)
     state, _ = settled(problem, problem.start())
@@ -127,12 +131,11 @@ def test_the_prior_of_the_wander_has_the_spread_it_was_given() -> None:
 
 def test_a_late_clock_and_a_wrong_wheel_are_seen_before_any_fit() -> None:
     vehicle, runs, _ = examined("none", 3)
-    late = Runs([Run(one.name, one.rate_hz, np.roll(one.measured_mps2, 6), one.distance_m, one.speed_mps, one.track)
-                 for one in runs.runs], 500.0)
+    late = SimulatedRuns([replace(one, measured_mps2=np.roll(one.measured_mps2, 6)) for one in runs.runs], 500.0)
     problem = Problem(late, vehicle, Tolerance())
     assert misalignment(problem, problem.start()).delay_s == pytest.approx(0.06, abs=0.006)
-    scaled = Runs([Run(one.name, one.rate_hz, one.measured_mps2, one.distance_m * 1.02, one.speed_mps * 1.02, one.track)
-                   for one in runs.runs], 500.0)
+    scaled = SimulatedRuns([replace(one, distance_m=one.distance_m * 1.02, speed_mps=one.speed_mps * 1.02)
+                            for one in runs.runs], 500.0)
     problem = Problem(scaled, vehicle, Tolerance())
     assert misalignment(problem, problem.start()).scale == pytest.approx(1.02, abs=0.004)
 

@@ -13,7 +13,8 @@ from logger.lab.beside import Beside, located
 from logger.lab.coherence import with_road
 from logger.lab.force_map import force_map
 from logger.lab.marks import Mark, Marks, read_marks, worst_places
-from logger.lab.prediction import Run, Runs
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 
 from compared import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 
@@ -100,7 +101,7 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     beside = beside_with(white)
     truth = [Run(run.name, run.rate_hz, run.measured_mps2, 0.99 * run.distance_m, run.speed_mps, run.track)
              for run in beside.runs]
-    driven = Runs(truth).predict(beside.car)
+    driven = SimulatedRuns(truth).predict(beside.car)
     wrong = Beside([measuring(run, one) for run, one in zip(beside.runs, driven, strict=True)], beside.car,
                    beside.predictions, beside.responses)
     assert drift(aligned(wrong)).value == pytest.approx(0.01, rel=0.03)
@@ -201,7 +202,7 @@ def test_blows_lean_to_one_side() -> None:
 
 def test_a_run_of_five_seconds_can_be_read() -> None:
     run = a_run("short", 10.0, 5.0, 3)
-    runs = Runs([run])
+    runs = SimulatedRuns([run])
     nothing = beside_with(white)
     prediction = runs.predict(nothing.car)
     rng = np.random.default_rng(1)

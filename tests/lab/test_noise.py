@@ -7,18 +7,18 @@ from scipy.signal import firwin
 from logger.lab.fitting import Problem, State
 from logger.lab.noise import floor_error, noise_of
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Runs
 from logger.lab.stretches import Stretches
+from logger.simulation.simulated_runs import SimulatedRuns
 
 from compared import CAR, a_run, measuring
 
 
 def found_for(noise: np.ndarray) -> tuple[float, float]:
     run = a_run("run", 12.0, len(noise) / 100.0, 3)
-    problem = Problem(Runs([run], 500.0), CAR, Tolerance(), whole=True)
+    problem = Problem(SimulatedRuns([run], 500.0), CAR, Tolerance(), whole=True)
     state = problem.start()
     predicted = state.predictions[0]
-    problem = Problem(Runs([measuring(run, predicted + noise)], 500.0), CAR, Tolerance(), whole=True)
+    problem = Problem(SimulatedRuns([measuring(run, predicted + noise)], 500.0), CAR, Tolerance(), whole=True)
     state = State((), state.logs, state.wander, [predicted])
     found = noise_of(problem, state)
     return found.deviation_mps2, floor_error(problem, found) * float(np.std((predicted + noise)[run.first:]))

@@ -13,7 +13,7 @@ from logger.lab.candidates import Tried, every_choice
 from logger.lab.diagnosis import diagnose
 from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Runs
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
@@ -103,8 +103,8 @@ def test_bending_that_a_bracket_stood_in_for_is_found_beside_tires() -> None:
               chosen(EFFECTS["tire_damping"], {"tire_damping_n_s_per_m": 500.0})]
     plain = [a_run(f"run{i}", speed, 40.0, i) for i, speed in enumerate((7.0, 12.0, 18.0))]
     rng = np.random.default_rng(8)
-    runs = Runs([measuring(run, one + rng.normal(0, 0.05, run.count)) for run, one in zip(
-        plain, Runs(plain).predict(compose(CAR, hidden)), strict=True)], 500.0)
+    runs = SimulatedRuns([measuring(run, one + rng.normal(0, 0.05, run.count)) for run, one in zip(
+        plain, SimulatedRuns(plain).predict(compose(CAR, hidden)), strict=True)], 500.0)
     names = ("body_bending", "sensor_mount_resonance", "tire_damping", "sensor_gain")
     found = diagnose(Problem(runs, CAR, Tolerance(), firm=True), {name: EFFECTS[name] for name in names})
     assert set(found.verdict) == {"body_bending", "tire_damping"} and not found.unexplained

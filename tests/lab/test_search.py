@@ -12,9 +12,10 @@ from logger.lab.diagnosis import Diagnosis, diagnose
 from logger.lab.fitting import Problem
 from logger.lab.gained import gained
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Run, Runs
 from logger.lab.settling import aligned, settled
 from logger.lab.verdict import as_json, told
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
@@ -27,48 +28,47 @@ EFFECTS = shipped_effects()
 NOISE_MPS2 = 0.05
 
 
-def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0, rougher: float = 1.0) -> Runs:
+def runs_of(car: Vehicle, effects: list[Chosen], lasts_s: float = 40.0, rougher: float = 1.0) -> SimulatedRuns:
     """Three drives of a car with effects, and noise."""
     rng = np.random.default_rng(8)
     plain = [a_run(f"run{i}", speed, lasts_s, i) for i, speed in enumerate((7.0, 12.0, 18.0))]
     plain = [replace(one, track=replace(one.track, elevation_m=rougher * one.track.elevation_m)) for one in plain]
-    return Runs([measuring(run, one + rng.normal(0, NOISE_MPS2, run.count)) for run, one in zip(
-        plain, Runs(plain).predict(compose(car, effects)), strict=True)], 500.0)
+    return SimulatedRuns([measuring(run, one + rng.normal(0, NOISE_MPS2, run.count)) for run, one in zip(
+        plain, SimulatedRuns(plain).predict(compose(car, effects)), strict=True)], 500.0)
 
 
-def searched(runs: Runs, car: Vehicle = CAR, names: tuple[str, ...] = ()) -> Diagnosis:
+def searched(runs: SimulatedRuns, car: Vehicle = CAR, names: tuple[str, ...] = ()) -> Diagnosis:
     effects = {name: EFFECTS[name] for name in names} if names else EFFECTS
     return diagnose(Problem(runs, car, Tolerance(), firm=True), effects)
 
 
 @pytest.fixture(scope="module")
-def flawless() -> Runs:
+def flawless() -> SimulatedRuns:
     return runs_of(CAR, [])
 
 
-def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics(flawless: Runs) -> None:
+def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics(flawless: SimulatedRuns) -> None:
     def weak(run: Run) -> np.ndarray:
         f_hz = np.fft.rfftfreq(run.count, 1 / run.rate_hz)
         return np.fft.irfft(np.fft.rfft(run.measured_mps2) * 0.992 * np.sinc(f_hz / run.rate_hz), run.count)
 
-    found = searched(Runs([measuring(run, weak(run)) for run in flawless.runs], 500.0))
+    found = searched(SimulatedRuns([measuring(run, weak(run)) for run in flawless.runs], 500.0))
     assert found.verdict == () and not found.unexplained
 
 
 @pytest.fixture(scope="module")
-def fast(flawless: Runs) -> Runs:
+def fast(flawless: SimulatedRuns) -> SimulatedRuns:
     """The same with a distance that is a little long."""
-    return Runs([Run(one.name, one.rate_hz, one.measured_mps2, 1.0008 * one.distance_m, one.speed_mps, one.track)
-                 for one in flawless.runs], 500.0)
+    return SimulatedRuns([replace(one, distance_m=1.0008 * one.distance_m) for one in flawless.runs], 500.0)
 
 
-def test_a_clock_that_runs_a_little_fast_lacks_no_physics(fast: Runs) -> None:
+def test_a_clock_that_runs_a_little_fast_lacks_no_physics(fast: SimulatedRuns) -> None:
     found = searched(fast)
     assert set(found.verdict) <= {"speed_scale"} and not found.unexplained
     assert fast.runs and found.problem.error(found.after) < 0.3 * found.baseline_error
 
 
-def test_aligning_moves_the_distance_and_leaves_the_car(fast: Runs) -> None:
+def test_aligning_moves_the_distance_and_leaves_the_car(fast: SimulatedRuns) -> None:
     problem = Problem(fast, CAR, Tolerance())
     nominal = problem.start()
     state = aligned(problem, nominal)
@@ -76,7 +76,7 @@ def test_aligning_moves_the_distance_and_leaves_the_car(fast: Runs) -> None:
     assert problem.error(state) < 0.5 * problem.error(nominal)
 
 
-def test_aligning_leaves_a_car_that_was_refitted_where_it_stands(flawless: Runs) -> None:
+def test_aligning_leaves_a_car_that_was_refitted_where_it_stands(flawless: SimulatedRuns) -> None:
     stands = changed(CAR, {"sprung_mass_kg": 1.2 * CAR.sprung_mass_kg})
     start = Problem(flawless, CAR, Tolerance(), stands=stands).start()
     assert start.logs.any()

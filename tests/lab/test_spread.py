@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from logger.lab.fitting import moves_of
 from logger.lab.spread import with_errors
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
+from logger.vehicle.effect_parameters import moves_of
 
 
 @pytest.mark.parametrize("name, key, value, error", [

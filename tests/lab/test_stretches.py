@@ -5,9 +5,10 @@ import pytest
 
 from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
-from logger.lab.prediction import Run, Runs
 from logger.lab.stretches import FIT_S, JUDGE_S, Stretches, Whitener, deviance, unseen_in
 from logger.profiles.track import Track
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 
 from compared import CAR, a_run, measuring
 
@@ -104,6 +105,6 @@ def test_what_judges_has_a_power_whatever_the_rate(rate_hz: float, seconds: floa
 def test_where_nothing_was_measured_that_could_judge_all_is_fitted() -> None:
     run = a_run("run", 10.0, 20.0, 1)
     measured = np.where(np.arange(run.count) < 1400, np.sin(np.arange(run.count)), 0.0)
-    problem = Problem(Runs([measuring(run, measured)], 500.0), CAR, Tolerance())
+    problem = Problem(SimulatedRuns([measuring(run, measured)], 500.0), CAR, Tolerance())
     assert not any(one.judges for one in problem.stretches)
     assert problem.judged_error(problem.start()) == pytest.approx(problem.error(problem.start()))

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from logger.lab.beside import Beside
-from logger.lab.prediction import Run, Runs
 from logger.lab.quantities import chance, measured, numbers_of, unit_of
 from logger.lab.unexplained import turns_of
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
@@ -98,7 +99,7 @@ def test_what_a_wheel_does_in_each_turn_is_found_and_noise_is_not() -> None:
 
 
 def humming(speeds_mps: list[float], swing: float, at_hz: float | None, at_per_m: float | None = None) -> Beside:
-    """Runs in which something hums in time, or along the way."""
+    """SimulatedRuns in which something hums in time, or along the way."""
     rng = np.random.default_rng(4)
 
     def shaken(run: Run) -> np.ndarray:
@@ -106,7 +107,7 @@ def humming(speeds_mps: list[float], swing: float, at_hz: float | None, at_per_m
         turns = at_hz * time_s if at_hz is not None else (at_per_m or 0.0) * run.distance_m
         return 0.05 * np.sin(2 * np.pi * turns) + rng.normal(0, 0.03, run.count)
 
-    runs = Runs([a_run(f"run{i}", speed, 40.0, i, swing) for i, speed in enumerate(speeds_mps)])
+    runs = SimulatedRuns([a_run(f"run{i}", speed, 40.0, i, swing) for i, speed in enumerate(speeds_mps)])
     car = compose(CAR)
     predictions = runs.predict(car)
     measured = [measuring(run, one + shaken(run)) for run, one in zip(runs.runs, predictions, strict=True)]

@@ -13,12 +13,12 @@ from logger.identification.unknown_road.drive_operator import Crossing, Drive, g
 from logger.lab.linear_response import Tabulated, response_of
 from logger.lab.nuisance import Tolerance
 from logger.lab.one_road import apart, in_doubt, likenesses
-from logger.lab.prediction import Run
 from logger.lab.unmeasured import NotOneRoad, SameRoad, State, trials
 from logger.lab.unmeasured import fitted as fit
 from logger.lab.unmeasured_diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
 from logger.profiles.track import Track
 from logger.roads.iso8608 import CM3_M3, generate
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.effect_file import shipped_effects
 from logger.store.vehicle_file import read_vehicle

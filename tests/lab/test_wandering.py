@@ -1,4 +1,4 @@
-"""Runs whose distances wander, against where they were truly driven."""
+"""SimulatedRuns whose distances wander, against where they were truly driven."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from logger.lab.addition import add
 from logger.lab.diagnosis import diagnose
 from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance, wander_of
-from logger.lab.prediction import Run, Runs
 from logger.lab.settling import aligned
 from logger.lab.spread import with_spread
 from logger.lab.verdict import summary, told
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
@@ -33,7 +34,7 @@ def driven(effects: list[Chosen], speeds_mps: tuple[float, ...] = (8.0, 14.0)) -
     rng = np.random.default_rng(5)
     plain = [a_run(f"run{i}", speed, 40.0, i) for i, speed in enumerate(speeds_mps)]
     return [measuring(run, one + rng.normal(0, NOISE_MPS2, run.count))
-            for run, one in zip(plain, Runs(plain).predict(compose(CAR, effects)), strict=True)]
+            for run, one in zip(plain, SimulatedRuns(plain).predict(compose(CAR, effects)), strict=True)]
 
 
 def with_wrong_speed(run: Run, deviation_mps: float, lasts_s: float, seed: int) -> Run:
@@ -49,7 +50,7 @@ def with_wrong_speed(run: Run, deviation_mps: float, lasts_s: float, seed: int) 
 
 
 def problem_of(runs: list[Run]) -> Problem:
-    return Problem(Runs(runs, 500.0), CAR, Tolerance(), firm=True)
+    return Problem(SimulatedRuns(runs, 500.0), CAR, Tolerance(), firm=True)
 
 
 # As far as a real signal is off (spread 0.08 m/s), from one reading to the next or for seconds.
@@ -68,7 +69,8 @@ def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> Non
     assert before > 0.02 and after < min(0.012, 0.5 * before)
     assert wandering.moved_m(problem, laid) > 0.02
     assert laid.tolerance == problem.tolerance
-    assert laid.error(state) < 1.1 * Problem(Runs(true, 500.0), CAR, Tolerance()).error(problem_of(true).start())
+    undisturbed = Problem(SimulatedRuns(true, 500.0), CAR, Tolerance())
+    assert laid.error(state) < 1.1 * undisturbed.error(problem_of(true).start())
 
 
 def test_a_distance_that_wanders_lacks_no_physics_and_hides_none(wrong: tuple[float, float]) -> None:
@@ -81,7 +83,8 @@ def test_a_distance_that_wanders_lacks_no_physics_and_hides_none(wrong: tuple[fl
 
 def test_an_effect_is_added_where_the_runs_lie() -> None:
     runs = [with_wrong_speed(run, 0.08, 1.0, 3 + i) for i, run in enumerate(driven([TIRES]))]
-    firm, loose = (Problem(Runs(runs, 500.0), CAR, Tolerance(), whole=True, firm=firm) for firm in (True, False))
+    firm, loose = (Problem(SimulatedRuns(runs, 500.0), CAR, Tolerance(), whole=True, firm=firm)
+                   for firm in (True, False))
     found = add(firm, loose, [], [chosen(EFFECTS["tire_damping"], {"tire_damping_n_s_per_m": 200.0})])
     floor = NOISE_MPS2 / np.sqrt(np.concatenate([run.measured_mps2[run.first:] ** 2 for run in runs]).mean())
     assert found.error_after < 1.05 * floor < found.error_as_written
@@ -93,7 +96,7 @@ def test_an_effect_is_added_where_the_runs_lie() -> None:
 def test_one_factor_of_all_runs_is_told_from_their_wander(factor: float) -> None:
     problem = problem_of([with_wrong_speed(run, 0.05, 1.0, 3 + i) for i, run in enumerate(driven([]))])
     runs = [replace(run, distance_m=(1 + factor) * run.distance_m) for run in problem.runs.runs]
-    wrong = problem.over(Runs(runs, 500.0))
+    wrong = problem.over(SimulatedRuns(runs, 500.0))
     laid, _ = wandering.lying(wrong, wrong.start())
     for one, run in zip(laid.runs.runs, driven([]), strict=True):
         left_m = one.distance_m - (1 + factor) * run.distance_m

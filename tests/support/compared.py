@@ -1,4 +1,4 @@
-"""Runs whose residual is made to measure, for the tests of the lab's comparison."""
+"""SimulatedRuns whose residual is made to measure, for the tests of the lab's comparison."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.beside import Beside
-from logger.lab.prediction import Run, Runs
 from logger.profiles.track import Track
+from logger.runs import Run
 from logger.shipped import vehicle_file
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 
@@ -41,8 +42,8 @@ def a_run(name: str, speed_mps: float, lasts_s: float, seed: int, swing: float =
 
 
 @cache
-def _driven(lasts_s: float) -> tuple[Runs, tuple[Array, ...], Beside]:
-    runs = Runs([a_run(f"runs/run{i + 1}", speed, lasts_s, i) for i, speed in enumerate(SPEEDS_MPS)])
+def _driven(lasts_s: float) -> tuple[SimulatedRuns, tuple[Array, ...], Beside]:
+    runs = SimulatedRuns([a_run(f"runs/run{i + 1}", speed, lasts_s, i) for i, speed in enumerate(SPEEDS_MPS)])
     car = compose(CAR)
     predictions = tuple(runs.predict(car))
     return runs, predictions, Beside(runs.runs, car, predictions, runs.respond(car))
@@ -61,9 +62,9 @@ def beside_with(residual: Residual, seed: int = 0, lasts_s: float = 40.0) -> Bes
     return Beside(measured, nothing.car, predictions, nothing.responses)
 
 
-def runs_of(beside: Beside) -> Runs:
+def runs_of(beside: Beside) -> SimulatedRuns:
     """The runs of a comparison, to predict."""
-    return Runs(list(beside.runs))
+    return SimulatedRuns(list(beside.runs))
 
 
 def recorded_by(effects: Sequence[tuple[str, dict[str, float]]], noise_mps2: float) -> Residual:
@@ -74,6 +75,6 @@ def recorded_by(effects: Sequence[tuple[str, dict[str, float]]], noise_mps2: flo
     car = compose(CAR, [chosen(shipped_effects()[name], values) for name, values in effects])
 
     def residual(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
-        return Runs([run]).predict(car)[0] - prediction + rng.normal(0, noise_mps2, len(prediction))
+        return SimulatedRuns([run]).predict(car)[0] - prediction + rng.normal(0, noise_mps2, len(prediction))
 
     return residual

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.prediction import Run, Runs
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.drive_file import write_drive, write_profile
 from logger.store.effect_file import shipped_effects
 from logger.vehicle.compose import compose
@@ -53,7 +54,7 @@ def write_runs(folder: Path, effects: Sequence[Chosen], lasts_s: float = 20.0, n
     folders = []
     for index, speed_mps in enumerate(SPEEDS_MPS):
         run = a_run(f"run{index + 1}", speed_mps, lasts_s, index + 3)
-        measured = Runs([run]).predict(car)[0] + rng.normal(0, noise_mps2, run.count)
+        measured = SimulatedRuns([run]).predict(car)[0] + rng.normal(0, noise_mps2, run.count)
         if more is not None:
             measured = measured + more(run)
         to = folder / run.name

@@ -4,8 +4,8 @@ import numpy as np
 
 from logger.chart_data import Field
 from logger.identification.obstacle_paths import Bump
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import RoadInput
+from logger.runs import Run
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump
 from logger.studies.study import Column, Effort, Result, Study, Table
@@ -50,7 +50,7 @@ def run(effort: Effort) -> Result:
                   verdict, (picture,))
 
 
-def _error_percent(record: Record, height_m: float, width_m: float) -> float:
+def _error_percent(record: Run, height_m: float, width_m: float) -> float:
     road = RoadInput(bump=Bump(_BUMP_AT_M, height_m, width_m))
     return error_percent(fitted(record, {MASS: TRUTH[MASS]}, False, road), MASS)
 

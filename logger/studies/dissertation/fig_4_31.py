@@ -4,8 +4,8 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.identification.obstacle_paths import Step
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import RoadInput
+from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, fitted
 from logger.studies.study import Column, Effort, Result, Study, Table
@@ -51,7 +51,7 @@ def run(effort: Effort) -> Result:
     return Result((table, ours), verdict, (picture,))
 
 
-def _mass(record: Record, height_m: float, ours: bool) -> float:
+def _mass(record: Run, height_m: float, ours: bool) -> float:
     return fitted(record, {MASS: TRUTH[MASS]}, ours, RoadInput(step=Step(_STEP_AT_M, height_m))).parameters[MASS]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.obstacle_paths import Step
 from logger.identification.prediction_error_fit import Fit
-from logger.identification.record import Record
 from logger.identification.unknown_inputs import RoadInput
+from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, PS_2119, STEP_M, bridge, record_of, without_profile
 from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table
@@ -72,7 +72,7 @@ def _drive(step_m: float, iri: float, seed: int) -> _Found:
         (1000 * (known.parameters["step.height_m"] - step_m), 1000 * known.standard_errors["step.height_m"]))
 
 
-def _told(record: Record, start: dict[str, float], road: RoadInput) -> Fit | None:
+def _told(record: Run, start: dict[str, float], road: RoadInput) -> Fit | None:
     try:
         return fitted(record, start, True, road)
     except NotIdentifiable:

@@ -1,76 +1,33 @@
 """What a car with effects would have recorded on the runs that were driven.
 
-Problem: the lab asks for hundreds of predictions of the same runs, by cars that differ in a number or an effect.
-Solution: ``Runs`` keeps each run laid out in time (``Passage``), also for the few other position signals (a speed that
-is off by a factor, a distance that wandered) that were asked for last.
-
-``error`` is, everywhere in the lab, the normalised root-mean-square error: rms(measured - model) / rms(measured) over
-all samples, the first 2 s of each run left out.
+Problem: a fit asks for hundreds of predictions of the same runs, by cars that differ in a number or an effect.
+Solution: ``SimulatedRuns`` keeps each run laid out in time (``Passage``), also for the few other position signals (a
+speed that is off by a factor, a distance that wandered) that were asked for last.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import Track
+from logger.runs import Run
 from logger.vehicle.compose import MOST_MPS2, Car, Response, recorded, respond
 from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import FINE_RATE_HZ
 
 Array = npt.NDArray[np.float64]
 
-SKIP_S = 2.0
 _KEPT_PASSAGES = 4
 _STEPPERS = 2
 # Dry friction changes at once: it needs so many times the steps that other laws need.
 _FINER_IF_IT_RUBS = 2
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One drive over one road, evenly sampled: arrays (n,).
-
-    name             as the user knows it
-    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder
-    distance_m       where the front tires stood on the track, as it was recorded
-
-    ValueError for columns of different lengths, or nothing left behind the first 2 s.
-    """
-
-    name: str
-    rate_hz: float
-    measured_mps2: Array
-    distance_m: Array
-    speed_mps: Array
-    track: Track
-
-    def __post_init__(self) -> None:
-        if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
-            raise ValueError(f"{self.name}: expected columns of one length, longer than {SKIP_S:g} s")
-
-    @property
-    def first(self) -> int:
-        """The first sample that counts."""
-        return int(np.ceil(SKIP_S * self.rate_hz - 1e-3))
-
-    @property
-    def count(self) -> int:
-        """How many samples there are."""
-        return len(self.measured_mps2)
-
-    @property
-    def two_tracks(self) -> bool:
-        """Whether the road is known under the right wheels too."""
-        return self.track.elevation_m.ndim == 2
-
-
-class Runs:
+class SimulatedRuns:
     """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
     laws of their own are stepped in two threads besides."""
 
@@ -118,11 +75,3 @@ def _recorded(car: Car, passage: Passage) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         found = recorded(car, passage)
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
-
-
-def error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
-    """rms(measured - model) / rms(measured) over all samples that count."""
-    left = sum(float(((run.measured_mps2 - one)[run.first:] ** 2).sum())
-               for run, one in zip(runs, predictions, strict=True))
-    whole = sum(float((run.measured_mps2[run.first:] ** 2).sum()) for run in runs)
-    return float(np.sqrt(left / whole)) if whole > 0 else float("nan")

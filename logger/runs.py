@@ -1,0 +1,84 @@
+"""One drive over one road, as fits, the lab and identification read it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.profiles.track import Track
+
+Array = npt.NDArray[np.float64]
+
+SKIP_S = 2.0
+"""How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
+_EVEN = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One drive over one road, evenly sampled: arrays (n,).
+
+    name             as the user knows it
+    rate_hz          samples a second
+    measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    distance_m       where the front tires stood on the track, as it was recorded [m]
+    speed_mps        [m/s]
+    track            the road
+    skip_s           how much of the beginning is left out [s]
+
+    ValueError for columns of different lengths, or fewer than two samples after the beginning.
+    """
+
+    name: str
+    rate_hz: float
+    measured_mps2: Array
+    distance_m: Array
+    speed_mps: Array
+    track: Track
+    skip_s: float = SKIP_S
+
+    def __post_init__(self) -> None:
+        if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
+            raise ValueError(f"{self.name}: expected columns of one length, longer than {self.skip_s:g} s")
+
+    @property
+    def first(self) -> int:
+        """The first sample that is not left out."""
+        return int(np.ceil(self.skip_s * self.rate_hz - _EVEN))
+
+    @property
+    def count(self) -> int:
+        """How many samples there are."""
+        return len(self.measured_mps2)
+
+    @property
+    def time_s(self) -> Array:
+        """When the samples were taken, the first at 0 [s]."""
+        return np.arange(self.count) / self.rate_hz
+
+    @property
+    def kept_mps2(self) -> Array:
+        """What was measured, without the beginning [m/s2]."""
+        return self.measured_mps2[self.first:]
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road is known under the right wheels too."""
+        return self.track.elevation_m.ndim == 2
+
+
+def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
+    """rms(measured - model) / rms(measured) over all samples that are not left out; predictions (n,) per run, whole.
+
+    NaN where nothing but zeros was measured."""
+    return normalised_rms([run.kept_mps2 - one[run.first:] for run, one in zip(runs, predictions, strict=True)],
+                          [run.kept_mps2 for run in runs])
+
+
+def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> float:
+    """rms(residuals) / rms(measured) over all samples of arrays (n,); NaN where nothing but zeros was measured."""
+    left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))
+    return float(np.sqrt(left / whole)) if whole > 0 else float("nan")

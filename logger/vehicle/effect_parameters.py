@@ -1,0 +1,86 @@
+"""Numbers of effects as a fit moves them: which there are, where they stand, and by how much they are changed.
+
+Problem: a fit moves a list of numbers, on scales on which they are moved well, and an effect is a frozen record with
+values by name. Solution: a ``Move`` says which number of which effect is meant; coordinates are those of
+``Parameter.coordinate``. Nothing here knows of any data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Chosen, Scale
+
+Array = npt.NDArray[np.float64]
+
+_LOG_STEP = 0.01
+_SHARE_STEP = 0.02
+_LEAST_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Move:
+    """A number of an effect that a fit moves: which effect of the model, and which of its parameters."""
+
+    effect: int
+    parameter: int
+
+
+def moves_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[Move]:
+    """Every number that can be moved, of all effects or of some."""
+    chosen = range(len(effects)) if which is None else which
+    return [Move(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.moves]
+
+
+def moved(effects: Sequence[Chosen], moves: Sequence[Move], coordinates: Array) -> tuple[Chosen, ...]:
+    """The effects with other values, given on the scales of their parameters (m,)."""
+    found = list(effects)
+    for move, coordinate in zip(moves, coordinates, strict=True):
+        one = found[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        found[move.effect] = replace(one, values={**one.values, parameter.name: parameter.value(float(coordinate))})
+    return tuple(found)
+
+
+def coordinates_of(effects: Sequence[Chosen], moves: Sequence[Move]) -> Array:
+    """Where the numbers stand, on the scales of their parameters (m,)."""
+    places = []
+    for move in moves:
+        one = effects[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        places.append(parameter.coordinate(one.values[parameter.name]))
+    return np.array(places)
+
+
+def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float = _LOG_STEP,
+             share_step: float = _SHARE_STEP) -> Array:
+    """Steps of the differences that slopes are taken by, on the scales of the parameters (m,); away from a bound.
+
+    log_step      on logarithmic scales
+    share_step    on others, as a share; both where a parameter has no step of its own
+    """
+    steps = []
+    for move, here in zip(moves, coordinates_of(effects, moves), strict=True):
+        parameter = effects[move.effect].effect.parameters[move.parameter]
+        step = parameter.step
+        if step is None:
+            size = max(abs(here), _LEAST_SHARE * parameter.usual_way())
+            step = log_step if parameter.scale is Scale.LOG else share_step * size
+        forward, back = (parameter.coordinate(parameter.value(here + way)) - here for way in (step, -step))
+        steps.append(forward if abs(forward) > 0.5 * step else max(forward, back, key=abs))
+    return np.array(steps)
+
+
+def steps_apart(one: Chosen, other: Chosen) -> float:
+    """How far the numbers of an effect are apart at two sets of values, at most, in steps of their differences;
+    infinitely far where another choice was made."""
+    choices = [parameter.name for parameter in one.effect.parameters if parameter.choices]
+    if any(one.values[name] != other.values[name] for name in choices):
+        return np.inf
+    moves = moves_of([one])
+    here, there = (coordinates_of([each], moves) for each in (one, other))
+    return float(np.max(np.abs(there - here) / np.abs(steps_of([one], moves)), initial=0.0))
