@@ -30,8 +30,6 @@ from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
-    from logger.estimation.sensor_noise import Sensor
-    from logger.vehicle.vehicle import Vehicle
 
 NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
 
@@ -55,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
+    from logger.api.drives import assessed, read_run
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines, window_lines
     from logger.shipped import vehicle_path
@@ -65,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     vehicle_yaml = vehicle_path(args.vehicle)
     vehicle = read_vehicle(vehicle_yaml)
     _check_files(args, vehicle_yaml)
-    found = _assessed(args.run, vehicle, Sensor(args.noise, args.step), window_m)
+    found = assessed(read_run(args.run), vehicle, Sensor(args.noise, args.step), window_m)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")
@@ -95,23 +94,6 @@ def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
     if clash := [path for path in beside if part.fullmatch(path.name) and path.resolve() in taken]:
         raise BadInput(f"--profile-out {args.profile_out}: expected another name, its parts could be written over "
                        f"{clash[0]}")
-
-
-def _assessed(run: Path, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:
-    """The road of a run. BadInput ("file:line: expected ..., found ...") for files that are not what they should be."""
-    from logger.estimation.assessment import Unusable, assess, estimable
-    from logger.store.drive_file import DRIVE, MAX_SPEED_MPS, PROFILE, read_drive, track_of
-    from logger.store.profile_file import read_profile
-
-    drive = read_drive(run / DRIVE if run.is_dir() else run)
-    try:
-        ready = estimable(drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, drive.distance_m, MAX_SPEED_MPS)
-    except Unusable as error:
-        line = "" if error.sample is None else f":{error.sample + 2}"
-        raise BadInput(f"{drive.path}{line}: {error}") from None
-    profile = run / PROFILE
-    track = track_of(read_profile(profile)) if run.is_dir() and profile.exists() else None
-    return assess(ready, vehicle, sensor, window_m, track)
 
 
 def _write_road(path: Path, found: Assessment) -> list[Path]:

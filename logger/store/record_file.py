@@ -35,7 +35,7 @@ _ROUNDING_STEPS = 0.2
 _HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AccelerationRecord:
     """Samples at start_s, start_s + 1 / rate_hz, ... [s]; acceleration per axis (n,) [m/s2], None where not measured.
 
