@@ -19,7 +19,8 @@ FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
-    "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
+    "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "api",
+    "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
 NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]

@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from logger.commands.report import read_logged
+from logger.api.log_files import read_logged
 from logger.records import WindowRecord
 from logger.store.rotation import ClockMap, SegmentLog, read_sidecar, repair
 from logger.store.segment_log import HEADER, format_row, parse_row, read_log
