@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from logger.comfort.exposure import CautionZone
     from logger.comfort.iso2631 import AxisFigures
     from logger.dsp.weightings.weighting import Weighting
-    from logger.store.record_file import AccelerationRecord
+    from logger.store.formats.record_file import AccelerationRecord
 
 LOWEST_RATE_HZ = 80.0
 # Rounded times make an 80 Hz record look a little slower.
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog comfort``."""
     from logger.plugins import catalogue
-    from logger.store.record_file import read_record
+    from logger.store.formats.record_file import read_record
 
     weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
     if args.weighting not in weightings:

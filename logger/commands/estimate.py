@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
     from logger.estimation.sensor_noise import Sensor
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_vehicle
     from logger.units import WINDOW_M
 
     window_m = WINDOW_M if args.window is None else args.window
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
     """Raise BadInput where a file to write is one that is read, or another one to write."""
-    from logger.store.drive_file import DRIVE, PROFILE
+    from logger.store.formats.drive_file import DRIVE, PROFILE
 
     taken = {path.resolve() for path in (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)}
     for option, path in (("--out", args.out), ("--profile-out", args.profile_out)):
@@ -104,8 +104,8 @@ def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
 def _assessed(run: Path, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:
     """The road of a run. BadInput ("file:line: expected ..., found ...") for files that are not what they should be."""
     from logger.estimation.assessment import Unusable, assess, estimable
-    from logger.store.drive_file import DRIVE, MAX_SPEED_MPS, PROFILE, read_drive, track_of
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.drive_file import DRIVE, MAX_SPEED_MPS, PROFILE, read_drive, track_of
+    from logger.store.formats.profile_file import read_profile
 
     drive = read_drive(run / DRIVE if run.is_dir() else run)
     try:
@@ -121,7 +121,7 @@ def _assessed(run: Path, vehicle: Vehicle, sensor: Sensor, window_m: float) -> A
 def _write_road(path: Path, found: Assessment) -> list[Path]:
     """The parts of the profile, each a file of its own; none where the readings do not make one."""
     from logger.profiles.track import Track
-    from logger.store.drive_file import write_profile
+    from logger.store.formats.drive_file import write_profile
 
     files: list[Path] = []
     for number, part in enumerate(found.road.parts if found.road else (), start=1):

@@ -16,7 +16,7 @@ from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.roads.iri import Array, IriWindow
-    from logger.store.profile_file import Profile
+    from logger.store.formats.profile_file import Profile
 
 WINDOW_M = 100.0
 
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DONE
     if args.profile is None:
         raise BadInput("expected a PROFILE, or --response")
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.profile_file import read_profile
 
     if not args.window > 0:
         raise BadInput(f"--window {args.window:g}: expected a length above 0 m")

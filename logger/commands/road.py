@@ -22,7 +22,7 @@ from logger.files import naming, write_text
 if TYPE_CHECKING:
     from logger.roads.gd_iri import Expected
     from logger.roads.spectrum import Array, Roughness
-    from logger.store.profile_file import Profile
+    from logger.store.formats.profile_file import Profile
 
 _SHORTEST_M = 11.0  # for an IRI
 _MOST_SAMPLES = 20_000_000
@@ -128,7 +128,7 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 
 
 def _classify(args: argparse.Namespace) -> int:
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.profile_file import read_profile
 
     if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
         raise BadInput(f"--psd {args.psd}: expected another file than the profile")
