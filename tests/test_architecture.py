@@ -21,7 +21,8 @@ FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
-    "files", "shipped", "plugins", "installation", "store", "studies", "service", "report", "demo", "commands",
+    "files", "shipped", "plugins", "installation", "store", "studies", "service", "report", "demo", "api",
+    "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
 STORE = ("formats", "log", "export", "integrity")

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +29,6 @@ from logger.errors import EXIT_DONE, BadInput
 if TYPE_CHECKING:
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import Motion
-    from logger.vehicle.compose import Car
     from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
@@ -95,8 +93,9 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
-    from logger.simulation.virtual_drive import SENSOR, as_sensed, response, response_with_effects
-    from logger.store.formats.drive_file import write_drive, write_profile
+    from logger.api.vehicles import car_on
+    from logger.simulation.virtual_drive import SensorErrors, recorded_drive
+    from logger.store.formats.drive_file import COLUMNS, write_drive, write_profile
 
     _check_given(args)
     _check_files(args)
@@ -105,28 +104,26 @@ def _simulate(args: argparse.Namespace) -> None:
         check_out(args.profile_out, (), option="--profile-out")
     vehicle, effects, said = _model(args.vehicle, args.effect)
     track = _road(args)
-    car = _car(vehicle, effects, said, track)
+    car = car_on(vehicle, effects, said, track)
     outputs = _outputs(args.output, car.vehicle, car.structure)
     motion = _motion(args, track, float(car.structure.behind_m.max()))
-    if effects:
-        try:
-            columns, motion = response_with_effects(car, outputs, track, motion, args.rate)
-        except ValueError as error:
-            raise BadInput(f"{car.vehicle.name}: {error}") from None
-    else:
-        columns = response(car.structure, outputs, track, motion, args.rate)
-    accel = as_sensed(columns.pop(SENSOR), args.noise, args.step, args.seed)
-    write_drive(args.out, {"t_s": motion.time_s, SENSOR: accel, "speed_mps": motion.speed_mps,
-                           "distance_m": motion.distance_m, **columns})
+    try:
+        columns = recorded_drive(car, bool(effects), outputs, track, motion, args.rate,
+                                 SensorErrors(args.noise, args.step, args.seed))
+    except ValueError as error:
+        raise BadInput(f"{car.vehicle.name}: {error}") from None
+    write_drive(args.out, columns)
     if args.profile_out is not None:
         write_profile(args.profile_out, track)
+    accel, speed_mps, distance_m = (columns[name] for name in COLUMNS[1:])
     made: dict[str, Any] = {
         "vehicle": vehicle.name, "model": vehicle.model, "file": str(args.out), "samples": len(accel),
         "rate_hz": args.rate, "duration_s": len(accel) / args.rate,
-        "distance_start_m": float(motion.distance_m[0]), "distance_end_m": float(motion.distance_m[-1]),
-        "speed_mean_mps": float(motion.speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
+        "distance_start_m": float(distance_m[0]), "distance_end_m": float(distance_m[-1]),
+        "speed_mean_mps": float(speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
-        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed, "more_columns": list(columns),
+        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed,
+        "more_columns": list(columns)[len(COLUMNS):],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
     print(json.dumps(made) if args.json else _in_words(made))
@@ -185,22 +182,6 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
         except ValueError as error:
             raise BadInput(f"--effect {text}: {error}") from None
     return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked
-
-
-def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], said: Mapping[str, str], track: Track) -> Car:
-    """The vehicle with its effects, which are possible on this road; ``said`` where, by name."""
-    from logger.store.formats.effect_file import check_on
-    from logger.vehicle.compose import compose
-
-    for one in effects:
-        try:
-            check_on(vehicle, one, track.elevation_m.ndim == 2)
-        except BadInput as error:
-            raise BadInput(f"{said[one.effect.name]}: {error}") from None
-    try:
-        return compose(vehicle, effects)
-    except ValueError as error:
-        raise BadInput(f"{vehicle.name}: {error}") from None
 
 
 def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:

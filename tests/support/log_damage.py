@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from logger.commands.report import read_logged
+from logger.api.log_files import read_logged
 from logger.records import WindowRecord
 from logger.store.log.disk_quota import DiskQuota, Limits
 from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair

@@ -34,7 +34,7 @@ _LINES_AT_ONCE = 50_000
 _HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}], each once"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """What a recorder wrote down while it drove, arrays (n,).
 
@@ -57,7 +57,7 @@ class Drive:
     lon_deg: Array | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run(Drive):
     """A drive over a known road, ``track``."""
 

@@ -35,7 +35,7 @@ _ROUNDING_M = 0.0006
 _ROUNDING_STEPS = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Profile:
     """Elevations (n,) [m] of one or two wheel tracks at start_m, start_m + spacing_m, ... [m].
 

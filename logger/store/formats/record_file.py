@@ -35,7 +35,7 @@ _ROUNDING_STEPS = 0.2
 _HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AccelerationRecord:
     """Samples at start_s, start_s + 1 / rate_hz, ... [s]; acceleration per axis (n,) [m/s2], None where not measured.
 
@@ -52,6 +52,11 @@ class AccelerationRecord:
     def duration_s(self) -> float:
         """Every sample stands for one step of time [s]."""
         return len(self.accel_z_mps2) / self.rate_hz
+
+    @property
+    def by_axis(self) -> dict[str, Array | None]:
+        """The accelerations by axis: ``z``, ``x``, ``y``."""
+        return {"z": self.accel_z_mps2, "x": self.accel_x_mps2, "y": self.accel_y_mps2}
 
 
 def read_record(path: Path | str) -> AccelerationRecord:
