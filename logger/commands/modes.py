@@ -138,7 +138,7 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
 
 def _find(args: argparse.Namespace, record: ChannelRecord, inputs: Any) -> ModalResult:
     from logger.modal.analysis import find_modes
-    from logger.modal.spectrum import peak_modes
+    from logger.modal.spectral_peaks import peak_modes
 
     if args.method == SPECTRUM:
         return peak_modes(record.samples, record.rate_hz, _SEGMENTS if args.segments is None else args.segments)

@@ -26,8 +26,8 @@ from logger.commands import main
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import AccelerometerConfig, Config
-from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.hil.log_comparison import Session, compare, read_sessions
+from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.pipeline import longest_wait_us
 from logger.store.log import row_format
 from logger.units import STANDARD_GRAVITY_MPS2

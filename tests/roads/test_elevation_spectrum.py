@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.roads import iso8608
-from logger.roads.spectrum import Spectrum, acceleration_psd, band_edges, classify, smooth, spectrum
+from logger.roads.elevation_spectrum import Spectrum, acceleration_psd, band_edges, classify, smooth, spectrum
 
 
 def random_walk(gd_n0_cm3: float, length_m: float, spacing_m: float, seed: int) -> np.ndarray:
