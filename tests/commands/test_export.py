@@ -13,7 +13,7 @@ from logger.commands.main import main
 from logger.commands.status import stick_lines
 from logger.errors import BadInput, CheckFailed
 from logger.service.config import Config, LogConfig
-from logger.store.export.export import export as export_of_store
+from logger.store.export import export as export_of_store
 from logger.store.export.export_marks import exported_names
 from logger.store.export.stick_status import read_note
 
