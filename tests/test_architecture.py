@@ -18,7 +18,7 @@ TREES = {
     for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
 }
 FLOORS = (
-    "errors", "units", "geodesy", "records", "chart_data", "printable",
+    "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
     "files", "shipped", "plugins", "installation", "store", "studies", "service", "report", "demo", "api",

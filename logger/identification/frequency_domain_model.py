@@ -17,7 +17,6 @@ Everything that fits knows only ``Model``, or ``Differentiable`` where a model h
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -54,24 +53,6 @@ _SLOWEST_MPS = 0.5
 _LONGEST_S = 100.0
 
 
-class Model(Protocol):
-    """What can be fitted: numbers in, one prediction per record out, as long as what was measured."""
-
-    @property
-    def parameters(self) -> Sequence[Free]: ...
-
-    def predict(self, values: Array) -> list[Array]:
-        """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
-
-
-@runtime_checkable
-class Differentiable(Model, Protocol):
-    """A model that knows its derivatives."""
-
-    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
-
-
 class VehicleModel:
     """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle`` and ``road``.
 
@@ -79,6 +60,8 @@ class VehicleModel:
     first sample of a record at the speed it has there, over the road that the track has there. ValueError for a name
     that neither has a number of, or that sets what another one sets.
     """
+
+    exact = True
 
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
                  road: RoadInput | None = None) -> None:

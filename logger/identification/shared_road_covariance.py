@@ -27,6 +27,7 @@ from logger.identification.prediction_error_fit import Fit
 from logger.roads.iso8608 import displacement_psd
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
+from logger.vehicle.named_parameters import Coordinates
 from logger.vehicle.simulate import recorder_gain
 
 Array = npt.NDArray[np.float64]
@@ -74,8 +75,7 @@ def with_common_roughness(model: VehicleModel, fit: Fit) -> CommonRoughness:
     if likeness < _CERTAIN * np.sqrt(size):
         return alone
     share = min(likeness / size, 1.0)
-    scale = np.array([value if one.by_factors else (one.high - one.low) / 2
-                      for one, value in zip(fit.free, values, strict=True)])
+    scale = Coordinates(fit.free).slopes(values)
     independent = np.linalg.pinv(fit.sensitivities.T @ fit.sensitivities, hermitian=True)
     wider = fit.covariance + share * np.outer(scale, scale) * (independent @ crossed @ independent)
     variances = np.maximum(np.diag(wider), np.diag(fit.covariance))

@@ -12,6 +12,7 @@ from logger.identification.noise_models import LEAST_SHARE
 from logger.identification.prediction_error_fit import Fit
 from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
+from logger.vehicle.named_parameters import Coordinates
 
 NORMAL_95 = 1.959964
 _MENTIONED = 0.7
@@ -169,8 +170,7 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
 def _least_known(fit: Fit) -> str:
     """The combination that is known worst: the longest axis of the error ellipsoid in relative changes."""
     names = list(fit.parameters)
-    scale = np.array([abs(fit.parameters[one.name]) if one.by_factors else (one.high - one.low) / 2
-                      for one in fit.free])
+    scale = np.abs(Coordinates(fit.free).slopes(np.array(list(fit.parameters.values()))))
     powers, directions = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
     ends = [directions[:, 0], directions[:, -1]]
     said = []
