@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from logger.lab.verdict import Verdict
     from logger.runs import Array
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
 TOLERANCE = 0.04
@@ -78,7 +78,7 @@ class Bench:
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
-        from logger.store.effect_file import check_on
+        from logger.store.formats.effect_file import check_on
 
         check_on(self.model.vehicle, one, self.two_tracks)
         if one.file is not None and not slow([one.effect]):
@@ -128,7 +128,7 @@ class Bench:
 
         said    how it was asked for
         """
-        from logger.store.effect_file import effect_named
+        from logger.store.formats.effect_file import effect_named
         from logger.vehicle.effect import chosen
 
         if name in self.effects:
@@ -184,8 +184,8 @@ class Bench:
     def model_with(self, found: Gained) -> Model:
         """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
         fit ended at numbers that no car has."""
-        from logger.store.effect_file import check_on
-        from logger.store.vehicle_file import Model, Step
+        from logger.store.formats.effect_file import check_on
+        from logger.store.formats.vehicle_file import Model, Step
 
         for one in found.added.effects:
             check_on(found.added.vehicle, one, two_tracks=True)
@@ -236,7 +236,7 @@ def deviation_of(tolerance: float) -> float:
 def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
     """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
     and the files of the user's own, by name. BadInput for a name that is there twice."""
-    from logger.store.effect_file import own_effect, shipped_effects
+    from logger.store.formats.effect_file import own_effect, shipped_effects
 
     effects, own = dict(shipped_effects()), {}
     for one in model.effects:

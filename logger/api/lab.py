@@ -13,7 +13,7 @@ from logger.api.run_checks import checked_runs
 from logger.api.shown import Result
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.store import drive_file
+from logger.store.formats import drive_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog add-effect``."""
     from logger.lab.gained import as_json
     from logger.report.lab_text import addition_lines
-    from logger.store.vehicle_file import write_model
+    from logger.store.formats.vehicle_file import write_model
 
     check_out(args.out, args.runs)
     given = bench(args)

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.lab.compare import as_json
     from logger.report.lab_text import comparison_lines
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     path = vehicle_path(args.vehicle)
     model = read_model(path)

@@ -39,7 +39,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     from logger.api.bench import require_compiler
     from logger.demo.lab_drives import VEHICLE
     from logger.lab.story import as_json as story_json
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", shipped_effects().values())

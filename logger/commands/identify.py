@@ -109,7 +109,7 @@ def _measured(args: argparse.Namespace) -> int:
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.report.identification_text import as_json, common_words, lines, tests
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_vehicle
 
     if args.waviness is not None:
         raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
@@ -172,7 +172,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
     from logger.identification.unknown_road.road_fit import fit_roads
     from logger.report.unknown_road_text import as_json, lines
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_vehicle
     from logger.vehicle.frequency_response import AxleResponse
 
     options = _road_options(args)
@@ -317,8 +317,8 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     from logger.identification.session import LEAST_SAMPLES
     from logger.profiles.track import Track
     from logger.runs import Run
-    from logger.store.drive_file import DRIVE, PROFILE, read_drive, read_run
-    from logger.store.drive_file import Run as DriveOnRoad
+    from logger.store.formats.drive_file import DRIVE, PROFILE, read_drive, read_run
+    from logger.store.formats.drive_file import Run as DriveOnRoad
 
     folder = path.is_dir()
     if flat_will_do and not (folder and (path / PROFILE).exists()):
@@ -359,7 +359,7 @@ def _write(path: Path, car: VehicleModel | AxleResponse, found: Fit | RoadFit) -
     """The fitted vehicle, its standard errors as comments."""
     import numpy as np
 
-    from logger.store.vehicle_file import write_vehicle
+    from logger.store.formats.vehicle_file import write_vehicle
 
     write_vehicle(path, car.vehicle_with(np.array(list(found.parameters.values()))))
     comments = [f"# {car.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} before, "

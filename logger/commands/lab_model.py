@@ -49,7 +49,7 @@ def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str
     from logger.api.bench import TOLERANCE, bench_of, deviation_of
     from logger.api.run_checks import lab_runs
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     numbers, model = deviation_of(TOLERANCE if tolerance is None else tolerance), read_model(vehicle_path(vehicle))
     return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned)
@@ -60,7 +60,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
 
     runs    their folders
     """
-    from logger.store.drive_file import DRIVE, PROFILE
+    from logger.store.formats.drive_file import DRIVE, PROFILE
 
     if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
         raise BadInput(f"{option} {out}: expected a file that is none of a run's")
