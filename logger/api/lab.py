@@ -142,7 +142,7 @@ def diagnose(
     from logger.lab.verdict import as_json
     from logger.report.lab_text import diagnosis_lines
 
-    bench = _bench(vehicle, runs, effect_files, tolerance, None if candidates else "diagnose")
+    bench = _bench(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose")
     if candidates is not None:
         if unknown := set(candidates) - set(bench.effects):
             raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(bench.effects)}")

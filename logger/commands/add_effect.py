@@ -16,7 +16,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress, warned
+from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress, tell_slow
 from logger.commands.numbers import named_numbers
 from logger.errors import EXIT_DONE
 
@@ -59,9 +59,7 @@ def run(args: argparse.Namespace) -> int:
 def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, float]]:
     """An effect as it was asked for, the file it is from, and what was said of its numbers. BadInput as
     ``Bench.asked_for``."""
-    from logger.api.bench import slow_words
-
     name, values = named_numbers(text, "add-effect")
     effect, file = given.asked_for(name, values, text)
-    warned(slow_words([effect]))
+    tell_slow([effect])
     return effect, file, values

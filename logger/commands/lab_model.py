@@ -16,6 +16,7 @@ from logger.report.text_layout import WIDTH
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
+    from logger.vehicle.effect import Effect
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,8 +88,15 @@ def _may_be_written(path: Path) -> bool:
 
 def warned(words: str) -> None:
     """Say on stderr that it will take long."""
-    if words:
-        print(words, file=sys.stderr, flush=True)
+    print(words, file=sys.stderr, flush=True)
+
+
+def tell_slow(effects: Iterable[Effect]) -> None:
+    """Say so where simulations with these effects take long."""
+    from logger.api.bench import slow_words
+
+    if words := slow_words(effects):
+        warned(words)
 
 
 @contextmanager
