@@ -20,7 +20,8 @@ MODULES = [importlib.import_module(f"logger.api.{one.name}") for one in pkgutil.
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[str, Any]:
-    """What the examples take for given: a run's folder, with a log in it, and a recorded dump."""
+    """What the examples take for given: a run's folder, with a log in it; a recorded dump; a car, and runs of it with a
+    sensor that reads 15 % too much."""
     from logger.commands.main import main
 
     folder = tmp_path_factory.mktemp("run")
@@ -28,7 +29,11 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
     run = ridelog.simulate("rav4-2009", road, speed_mps=20.0, noise_mps2=0.05)
     ridelog.write_run(folder, run)
     assert main(["replay", str(short_dump), "--out", str(folder / "logs"), "--json"]) == 0
-    return {"folder": folder, "recording": short_dump, "np": np, **vars(ridelog)}
+    car, bumpy = ridelog.read_vehicle("rav4-2009"), ridelog.random_road(iso_class="C", length_m=180.0, seed=2)
+    wrong = car.with_effect("sensor_gain", gain=1.15)
+    runs = [ridelog.simulate(wrong, bumpy, speed_mps, noise_mps2=0.03, name=f"at {speed_mps:g} mps")
+            for speed_mps in (9.0, 15.0)]
+    return {"folder": folder, "recording": short_dump, "car": car, "runs": runs, "np": np, **vars(ridelog)}
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)

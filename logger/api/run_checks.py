@@ -1,4 +1,4 @@
-"""Runs that the lab's commands are given: folders on the command line, read and checked together."""
+"""Runs for the lab: read, and checked together."""
 
 from __future__ import annotations
 
@@ -29,27 +29,31 @@ _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
 def lab_runs(folders: Sequence[Path], thin: bool = True) -> SimulatedRuns:
-    """The runs in some folders, of one sample rate; of about 100 samples a second if they have many more and may be
-    thinned (``thin``).
+    """The runs in some folders, as ``checked_runs``. BadInput for one that cannot be read, or is there twice."""
+    from logger.store.formats.drive_file import read_run
 
-    Raises BadInput for one that cannot be read, is there twice, is not what ``check_record`` asks for, or stands
-    nowhere on its own profile.
+    places = [folder.resolve() for folder in folders]
+    if again := next((one for number, one in enumerate(folders) if places[number] in places[:number]), None):
+        raise BadInput(f"{again}: expected each run once")
+    return checked_runs(list(map(read_run, folders)), thin)
+
+
+def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True) -> SimulatedRuns:
+    """Runs of one sample rate; of about 100 samples a second if they have many more and may be thinned (``thin``).
+
+    Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
     from logger.runs import Run
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.formats.drive_file import DRIVE, read_run
+    from logger.store.formats.drive_file import DRIVE
 
-    drives: list[DriveOnRoad] = []
-    for folder in folders:
-        if folder.resolve() in [one.path.resolve() for one in drives]:
-            raise BadInput(f"{folder}: expected each run once")
-        drive = read_run(folder)
+    for number, drive in enumerate(drives):
+        file = drive.path / DRIVE if drive.path.is_dir() else drive.path
         first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
         if last_m < drive.track.start_m or first_m > drive.track.end_m:
-            raise BadInput(f"{folder / DRIVE}: expected distances on the profile, {drive.track.start_m:g} to "
+            raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
                            f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
-        check_record(drive, folder / DRIVE, drives)
-        drives.append(drive)
+        check_record(drive, file, drives[:number])
     runs = [Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
             for one in drives]
     return SimulatedRuns(thinned_runs(runs) if thin else runs)
