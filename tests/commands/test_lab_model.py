@@ -20,7 +20,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_run, write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle
 
-from lacking import OWN, named, write_runs
+from ..support.lab.runs_with_effects import OWN, named, write_runs
 
 SHAKES = """\
 from dataclasses import replace
