@@ -14,7 +14,7 @@ import pytest
 
 from logger.demo.simulated_drive import Drive, record, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 from drives import SHORT_PLAN
 

@@ -14,7 +14,7 @@ from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import Result, Shown, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
-from logger.store import drive_file
+from logger.store.formats import drive_file
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:

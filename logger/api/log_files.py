@@ -6,10 +6,10 @@ from pathlib import Path
 
 from logger.errors import BadInput
 from logger.report.page import LoggedFile
-from logger.store.log_folder import inside_of
-from logger.store.log_name import LogName, finished_path
-from logger.store.segment_log import read_log
-from logger.store.sidecar import read_sidecar
+from logger.store.log.log_folder import inside_of
+from logger.store.log.log_name import LogName, finished_path
+from logger.store.log.row_format import read_log
+from logger.store.log.sidecar import read_sidecar
 
 
 def find_logs(place: Path) -> list[Path]:

@@ -144,7 +144,7 @@ class Dump(Shown):
 
     def samples(self) -> Samples:
         """The accelerometer's samples, decoded by its driver. BadInput for a header that names what cannot be."""
-        from logger.service.assemble import config_for_dump, instrument
+        from logger.service.wiring import config_for_dump, instrument
 
         try:
             config = config_for_dump(self.header, None, "rav4-2009", place=f"{self.path}:1").accelerometer

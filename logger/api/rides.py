@@ -13,7 +13,7 @@ import numpy.typing as npt
 from logger.api.drives import Run
 from logger.api.shown import Result, Shown, table
 from logger.errors import BadInput
-from logger.store import record_file
+from logger.store.formats import record_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart

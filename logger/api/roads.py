@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from logger.api.shown import Result, Shown, table
 from logger.errors import BadInput
-from logger.store import drive_file, profile_file
+from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart

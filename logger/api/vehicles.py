@@ -11,7 +11,7 @@ from logger.errors import BadInput
 from logger.lab.quantities import numbers_of, unit_of
 from logger.profiles.track import Track
 from logger.shipped import vehicle_names, vehicle_path
-from logger.store import effect_file, vehicle_file
+from logger.store.formats import effect_file, vehicle_file
 from logger.vehicle.compose import Car, compose, with_effect
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, names, read

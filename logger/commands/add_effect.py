@@ -34,7 +34,7 @@ from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.lab.gained import Gained
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
 
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog add-effect``."""
     from logger.lab.gained import as_json
-    from logger.store.vehicle_file import write_model
+    from logger.store.formats.vehicle_file import write_model
 
     check_out(args.out, args.runs)
     given = bench(args)
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 def asked_for(text: str, given: Bench) -> tuple[Effect, str | None, dict[str, float]]:
     """An effect as it was asked for, the file it is from, and what was said of its numbers. BadInput where it is not
     known, is in the model already, or cannot be there."""
-    from logger.store.effect_file import effect_named
+    from logger.store.formats.effect_file import effect_named
     from logger.vehicle.effect import chosen
 
     name, values = named_numbers(text, "add-effect")
@@ -138,8 +138,8 @@ def added(given: Bench, start: Chosen, starts: int) -> Gained:
 def model_of(given: Bench, found: Gained) -> Model:
     """The model with the effect, and how it came to it. BadInput for one that could not be read back, because a fit
     ended at numbers that no car has."""
-    from logger.store.effect_file import check_on
-    from logger.store.vehicle_file import Model, Step
+    from logger.store.formats.effect_file import check_on
+    from logger.store.formats.vehicle_file import Model, Step
 
     for one in found.added.effects:
         check_on(found.added.vehicle, one, two_tracks=True)

@@ -20,7 +20,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import open_serial
 from drivers.ports import BytePort
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.service.stop import stopped_by_signals
+from logger.service.shutdown_signals import stopped_by_signals
 from logger.units import US_PER_S
 
 _CHUNK_BYTES = 4096

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.comfort.ride_comfort import ride_comfort
     from logger.plugins import catalogue
     from logger.report.comfort_text import as_json, lines
-    from logger.store.record_file import read_record
+    from logger.store.formats.record_file import read_record
 
     weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
     if args.weighting not in weightings:

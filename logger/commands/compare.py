@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.lab.compare import as_json, compare
     from logger.lab.nuisance import Tolerance
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     tolerance = Tolerance(numbers=deviation_of(args.tolerance))
     path = vehicle_path(args.vehicle)

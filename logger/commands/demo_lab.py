@@ -37,7 +37,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.demo.lab_drives import VEHICLE
     from logger.lab.story import as_json as story_json
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", shipped_effects().values())

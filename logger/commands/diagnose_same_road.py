@@ -20,7 +20,7 @@ from logger.errors import EXIT_DONE, BadInput
 if TYPE_CHECKING:
     from logger.lab.unmeasured_diagnosis import Found
     from logger.runs import Run
-    from logger.store.drive_file import Drive
+    from logger.store.formats.drive_file import Drive
 
 _SHOWN = 8
 
@@ -31,7 +31,7 @@ def run_same_road(args: argparse.Namespace) -> int:
     from logger.lab.unmeasured import NotOneRoad, SameRoad
     from logger.lab.unmeasured_diagnosis import as_json, diagnose_same_road
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     if args.out is not None:
         raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
@@ -64,7 +64,7 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
 
     from logger.profiles.track import Track
     from logger.runs import Run
-    from logger.store.drive_file import DRIVE, read_drive
+    from logger.store.formats.drive_file import DRIVE, read_drive
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")

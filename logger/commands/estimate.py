@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines, window_lines
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_vehicle
     from logger.units import WINDOW_M
 
     window_m = WINDOW_M if args.window is None else args.window
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
     """Raise BadInput where a file to write is one that is read, or another one to write."""
-    from logger.store.drive_file import DRIVE, PROFILE
+    from logger.store.formats.drive_file import DRIVE, PROFILE
 
     taken = {path.resolve() for path in (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)}
     for option, path in (("--out", args.out), ("--profile-out", args.profile_out)):
@@ -99,7 +99,7 @@ def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
 def _write_road(path: Path, found: Assessment) -> list[Path]:
     """The parts of the profile, each a file of its own; none where the readings do not make one."""
     from logger.profiles.track import Track
-    from logger.store.drive_file import write_profile
+    from logger.store.formats.drive_file import write_profile
 
     files: list[Path] = []
     for number, part in enumerate(found.road.parts if found.road else (), start=1):

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.runs import Run
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
 
@@ -111,7 +111,7 @@ def _measured(args: argparse.Namespace) -> int:
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.report.identification_text import as_json, common_words, lines, tests
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     if args.waviness is not None:
         raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
@@ -170,7 +170,7 @@ def _model(args: argparse.Namespace, given: Model, road: RoadInput, unplaced: li
 def _check_effects(args: argparse.Namespace, given: Model, records: Sequence[Run]) -> None:
     """Raise BadInput for an effect that cannot be there on these roads, or one that is to be found and is not there."""
     from logger.commands.lab_model import tell_slow
-    from logger.store.effect_file import check_on, shipped_effects
+    from logger.store.formats.effect_file import check_on, shipped_effects
 
     for one in given.effects:
         check_on(given.vehicle, one, all(record.two_tracks for record in records))
@@ -194,7 +194,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
     from logger.identification.unknown_road.road_fit import fit_roads
     from logger.report.unknown_road_text import as_json, lines
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import Model, read_model
+    from logger.store.formats.vehicle_file import Model, read_model
     from logger.vehicle.frequency_response import AxleResponse
 
     options = _road_options(args)
@@ -355,8 +355,8 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     from logger.identification.session import LEAST_SAMPLES
     from logger.profiles.track import Track
     from logger.runs import Run
-    from logger.store.drive_file import DRIVE, PROFILE, read_drive, read_run
-    from logger.store.drive_file import Run as DriveOnRoad
+    from logger.store.formats.drive_file import DRIVE, PROFILE, read_drive, read_run
+    from logger.store.formats.drive_file import Run as DriveOnRoad
 
     folder = path.is_dir()
     if flat_will_do and not (folder and (path / PROFILE).exists()):
@@ -408,7 +408,7 @@ def _fitted(given: Model, model: DriveModel, found: Fit) -> Model:
 
 def _write(path: Path, made: Model, found: Fit | RoadFit) -> None:
     """The fitted vehicle, its standard errors as comments."""
-    from logger.store.vehicle_file import write_model
+    from logger.store.formats.vehicle_file import write_model
 
     write_model(path, made)
     comments = [f"# {made.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} "

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
         raise BadInput("expected a PROFILE, or --response")
     from logger.report.iri_text import as_json, lines
     from logger.roads.profile_iri import profile_iri
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.profile_file import read_profile
 
     if not args.window > 0:
         raise BadInput(f"--window {args.window:g}: expected a length above 0 m")

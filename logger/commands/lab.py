@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from logger.lab.compare import Comparison
     from logger.lab.story import Round, Story
     from logger.lab.verdict import Verdict
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen
 
 STORY = "story.html"
@@ -117,7 +117,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
 def _round(given: Bench, start: Chosen, out: Path, number: int) -> tuple[Round, Model]:
     """Add an effect, write the vehicle and compare it; the model with it."""
     from logger.lab.story import Round
-    from logger.store.vehicle_file import write_model
+    from logger.store.formats.vehicle_file import write_model
 
     try:
         gained = added(given, start, len(start.effect.trials()))

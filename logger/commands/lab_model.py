@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from logger.lab.fitting import Problem
     from logger.runs import Array
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
 WIDTH = 100
@@ -68,7 +68,7 @@ class Bench:
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
-        from logger.store.effect_file import check_on
+        from logger.store.formats.effect_file import check_on
 
         check_on(self.model.vehicle, one, self.two_tracks)
         if one.file is not None and not slow([one.effect]):
@@ -121,7 +121,7 @@ def bench_of(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str],
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
     """
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     numbers = deviation_of(tolerance)
     model = read_model(vehicle_path(vehicle))
@@ -146,7 +146,7 @@ def deviation_of(tolerance: float) -> float:
 def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
     """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
     and the files of the user's own, by name. BadInput for a name that is there twice."""
-    from logger.store.effect_file import own_effect, shipped_effects
+    from logger.store.formats.effect_file import own_effect, shipped_effects
 
     effects, own = dict(shipped_effects()), {}
     for one in model.effects:
@@ -259,7 +259,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
 
     runs    their folders
     """
-    from logger.store.drive_file import DRIVE, PROFILE
+    from logger.store.formats.drive_file import DRIVE, PROFILE
 
     if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
         raise BadInput(f"{option} {out}: expected a file that is none of a run's")

@@ -12,8 +12,8 @@ from logger.errors import BadInput
 if TYPE_CHECKING:
     from logger.runs import Run
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.drive_file import Drive
-    from logger.store.drive_file import Run as DriveOnRoad
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.drive_file import Run as DriveOnRoad
 
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
 # What the lab looks at lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
@@ -37,7 +37,7 @@ def lab_runs(folders: Sequence[Path], thin: bool = True) -> SimulatedRuns:
     """
     from logger.runs import Run
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.drive_file import DRIVE, read_run
+    from logger.store.formats.drive_file import DRIVE, read_run
 
     drives: list[DriveOnRoad] = []
     for folder in folders:
@@ -72,7 +72,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     import numpy as np
 
     from logger.runs import SKIP_S
-    from logger.store.drive_file import MAX_SPEED_MPS
+    from logger.store.formats.drive_file import MAX_SPEED_MPS
 
     if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
         raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "

@@ -20,9 +20,9 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
 if TYPE_CHECKING:
+    from logger.roads.elevation_spectrum import Array, Roughness
     from logger.roads.gd_iri import Expected
-    from logger.roads.spectrum import Array, Roughness
-    from logger.store.profile_file import Profile
+    from logger.store.formats.profile_file import Profile
 
 _SHORTEST_M = 11.0  # for an IRI
 _MOST_SAMPLES = 20_000_000
@@ -128,7 +128,7 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 
 
 def _classify(args: argparse.Namespace) -> int:
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.profile_file import read_profile
 
     if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
         raise BadInput(f"--psd {args.psd}: expected another file than the profile")
@@ -192,10 +192,10 @@ class Told:
 
 
 def tell(elevation_m: Array, profile: Profile) -> Told:
-    """Measure one track of a profile. ValueError as in ``logger.roads.spectrum.classify``."""
+    """Measure one track of a profile. ValueError as in ``logger.roads.elevation_spectrum.classify``."""
+    from logger.roads.elevation_spectrum import classify
     from logger.roads.gd_iri import iri_of_road
     from logger.roads.iri import iri
-    from logger.roads.spectrum import classify
 
     roughness = classify(elevation_m, profile.spacing_m, profile.widest_step_m)
     expected = iri_of_road(roughness.gd_n0_cm3, (len(elevation_m) - 1) * profile.spacing_m, roughness.waviness)
@@ -203,7 +203,7 @@ def tell(elevation_m: Array, profile: Profile) -> Told:
 
 
 def _psd_csv(profile: Profile, found: Roughness) -> str:
-    from logger.roads.spectrum import acceleration_psd, band_edges, smooth, spectrum
+    from logger.roads.elevation_spectrum import acceleration_psd, band_edges, smooth, spectrum
 
     bands = smooth(spectrum(profile.elevation_m, profile.spacing_m), band_edges(found.lowest_cpm, found.highest_cpm))
     columns = (bands.edges_cpm[:-1], bands.edges_cpm[1:], bands.psd_m3,

@@ -95,7 +95,7 @@ def _simulate(args: argparse.Namespace) -> None:
 
     from logger.api.vehicles import car_on
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
-    from logger.store.drive_file import COLUMNS, write_drive, write_profile
+    from logger.store.formats.drive_file import COLUMNS, write_drive, write_profile
 
     _check_given(args)
     _check_files(args)
@@ -164,8 +164,8 @@ def _check_files(args: argparse.Namespace) -> None:
 def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
     """The vehicle and its effects, those of its file and those asked for, and where each was said, by name."""
     from logger.shipped import vehicle_path
-    from logger.store.effect_file import effect_named
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.effect_file import effect_named
+    from logger.store.formats.vehicle_file import read_model
     from logger.vehicle.compose import with_effect
     from logger.vehicle.effect import chosen
 
@@ -235,8 +235,8 @@ def _road(args: argparse.Namespace) -> Track:
 
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import Obstacle, with_obstacles
-    from logger.store.drive_file import track_of
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.drive_file import track_of
+    from logger.store.formats.profile_file import read_profile
 
     track = Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
     wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
@@ -248,7 +248,7 @@ def _road(args: argparse.Namespace) -> Track:
 
 def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motion:
     from logger.simulation.virtual_drive import at_one_speed, motion_along
-    from logger.store.drive_file import read_speeds
+    from logger.store.formats.drive_file import read_speeds
 
     knots = (at_one_speed(track, wheelbase_m, args.speed) if args.speed is not None else read_speeds(args.speed_file))
     try:
@@ -261,7 +261,7 @@ def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motio
 
 
 def _list_effects(as_json: bool) -> None:
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
 
     if as_json:
         print(json.dumps({"effects": [_told(effect) for effect in shipped_effects().values()]}))

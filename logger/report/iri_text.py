@@ -6,7 +6,7 @@ from typing import Any
 
 from logger.roads.profile_iri import ProfileIri
 from logger.roads.roughness_words import ride_words, road_kinds
-from logger.store.profile_file import Profile
+from logger.store.formats.profile_file import Profile
 
 _HEADS = {"iri_m_per_km": "IRI", "iri_right_m_per_km": "IRI right", "mri_m_per_km": "MRI", "hri_m_per_km": "HRI"}
 

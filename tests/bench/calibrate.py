@@ -18,10 +18,10 @@ from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, Settings, 
 from logger.estimation.rms_relation import rms_relation
 from logger.roads import iso8608
 from logger.roads.gd_iri import iri_per_root_gd
-from logger.service.chain import recorder_gain
+from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.calibration_file import find, fingerprint, keep
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.calibration_file import find, fingerprint, keep
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import FOOT_M, MPH_MPS
 
 from figures import Figures

@@ -47,11 +47,11 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.roads.golden_car import TIRE_BASE_M, sections
-from logger.service import assemble
-from logger.service.chain import GRAVITY_CORNER_HZ, GRID_STEP_US, recorder_gain
+from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, GpsConfig, PipelineConfig
+from logger.service.signal_chain import GRAVITY_CORNER_HZ, GRID_STEP_US, recorder_gain
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import FOOT_M, MPH_MPS, US_PER_S, WINDOW_M
 from logger.vehicle import half_car
 from logger.vehicle.structure import body_point
@@ -538,7 +538,7 @@ def logged_drive(
     """A drive through the real pipeline, and the exact IRI at the places its records tell."""
     rng = np.random.default_rng([FIRST_SEED, seed])
     config = config_for(sensor, window_m, told_latency_s)
-    pipeline = assemble.pipeline(config, assemble.instrument(config.accelerometer), read_vehicle(config.vehicle))
+    pipeline = wiring.pipeline(config, wiring.instrument(config.accelerometer), read_vehicle(config.vehicle))
     start_us = 50_000_000
     readings, clipped = sensor.read(drive.accel_mps2, rng)
     t_us = start_us + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US // sensor.oversample

@@ -15,8 +15,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from logger.store import manifest
-from logger.store.manifest import Manifest, format_manifest
+from logger.store.export import manifest
+from logger.store.export.manifest import Manifest, format_manifest
 
 from figures import Figures
 

@@ -24,7 +24,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import iso8608
 from logger.roads.golden_car import sections
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
 
 from figures import Figures

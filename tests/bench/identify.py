@@ -29,7 +29,7 @@ from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
 from logger.vehicle.frequency_response import AxleResponse, body_acceleration_response
 from logger.vehicle.models import structure_of

@@ -16,7 +16,7 @@ import numpy as np
 from logger.commands.main import main as ridelog
 from logger.roads import iso8608
 from logger.roads.golden_car import GoldenCarFilter, sections
-from logger.store.profile_file import read_profile
+from logger.store.formats.profile_file import read_profile
 from logger.vehicle.quarter_car import GOLDEN_CAR, structure
 from logger.vehicle.state_space import straight_step
 
@@ -33,7 +33,7 @@ def main() -> int:
         path = Path(directory) / "road.csv"
         rows = (f"{SPACING_M * number:.3f},{height:.6f}\n" for number, height in enumerate(elevation.tolist()))
         path.write_text("distance_m,elevation_m\n" + "".join(rows))
-        for module in ("logger.commands.iri", "logger.roads.iri", "logger.store.profile_file"):
+        for module in ("logger.commands.iri", "logger.roads.iri", "logger.store.formats.profile_file"):
             importlib.import_module(module)
         silent = io.StringIO()
         with contextlib.redirect_stdout(silent):

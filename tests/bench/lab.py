@@ -17,9 +17,9 @@ import numpy as np
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
-from logger.store.drive_file import write_drive, write_profile
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import write_drive, write_profile
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import Car, compose, recorded
 from logger.vehicle.effect import Chosen, Effect, chosen
 from logger.vehicle.passage import Passage

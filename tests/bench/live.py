@@ -23,7 +23,7 @@ from drivers.dump import Event, open_dump
 from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 from figures import Figures
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.roads import gd_iri, iso8608
+from logger.roads.elevation_spectrum import Roughness, classify
 from logger.roads.iri import iri, rectified_slope
-from logger.roads.spectrum import Roughness, classify
 
 from figures import Figures
 

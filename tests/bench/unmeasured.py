@@ -18,9 +18,9 @@ from logger.lab.unmeasured import SameRoad
 from logger.lab.unmeasured_diagnosis import Found, diagnose_same_road
 from logger.profiles.track import Track
 from logger.runs import Run
-from logger.store.drive_file import read_drive
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import read_drive
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 
 from figures import Figures
 

@@ -14,8 +14,8 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
 from logger.shipped import vehicle_file
-from logger.store.drive_file import write_drive, write_profile
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import write_drive, write_profile
+from logger.store.formats.vehicle_file import read_vehicle
 
 from bump_drives import bump_record, road_record
 

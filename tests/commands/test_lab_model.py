@@ -17,7 +17,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.shipped import vehicle_file
-from logger.store.drive_file import read_run, write_drive, write_profile
+from logger.store.formats.drive_file import read_run, write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle
 
 from lacking import OWN, named, write_runs

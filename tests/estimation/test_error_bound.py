@@ -12,7 +12,7 @@ from logger.estimation.sensor_noise import Sensor
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 

@@ -11,7 +11,7 @@ from logger.estimation.local_variance import LocalRoughness, RelativeVariance, m
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 

@@ -11,7 +11,7 @@ from logger.estimation.car_response import CarResponse, golden_car_slope
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, _fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure, body_point

@@ -14,7 +14,7 @@ from logger.identification.noise_models import Autoregressive, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
 from logger.runs import normalised_rms
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import Free, changed, free
 

@@ -8,7 +8,7 @@ from logger.lab.blind import blind
 from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 
 from compared import CAR, a_run, measuring

@@ -10,7 +10,7 @@ import pytest
 
 from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Vehicle
 

@@ -13,7 +13,7 @@ from logger.lab.stretches import Cells
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
 from compared import CAR, a_run

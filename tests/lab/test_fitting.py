@@ -17,9 +17,9 @@ from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.settling import settled
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.drive_file import read_run
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import read_run
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import moves_of, steps_apart, steps_of
 from logger.vehicle.named_parameters import read

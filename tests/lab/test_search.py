@@ -16,7 +16,7 @@ from logger.lab.settling import aligned, settled
 from logger.lab.verdict import as_json, told
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read

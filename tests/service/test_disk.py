@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.rotation import SegmentLog
+from logger.store.log.log_writer import SegmentLog
 
 from crashes import FACTS, window
 from disk_faults import HAZARDS

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.space import RESERVE_BYTES
+from logger.store.log.disk_quota import RESERVE_BYTES
 
 from car_days import START_US, CarDay
 from soaking import MAX_FILE_BYTES, soak

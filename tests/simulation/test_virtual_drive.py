@@ -20,8 +20,8 @@ from logger.simulation.virtual_drive import (
     response_with_effects,
     with_obstacles,
 )
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of

@@ -21,7 +21,7 @@ from logger.demo.motion import STEP_S, Motion
 from logger.demo.receiver import Reception, transmit
 from logger.demo.simulated_drive import GPS_BAUD, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 START_US = 41_300_000
 CLOCK_RATE = 1.0 + 20e-6

@@ -13,7 +13,7 @@ from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 
 Array = npt.NDArray[np.float64]
@@ -69,7 +69,7 @@ def runs_of(beside: Beside) -> SimulatedRuns:
 
 def recorded_by(effects: Sequence[tuple[str, dict[str, float]]], noise_mps2: float) -> Residual:
     """What a car with effects would have recorded beyond the plain one, and noise."""
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
     from logger.vehicle.effect import chosen
 
     car = compose(CAR, [chosen(shipped_effects()[name], values) for name, values in effects])

@@ -17,11 +17,11 @@ from drivers.dump import DumpHeader, Event, open_dump
 from drivers.errors import DumpError
 from logger.records import WindowRecord
 from logger.service.storage import Storage
-from logger.store.recording import repair_recordings
-from logger.store.rotation import ClockMap, next_session, read_sidecar, repair
-from logger.store.segment_log import format_row, parse_row, read_log
-from logger.store.space import Limits
-from logger.store.verify import verify
+from logger.store.integrity import verify
+from logger.store.log.disk_quota import Limits
+from logger.store.log.dump_recording import repair_recordings
+from logger.store.log.log_writer import ClockMap, next_session, read_sidecar, repair
+from logger.store.log.row_format import format_row, parse_row, read_log
 
 from fault_trials import Found, Hazard
 from faulty_disk import CrashModel, RecordingFiles, RefusingFiles, RefusingJournal

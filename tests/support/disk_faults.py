@@ -11,8 +11,8 @@ from typing import Any
 from unittest.mock import patch
 
 from logger.service.storage import LOOK_US
-from logger.store import lasting, space
-from logger.store.space import Limits
+from logger.store.log import disk_quota, outage_buffer
+from logger.store.log.disk_quota import Limits
 
 from crashes import ERRORS, KINDS, Service, events, outage, problems, restart, segments
 from fault_trials import Found, Hazard, found
@@ -38,7 +38,7 @@ def disk_never_comes_back(folder: Path, case: tuple[int, int]) -> Found:
         files.refuses = lambda kind, bad=step >= begin: bad
         service.step()
     status = service.storage.status()
-    assert lasting.disk_words(OSError(error, "")) == status.trouble
+    assert outage_buffer.disk_words(OSError(error, "")) == status.trouble
     assert status.rows_waiting >= 20 - begin
     assert status.since_s > 0
     service.storage.close()
@@ -88,7 +88,7 @@ def outages_over_and_over(folder: Path, kind: str) -> Found:
 
 
 def outage_longer_than_memory(folder: Path, places: int) -> Found:
-    with patch.object(lasting, "WAITING_ROWS", places):
+    with patch.object(outage_buffer, "WAITING_ROWS", places):
         files = RefusingFiles()
         service = Service(folder / "log", files)
         for _ in range(3):
@@ -179,7 +179,7 @@ def bad_from_the_start(folder: Path, error: int) -> Found:
     for _ in range(10):
         service.step()
     status = service.storage.status()
-    assert (status.trouble, status.rows_waiting) == (lasting.disk_words(OSError(error, "")), 10)
+    assert (status.trouble, status.rows_waiting) == (outage_buffer.disk_words(OSError(error, "")), 10)
     assert service.storage.log.file_name is None
     files.refuses = lambda kind: False
     service.wait()
@@ -238,7 +238,7 @@ class Card(RefusingFiles):
 
 def small() -> Any:
     """Kilobytes for megabytes."""
-    return patch.multiple(space, RESERVE_BYTES=50_000, STEP_BYTES=5_000)
+    return patch.multiple(disk_quota, RESERVE_BYTES=50_000, STEP_BYTES=5_000)
 
 
 def old_files(folder: Path) -> int:
@@ -252,8 +252,8 @@ def old_files(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
-def keeper(folder: Path, files: Card, exported: set[str], limits: Limits) -> space.SpaceKeeper:
-    return space.SpaceKeeper(folder, limits, lambda _: exported, files)
+def keeper(folder: Path, files: Card, exported: set[str], limits: Limits) -> disk_quota.DiskQuota:
+    return disk_quota.DiskQuota(folder, limits, lambda _: exported, files)
 
 
 def exported_files_go_first(folder: Path, by_quota: bool) -> Found:

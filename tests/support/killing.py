@@ -30,10 +30,10 @@ from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
-from logger.store.rotation import LogName
-from logger.store.segment_log import read_log
-from logger.store.vehicle_file import read_vehicle
-from logger.store.verify import verify
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.integrity import verify
+from logger.store.log.log_writer import LogName
+from logger.store.log.row_format import read_log
 
 from fault_trials import Found, Hazard, found
 

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.drive_file import write_drive, write_profile
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.drive_file import write_drive, write_profile
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 from drivers.dump import DumpHeader, Event
 from logger.records import WindowRecord
-from logger.service import assemble
+from logger.service import wiring
 from logger.service.config import Config
-from logger.service.core import Core
-from logger.store.rotation import ClockMap
-from logger.store.segment_log import format_row
-from logger.store.vehicle_file import read_vehicle
+from logger.service.event_core import EventCore
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.log.log_writer import ClockMap
+from logger.store.log.row_format import format_row
 
 
 class Rows:
@@ -35,12 +35,12 @@ class Rows:
         self.rows.append("close")
 
 
-def core_for(header: DumpHeader, config: Config | None = None) -> tuple[Core, Rows]:
-    config = assemble.config_for_dump(header, config, None)
-    sensor = assemble.instrument(config.accelerometer)
+def core_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows]:
+    config = wiring.config_for_dump(header, config, None)
+    sensor = wiring.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
     rows = Rows()
-    return Core(sensor.decoder, assemble.gps_decoder(config), assemble.pipeline(config, sensor, vehicle), rows), rows
+    return EventCore(sensor.decoder, wiring.gps_decoder(config), wiring.pipeline(config, sensor, vehicle), rows), rows
 
 
 def rows_of(header: DumpHeader, events: Iterable[Event], config: Config | None = None) -> Rows:

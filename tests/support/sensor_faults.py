@@ -24,23 +24,24 @@ from drivers.accelerometers._bma220_registers import AXES, CHIP_ID, FILTER, RANG
 from drivers.accelerometers.bma220 import RANGE_CODES, Bma220Config, Bma220Settings, chip_source
 from drivers.dump import DumpHeader, Event
 from drivers.errors import NotPresent
-from drivers.replay import Cue, Fault, RecordedBus, RecordedPort
+from drivers.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 from drivers.sources import SerialSource, Source
 from logger.commands.status import advice
 from logger.records import WindowRecord
-from logger.service import assemble
+from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config
-from logger.service.core import Core
-from logger.service.live import HANG_US, Listener, LiveService, monotonic_us
-from logger.service.observer import Observer
+from logger.service.event_core import EventCore
+from logger.service.frozen_sensor import FROZEN_S
+from logger.service.listener import HANG_US, Listener, monotonic_us
+from logger.service.main_loop import MainLoop
 from logger.service.status import ServiceStatus
-from logger.service.stillness import FROZEN_S
+from logger.service.status_reporter import StatusReporter
 from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import OTHER_DATE_US
-from logger.store.segment_log import read_log
-from logger.store.space import Limits
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.log.disk_quota import Limits
+from logger.store.log.row_format import read_log
 
 from fault_trials import Found, Hazard, found
 from replaying import Rows, core_for
@@ -136,22 +137,23 @@ class Car:
             config = replace(config, accelerometer=AccelerometerConfig(
                 sections=AccelerometerConfig().sections | {"bma220": Bma220Config(range_g=settings.range_g)}))
         self.config = replace(config, log=replace(config.log, directory=folder))
-        sensor = assemble.instrument(self.config.accelerometer)
+        sensor = wiring.instrument(self.config.accelerometer)
         vehicle = read_vehicle(self.config.vehicle)
         self.storage = Storage(folder, {}, 4_000_000, None, Limits(), self.clock)
-        self.decoder = assemble.gps_decoder(self.config)
-        self.pipeline = assemble.pipeline(self.config, sensor, vehicle)
+        self.decoder = wiring.gps_decoder(self.config)
+        self.pipeline = wiring.pipeline(self.config, sensor, vehicle)
         self.rows = Rows()
-        self.core = Core(sensor.decoder, self.decoder, self.pipeline, self.rows)
+        self.core = EventCore(sensor.decoder, self.decoder, self.pipeline, self.rows)
         source: Source = SerialSource("pasco", lambda: self.lines, self.clock, 0.0) if serial else chip_source(
             lambda: self.bus, settings or Bma220Settings(), self.clock, lambda seconds: None)
         self.accelerometer = Supervisor(source, self.clock)
         self.gps = Supervisor(SerialSource("nmea", self.port.opened, self.clock, 0.0), self.clock)
-        self.observer = Observer(self.config, self.core, self.storage, self.pipeline, self.accelerometer, self.gps,
-                                 {"accelerometer": lambda: sensor.decoder.counts, "gps": dict})
+        counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": dict}
+        self.observer = StatusReporter(self.config, self.core, self.storage, self.pipeline, self.accelerometer,
+                                       self.gps, counters)
         events: deque[Event] = deque()
         self.listeners = [Listener(part, events, lambda: None) for part in (self.accelerometer, self.gps)]
-        self.service = LiveService(self.core, self.storage, self.listeners, events, 1.0, 1.0, lambda now_us: None)
+        self.service = MainLoop(self.core, self.storage, self.listeners, events, 1.0, 1.0, lambda now_us: None)
         self.heard_us: list[int] = []
         self.core.feed = self._heard  # type: ignore[method-assign]
         self.longest_step_us = 0
@@ -167,7 +169,7 @@ class Car:
     def _heard(self, event: Event) -> None:
         if event.source != "nmea":
             self.heard_us.append(event.t_us)
-        Core.feed(self.core, event)
+        EventCore.feed(self.core, event)
 
     def rough_road(self, second: float) -> bytes:
         return bytes((0, 4 * self.rng.randrange(2), 4 * (16 + self.rng.randrange(-2, 3))))
@@ -497,7 +499,7 @@ def hour_without_fix(folder: Path, case: None) -> Found:
     return found(rows=len(lost))
 
 
-def dated_rows(jump: Callable[[int], timedelta], seconds: int) -> tuple[Core, Rows]:
+def dated_rows(jump: Callable[[int], timedelta], seconds: int) -> tuple[EventCore, Rows]:
     core, rows = core_for(DumpHeader(None, {"driver": "bma220", "range_g": 2}, {}, "rav4-2009"))
     rng = random.Random(2)
     for second in range(seconds):

@@ -11,7 +11,7 @@ from drivers.dump import Event
 from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 from replaying import Rows, rows_of
 

@@ -16,9 +16,9 @@ from unittest.mock import patch
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.service.storage import Storage
-from logger.store.rotation import ClockMap, SegmentLog
-from logger.store.segment_log import read_log
-from logger.store.space import Limits
+from logger.store.log.disk_quota import Limits
+from logger.store.log.log_writer import ClockMap, SegmentLog
+from logger.store.log.row_format import read_log
 
 from crashes import FACTS, HEADER, OFFSET_US, event_of, problems, window
 from fault_trials import Found, Hazard, found

@@ -18,15 +18,15 @@ from pathlib import Path
 
 from drivers.dump import Event, open_dump
 from logger.records import WindowRecord
-from logger.service import assemble
+from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, LogConfig
-from logger.service.core import Core
-from logger.service.replay import Player
+from logger.service.dump_player import Player
+from logger.service.event_core import EventCore
 from logger.service.storage import Storage
-from logger.store.segment_log import read_log
-from logger.store.space import Limits
-from logger.store.vehicle_file import read_vehicle
-from logger.store.verify import FileCheck, verify
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.integrity import FileCheck, verify
+from logger.store.log.disk_quota import Limits
+from logger.store.log.row_format import read_log
 
 from car_days import HEADER, START_US, CarDay
 
@@ -93,15 +93,15 @@ class _Service:
     """What the loop of the live service does with each event, on the day's clock."""
 
     def __init__(self, directory: Path, quota_bytes: int) -> None:
-        config = assemble.config_for_dump(HEADER, Config(log=LogConfig(directory, MAX_FILE_BYTES)), None)
-        sensor, vehicle = assemble.instrument(config.accelerometer), read_vehicle(config.vehicle)
+        config = wiring.config_for_dump(HEADER, Config(log=LogConfig(directory, MAX_FILE_BYTES)), None)
+        sensor, vehicle = wiring.instrument(config.accelerometer), read_vehicle(config.vehicle)
         self._directory = directory
         self._sync_us = config.log.sync_s * 1e6
         self.t_us = START_US
-        self.storage = Storage(directory, assemble.sidecar(config, sensor, vehicle), MAX_FILE_BYTES, HEADER,
+        self.storage = Storage(directory, wiring.sidecar(config, sensor, vehicle), MAX_FILE_BYTES, HEADER,
                                Limits(quota_bytes, floor_bytes=0), lambda: self.t_us)
-        pipeline = assemble.pipeline(config, sensor, vehicle)
-        self._core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, self.storage.log)
+        pipeline = wiring.pipeline(config, sensor, vehicle)
+        self._core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, self.storage.log)
         self._tended_us = self._sampled_us = START_US
         self.samples: list[Sample] = []
 

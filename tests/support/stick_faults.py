@@ -20,12 +20,12 @@ from unittest.mock import patch
 import pytest
 
 from logger.errors import BadInput, CheckFailed
-from logger.store import manifest, open_folder
-from logger.store.export import ExportResult, Progress, export
-from logger.store.exported import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
-from logger.store.manifest import read_manifest
-from logger.store.open_folder import OpenFolder
-from logger.store.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
+from logger.store.export import directory_handle, manifest
+from logger.store.export.directory_handle import DirectoryHandle
+from logger.store.export.export import ExportResult, Progress, export
+from logger.store.export.export_marks import IDENTITY_NAME, MARKS_NAME, Mark, exported_names, mark_exported
+from logger.store.export.manifest import read_manifest
+from logger.store.export.pairing import FIRST_STICK, NOT_PAIRED, PAIRED_NAME, Pairing
 
 from fault_trials import Found, Hazard, found
 
@@ -177,11 +177,11 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def put_in(system: Stick) -> Any:
     """For the length of a ``with``, the export reaches its stick through this."""
-    return patch.object(open_folder, "os", system)
+    return patch.object(directory_handle, "os", system)
 
 
 def room_for(free_bytes: int) -> Any:
-    return patch.object(OpenFolder, "free_bytes", lambda folder: (free_bytes, 512))
+    return patch.object(DirectoryHandle, "free_bytes", lambda folder: (free_bytes, 512))
 
 
 def number_of_calls(logs: Path, stick: Path) -> int:
@@ -294,7 +294,7 @@ def write_protected(folder: Path, case: None) -> Found:
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, "Read-only file system")
 
-    with patch.multiple(OpenFolder, **dict.fromkeys(("write", "rename", "replace", "discard", "sync"), refuse)):
+    with patch.multiple(DirectoryHandle, **dict.fromkeys(("write", "rename", "replace", "discard", "sync"), refuse)):
         assert run(logs, stick).complete
     return found()
 
@@ -326,7 +326,7 @@ def damaged_marks(folder: Path, case: None) -> Found:
     names = {"00001-001.csv", "00001-001.json"}
     for name in names:
         (folder / name).write_text("text\n")
-    with OpenFolder.at(folder) as opened:
+    with DirectoryHandle.at(folder) as opened:
         mark_exported(opened, {name: Mark(5, (folder / name).stat().st_mtime_ns, "0" * 64) for name in names})
     path = folder / MARKS_NAME
     whole = path.read_bytes()
@@ -454,8 +454,8 @@ def card_that_cannot_be_written_to(folder: Path, error: int) -> Found:
     def refuse(*_: object) -> int:
         raise OSError(error, os.strerror(error))
 
-    with (patch("logger.store.exported.MACHINE_ID", folder / "machine-id"),
-          patch.object(OpenFolder, "open_lock_file", refuse)):
+    with (patch("logger.store.export.export_marks.MACHINE_ID", folder / "machine-id"),
+          patch.object(DirectoryHandle, "open_lock_file", refuse)):
         result, again = run(logs, stick), run(logs, stick)
     assert result.complete
     assert result.copied == again.already_there == NAMES

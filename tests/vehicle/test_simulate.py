@@ -14,7 +14,7 @@ from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.obstacles import pothole, step
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive, recorder_taps, simulate

@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.effect_file import own_effect, shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import own_effect, shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Chosen, chosen

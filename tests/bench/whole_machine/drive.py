@@ -24,7 +24,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event, open_dump
 from logger.demo.motion import Stretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 FAST_MPS, SLOW_MPS = 20.0, 14.0
 SPEED_CHANGE_S = 30.0

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from logger.store.segment_log import HEADER as HEADER_LINE
+from logger.store.log.row_format import HEADER as HEADER_LINE
 
 PROMISED_AFTER_S = 1.0  # sync_s as shipped
 HEADER = HEADER_LINE.split(",")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 
-from logger.store.segment_log import HEADER
+from logger.store.log.row_format import HEADER
 
 from .catalogue import Check, Report
 from .page import page
