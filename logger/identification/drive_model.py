@@ -89,6 +89,14 @@ class DriveModel:
         """The vehicle with its effects. ValueError where it then lacks what its model or an effect needs."""
         return compose(self.vehicle_with(values), self.effects_with(values))
 
+    def trials(self) -> list[dict[str, float]]:
+        """Values of single free numbers of effects, by name, that a search begins at as well: where things stick and
+        slip, downhill from one start may end in another place than from the next."""
+        free = {one.name: one for one in self.parameters}
+        return [{name: value} for name, move in self._moves.items()
+                for value in self.effects[move.effect].effect.parameters[move.parameter].trials
+                if free[name].low <= value <= free[name].high]
+
     def road_with(self, values: Array, run: int) -> RoadInput:
         """The road's input in a run, counted from 0, with these values of the free numbers."""
         return changed_input(self.road, {name: value for name, value in self._named(values) if is_input(name)}, run)

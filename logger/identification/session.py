@@ -107,7 +107,7 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return Options(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
-                   starts=spread_starts(model.parameters, tries))
+                   starts=[*model.trials(), *spread_starts(model.parameters, tries)])
 
 
 def upright_fit(

@@ -28,9 +28,10 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-# Steps of differences: of what moves by factors; of a factor of all distances, which moves what lies far away; of
-# places [m].
-_FACTOR_STEP, _SPEED_STEP, _PLACE_STEP_M = 2e-3, 1e-6, 2e-3
+# Steps of differences, either way: of what moves by factors, and of effects' numbers as shares; of a factor of all
+# distances, which moves what lies far away; of places [m]. What sticks and slips makes a response that is jagged on a
+# fine scale: smaller steps show its teeth, and not where it leads.
+_STEP, _SHARE_STEP, _SPEED_STEP, _PLACE_STEP_M = 5e-3, 1e-2, 1e-6, 5e-3
 _KEPT_TRACKS = 4
 
 
@@ -55,27 +56,25 @@ class SimulatedModel(DriveModel):
         return [one[record.first:] for record, one in zip(self.records, predictions, strict=True)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``Differentiable``: differences."""
-        predictions = self.predict(values)
+        """As ``Differentiable``: differences, to both sides of a number unless it is at a bound."""
         columns = []
         for index, one in enumerate(self.parameters):
             step = self._step(one, float(values[index]))
-            beside = values.copy()
-            beside[index] += step
-            columns.append([(there - here) / step
-                            for there, here in zip(self.predict(beside), predictions, strict=True)])
-        return predictions, [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
+            ends = np.clip(values[index] + step * np.array([-1.0, 1.0]), one.low, one.high)
+            low, high = (self.predict(np.where(np.arange(len(values)) == index, end, values)) for end in ends)
+            columns.append([(there - here) / (ends[1] - ends[0]) for here, there in zip(low, high, strict=True)])
+        return self.predict(values), [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
     def _step(self, one: Free, value: float) -> float:
-        """Of a number, within its bounds."""
+        """Of a number where it is."""
         if (move := self._moves.get(one.name)) is not None:
             chosen = self.effects[move.effect]
             parameter = chosen.effect.parameters[move.parameter]
             here = Chosen(chosen.effect, {**chosen.values, parameter.name: value})
-            step = float(steps_of([*self.effects[: move.effect], here], [move])[0])
+            step = float(steps_of([*self.effects[: move.effect], here], [move], _STEP, _SHARE_STEP)[0])
             return step / slope_of(parameter, value)
         if one.by_factors:
-            return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _FACTOR_STEP)
+            return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else _STEP)
         return _PLACE_STEP_M
 
     def _track(self, run: int, road: RoadInput) -> WheelTracks:
