@@ -12,6 +12,7 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 """
 
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
+from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Number, add_effect, compare, diagnose
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, iri, random_road, read_profile, write_profile
@@ -19,8 +20,12 @@ from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicl
 from logger.errors import BadInput
 
 __all__ = [
+    "AddedEffect",
     "BadInput",
+    "Candidate",
     "Comfort",
+    "Comparison",
+    "Diagnosis",
     "Dump",
     "EffectInfo",
     "Effects",
@@ -28,11 +33,15 @@ __all__ = [
     "Iri",
     "Log",
     "Model",
+    "Number",
     "Profile",
     "Record",
     "Run",
     "Samples",
+    "add_effect",
     "comfort",
+    "compare",
+    "diagnose",
     "effects",
     "estimate",
     "iri",

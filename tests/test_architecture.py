@@ -11,11 +11,13 @@ import pytest
 
 import drivers
 import logger
+import ridelog
 
 ROOT = Path(__file__).parents[1]
 TREES = {
     ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): ast.parse(path.read_text("utf-8"))
-    for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
+    for package in (drivers, logger, ridelog) for root in [Path(str(package.__file__)).parent]
+    for path in root.rglob("*.py")
 }
 FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
@@ -102,6 +104,12 @@ def test_numerical_folders_know_no_files_and_no_clocks(module: str) -> None:
 @pytest.mark.parametrize("module", [name for name in TREES if name.startswith("drivers.")])
 def test_drivers_know_nothing_of_the_logger(module: str) -> None:
     assert not {name for name in imports(module) if name.split(".")[0] == "logger"}
+
+
+def test_the_public_interface_takes_its_names_from_the_api_and_nothing_of_ours_uses_it() -> None:
+    assert {name.rpartition(".")[0] for name in imports("ridelog.__init__") if name.count(".") == 3} <= {
+        name for name in TREES if floor_of(name) == "api"}
+    assert not {module for module in TREES if "ridelog" in {name.split(".")[0] for name in imports(module)}}
 
 
 def test_no_file_imports_itself_through_others() -> None:

@@ -190,6 +190,7 @@ def _profile_of(track: Track) -> Profile:
 class Estimate(Result):
     """The road's roughness from a drive's acceleration, in w windows.
 
+    mean_iri_m_per_km    of the windows that are known; NaN: none is
     edges_m              (w + 1,) ends of the windows [m]
     speed_mps            (w,) mean speed in each [m/s]
     iri_m_per_km         (w,) IRI; NaN where it is not known, ``flags`` say why
@@ -200,6 +201,7 @@ class Estimate(Result):
     profile              the road, as far as the readings tell it, in its parts; it is smoother than the road
     """
 
+    mean_iri_m_per_km: float
     edges_m: Array
     speed_mps: Array
     iri_m_per_km: Array
@@ -255,8 +257,9 @@ def estimate(
     found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
     told, windows = as_json(str(drive.path), found), found.windows
     parts = found.road.parts if found.road else ()
-    return Estimate("\n".join(lines(found, told)), told, windows.edges_m, windows.speed_mps, windows.iri_m_per_km,
-                    windows.iri_std_m_per_km, found.exact_m_per_km, found.least_error_m_per_km, windows.flags,
+    return Estimate("\n".join(lines(found, told)), told, told.get("iri_m_per_km", np.nan), windows.edges_m,
+                    windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
+                    found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
+    from logger.report.html import Html
 
 Row = tuple[str, object, str]
 """What it is called, a number or words, its unit."""
@@ -26,11 +27,16 @@ class Shown(ABC):
         """What a notebook draws of it; the arrays are in them."""
         return ()
 
-    def _repr_html_(self) -> str:
+    def figures(self) -> list[Html]:
+        """The same as figure elements of HTML."""
         from logger.report.charts import chart
+
+        return list(map(chart, self.charts()))
+
+    def _repr_html_(self) -> str:
         from logger.report.notebook import cell
 
-        return cell(repr(self), map(chart, self.charts()))
+        return cell(repr(self), self.figures())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

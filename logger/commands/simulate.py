@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.commands.lab_model import check_out
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_number, named_numbers
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -182,23 +182,6 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
         except ValueError as error:
             raise BadInput(f"--effect {text}: {error}") from None
     return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked
-
-
-def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
-    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
-    from math import isfinite
-
-    name, _, rest = text.partition(":")
-    found: dict[str, float] = {}
-    for piece in rest.split(",") if rest else ():
-        parameter, _, value = piece.partition("=")
-        try:
-            found[parameter] = float(value)
-        except ValueError:
-            found[parameter] = float("nan")
-        if not isfinite(found[parameter]):
-            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
-    return name, found
 
 
 def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:

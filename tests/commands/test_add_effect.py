@@ -12,7 +12,7 @@ from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 
-from lacking import OWN, named, write_runs
+from ..support.lab.runs_with_effects import OWN, named, write_runs
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from logger.errors import BadInput
 from logger.store.formats.drive_file import read_run
 from logger.store.formats.effect_file import shipped_effects
 
-from lacking import FEW, OWN, named, out_of_balance, write_runs
+from ..support.lab.runs_with_effects import FEW, OWN, named, out_of_balance, write_runs
 
 
 @pytest.fixture(autouse=True)

@@ -32,7 +32,7 @@ from logger.service.pipeline import longest_wait_us
 from logger.store.log import row_format
 from logger.units import STANDARD_GRAVITY_MPS2
 
-from replaying import rows_of
+from ..support.drives.replay import rows_of
 
 PATIENCE_S = 120.0
 PIECE_S = 25

@@ -17,7 +17,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import write_drive, write_profile
 from logger.store.formats.vehicle_file import read_vehicle
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from logger.errors import BadInput
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_model
 
-from lacking import FEW, named, write_runs
+from ..support.lab.runs_with_effects import FEW, named, write_runs
 
 
 @pytest.fixture(autouse=True)

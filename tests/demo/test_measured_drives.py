@@ -13,7 +13,7 @@ from logger.vehicle import half_car
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
 
-from measured_drives import (
+from ..support.drives.measured import (
     SPACING_M,
     Accelerometer,
     Receiver,

@@ -20,8 +20,8 @@ from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.events import Event
 from drivers.readings import AccelerationBlock
 
-from accelerometer_fakes.fake import Clock
-from accelerometer_fakes.iio import SCALE, FakeIio
+from ..support.accelerometer_fakes.fake import Clock
+from ..support.accelerometer_fakes.iio import SCALE, FakeIio
 
 RAMP_MPS2_PER_S = 0.5
 STEP_US = SCALE / RAMP_MPS2_PER_S * 1e6

@@ -16,7 +16,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
-from measured_drives import road_response
+from ..support.drives.measured import road_response
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 STRUCTURE = structure_of(CAR)

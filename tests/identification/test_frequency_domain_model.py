@@ -17,7 +17,7 @@ from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 BUMP = bump_record(CAR)

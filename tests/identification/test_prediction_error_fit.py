@@ -18,7 +18,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import Free, changed, free
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

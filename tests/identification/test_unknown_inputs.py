@@ -33,7 +33,7 @@ from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import free
 from logger.vehicle.vehicle import Vehicle
 
-from bump_drives import bump_record
+from ..support.drives.bumps import bump_record
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 EFFECTS = [shipped_effects()[name] for name in ("tire_enveloping", "sensor_gain", "speed_scale")]
 

@@ -18,7 +18,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 EFFECTS = shipped_effects()
 

@@ -22,7 +22,7 @@ from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.vehicle import Vehicle
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 EFFECTS = shipped_effects()
 NOISE_MPS2 = 0.05

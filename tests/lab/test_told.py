@@ -16,7 +16,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-from compared import CAR, a_run, beside_with, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, beside_with, measuring
 
 
 @pytest.mark.parametrize(("value", "error", "words"), [

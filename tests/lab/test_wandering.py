@@ -21,7 +21,7 @@ from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 NOISE_MPS2 = 0.05
 EFFECTS = {name: shipped_effects()[name]

@@ -30,10 +30,10 @@ from logger.service.status_reporter import Progress
 from logger.service.supervisor import Supervisor
 from logger.store.formats.vehicle_file import read_vehicle
 
-from accelerometer_fakes import fakes
-from accelerometer_fakes.fake import Clock, Fake, Vector
-from replaying import Rows
-from sensor_faults import epoch
+from ..support.accelerometer_fakes import fakes
+from ..support.accelerometer_fakes.fake import Clock, Fake, Vector
+from ..support.drives.replay import Rows
+from ..support.faults.sensors import epoch
 
 NAMES = list(accelerometers())
 SPEED_MPS = 12.0

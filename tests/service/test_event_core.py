@@ -19,9 +19,9 @@ from logger.service.event_core import STEP_US
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
-from drives import SHORT_PLAN
-from replaying import core_for, rows_of
-from sensor_faults import checked
+from ..support.drives.replay import core_for, rows_of
+from ..support.drives.short_drive import SHORT_PLAN
+from ..support.faults.sensors import checked
 
 
 @pytest.fixture(scope="module")

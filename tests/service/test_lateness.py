@@ -16,7 +16,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import US_PER_S
 
-from replaying import core_for
+from ..support.drives.replay import core_for
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -21,7 +21,7 @@ from logger.vehicle.simulate import drive, recorder_taps, simulate
 from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
 
-from newton import Told, judge, road_under
+from ..support.drives.newton_car import Told, judge, road_under
 
 RMS_GOAL = 1e-4
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

@@ -29,7 +29,7 @@ from logger.vehicle.stepping import march, static_tire_loads_n
 from logger.vehicle.structure import suspension_travel, wheel
 from logger.vehicle.vehicle import Axle, Vehicle
 
-from newton import road_under
+from ..support.drives.newton_car import road_under
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 G = 9.80665

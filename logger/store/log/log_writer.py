@@ -11,7 +11,7 @@ damaged lines left out) which is on the disk before it takes the name, and only 
 instant there is either the part or the finished file, and ``repair`` at the next start makes the step that was missing.
 Every change to the disk goes through ``FileSystem``, so that tests can cut between any two of them.
 
-What is promised, whatever is cut and wherever (``tests/bench/faults.py`` tries it):
+What is promised, whatever is cut and wherever (``tests/benchmarks/faults.py`` tries it):
 
 1. A row that ``sync`` returned for is in the folder, once, in every later instant. The service syncs each row within
    a second of handing it over; a process that is killed loses no row at all that it had handed over.

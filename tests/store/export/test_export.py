@@ -20,8 +20,7 @@ from logger.store.export.export_marks import MARKS_NAME, exported_names
 from logger.store.export.manifest import Manifest, format_manifest, read_manifest
 from logger.store.integrity import FileCheck, verify
 
-from fault_trials import Hazard, cases_for_tests, label
-from stick_faults import (
+from ...support.faults.sticks import (
     HAZARDS,
     NAMES,
     OTHER_LOGGER,
@@ -33,6 +32,7 @@ from stick_faults import (
     own,
     run,
 )
+from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from logger.store.export.export_marks import (
     mark_exported,
 )
 
-from small_files import at_most_s
+from ...support.faults.small_files import at_most_s
 
 
 def a_file(folder: Path, name: str, text: str = "text\n") -> Mark:

@@ -12,7 +12,7 @@ from logger.store.export.export import ExportResult, export
 from logger.store.export.export_marks import exported_names, read_marks
 from logger.store.export.pairing import FIRST_STICK, KEY_FILE, KEY_NAME, OFF, PAIRED_NAME, STICK_NAME, Pairing
 
-from stick_faults import NAMES, a_card, a_stick, contents, own, quiet
+from ...support.faults.sticks import NAMES, a_card, a_stick, contents, own, quiet
 
 KEY = b"0123456789abcdef0123456789abcdef\n"
 FIRST = Pairing(FIRST_STICK)

@@ -15,7 +15,7 @@ from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.passage import Passage
 
-from compared import rough_track
+from ...support.lab.runs_with_residual import rough_track
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 HEAD = """\

@@ -1,6 +1,6 @@
 """The storage of the service cut at every change of the disk: killed, and without power; the repair cut as well.
 
-A few hundred of the crashes of ``tests/bench/faults.py``, and cuts that this bench once showed to be wrong.
+A few hundred of the crashes of ``tests/benchmarks/faults.py``, and cuts that this bench once showed to be wrong.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import pytest
 
 from logger.store.log.log_writer import repair
 
-from crashes import HAZARDS, Life, crash
-from fault_trials import Hazard, cases_for_tests, label
-from faulty_disk import CrashModel, RecordingFiles
+from ...support.faults.crashes import HAZARDS, Life, crash
+from ...support.faults.disk_models import CrashModel, RecordingFiles
+from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)

@@ -13,9 +13,9 @@ from logger.store.log.intact_rows import MOST_HOLES
 from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair
 from logger.store.log.row_format import HEADER, format_row, read_log
 
-from crashes import FACTS, OFFSET_US, problems, window
-from fault_trials import Hazard, cases_for_tests, label
-from log_damage import HAZARDS
+from ...support.faults.crashes import FACTS, OFFSET_US, problems, window
+from ...support.faults.log_damage import HAZARDS
+from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)

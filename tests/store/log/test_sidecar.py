@@ -12,7 +12,7 @@ from logger.store.integrity import FileCheck, verify
 from logger.store.log.log_writer import SegmentLog, read_sidecar, repair
 from logger.store.log.row_format import read_log
 
-from crashes import FACTS, OFFSET_US, window
+from ...support.faults.crashes import FACTS, OFFSET_US, window
 
 
 @pytest.fixture

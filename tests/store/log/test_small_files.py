@@ -15,10 +15,10 @@ from logger.service.config import Config, LogConfig
 from logger.service.shutdown_signals import Stop
 from logger.store.log.log_writer import SegmentLog, next_session
 
-from crashes import window
-from fault_trials import Hazard, cases_for_tests, label
-from faulty_disk import RefusingFiles
-from small_files import HAZARDS, NAMES, THINGS, DeadFile, at_most_s, left_by_a_kill, replace_by
+from ...support.faults.crashes import window
+from ...support.faults.disk_models import RefusingFiles
+from ...support.faults.small_files import HAZARDS, NAMES, THINGS, DeadFile, at_most_s, left_by_a_kill, replace_by
+from ...support.faults.trials import Hazard, cases_for_tests, label
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
