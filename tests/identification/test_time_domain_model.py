@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from bump_drives import bump_record, road_record
 from friction_drives import CAR, FRICTION_N, GROWN_AT_MPS, rubbing_run
 
 from logger.identification.frequency_domain_model import VehicleModel
@@ -24,8 +25,6 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effect_parameters import free_number, move_named
 from logger.vehicle.named_parameters import free
-
-from bump_drives import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 
