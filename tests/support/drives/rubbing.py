@@ -13,7 +13,7 @@ from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4
 from logger.vehicle.simulate import recorder_taps
 
-from newton import judge, road_under
+from .newton_car import judge, road_under
 
 Array = npt.NDArray[np.float64]
 
