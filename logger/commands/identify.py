@@ -7,6 +7,10 @@ driven on. What is free is named as in the vehicle's file; both.NAME is the fron
   ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
       --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --low-pass 20 --out fitted.yaml
 
+The numbers of an effect that the vehicle's file has are free by the effect's name:
+
+  ridelog identify run --vehicle mycar.yaml --free sprung_mass_kg,dry_friction.friction_force_n
+
 What is not known of the road can be free as well: a bump (Eq 4.41) or a step of which only the kind is known, and the
 scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle, and its start is
 looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a single run, NAME).

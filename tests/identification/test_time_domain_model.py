@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bump_drives import bump_record, road_record
-from friction_drives import CAR, FRICTION_N, GROWN_AT_MPS, rubbing_run
 
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import TOGETHER, NotIdentifiable
@@ -25,6 +23,9 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effect_parameters import free_number, move_named
 from logger.vehicle.named_parameters import free
+
+from ..support.drives.bumps import bump_record, road_record
+from ..support.drives.rubbing import CAR, FRICTION_N, GROWN_AT_MPS, rubbing_run
 
 Array = npt.NDArray[np.float64]
 

@@ -6,13 +6,14 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
-from newton import judge, road_under
 
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4
 from logger.vehicle.simulate import recorder_taps
+
+from .newton_car import judge, road_under
 
 Array = npt.NDArray[np.float64]
 
