@@ -15,7 +15,7 @@ from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simul
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Number, add_effect, compare, diagnose
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.rides import Comfort, Record, comfort, read_record
-from logger.api.roads import Iri, Profile, iri, random_road, read_profile, write_profile
+from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
 from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
 from logger.errors import BadInput
 
@@ -36,9 +36,11 @@ __all__ = [
     "Number",
     "Profile",
     "Record",
+    "RoadClass",
     "Run",
     "Samples",
     "add_effect",
+    "classify",
     "comfort",
     "compare",
     "diagnose",

@@ -161,8 +161,7 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
     from logger.report.iri_text import as_json, lines
     from logger.roads.profile_iri import profile_iri
 
-    name = "profile" if isinstance(profile, profile_file.Profile) else str(profile)
-    road = profile if isinstance(profile, profile_file.Profile) else read_profile(profile)
+    name, road = _named(profile)
     try:
         found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
     except ValueError as error:
@@ -173,3 +172,49 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
     return Iri("\n".join(lines(found, road, Path(name).name)), as_json(found, road), whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
                road.start_m + np.array(ends_m), shown[1:])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RoadClass(Result):
+    """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
+
+    road_class       A to H (ISO 8608)
+    gd_n0_cm3        degree of roughness Gd(n0) [cm3], and ``gd_n0_std_cm3`` its standard error
+    waviness         w, and ``waviness_std`` its standard error
+    iri_m_per_km     exact
+    """
+
+    road_class: str
+    gd_n0_cm3: float
+    gd_n0_std_cm3: float
+    waviness: float
+    waviness_std: float
+    iri_m_per_km: float
+
+
+def classify(profile: Profile | Path | str) -> RoadClass:
+    """The class, degree of roughness and waviness of a profile of 100 m or more (ISO 8608).
+
+    Raises BadInput for one that is too short or too odd, and as ``read_profile``.
+
+    >>> found = classify(random_road(iso_class="C", length_m=500.0))
+    >>> found.road_class, abs(found.waviness - 2.0) < 3 * found.waviness_std
+    ('C', True)
+    """
+    from logger.report.road_text import as_json, lines
+    from logger.roads.track_class import track_class
+
+    name, road = _named(profile)
+    tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
+    try:
+        found = [track_class(one, road.spacing_m, road.widest_step_m) for one in tracks]
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    left = found[0].roughness
+    return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
+                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km)
+
+
+def _named(profile: Profile | Path | str) -> tuple[str, Profile]:
+    """A profile and what to call it."""
+    return ("profile", profile) if isinstance(profile, Profile) else (str(profile), read_profile(profile))
