@@ -66,7 +66,7 @@ class MainLoop:
         while not stop.wait(LOOP_S):
             now_us = monotonic_us()
             self.move(now_us)
-            self._sync(now_us)
+            self.sync_in_time(now_us)
             self._storage.tend()
             if now_us - beat_us >= self._beat_us:
                 beat_us = now_us
@@ -104,8 +104,9 @@ class MainLoop:
         self._storage.record(event)
         self._core.feed(event)
 
-    def _sync(self, now_us: int) -> None:
-        """Sync in time: what was written since the last sync must not be older than ``sync_s`` in the next round."""
+    def sync_in_time(self, now_us: int) -> None:
+        """Sync where it is time for that, asked once a round [us, monotonic]: what was written since the last sync must
+        not be older than ``sync_s`` in the next round."""
         if self._unsynced_us is None:
             self._unsynced_us = now_us
         if now_us + LOOP_S * US_PER_S - self._unsynced_us > self._sync_us:

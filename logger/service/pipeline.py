@@ -89,6 +89,11 @@ class Pipeline:
         self.stillness = Stillness()
         self.speed_check = SpeedCheck()
 
+    @property
+    def waiting_samples(self) -> int:
+        """Samples on the grid that wait for their distance or their window."""
+        return sum(map(len, self._pending))
+
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
         if self._start_us is None:

@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 def serve(config: Config, stop: Stop) -> None:
     """Run the service until ``stop`` is set. Raises BadInput for wrong settings, OSError where no folder can be."""
     go_first()
-    _make(config.log.directory)
+    make_log_folder(config.log.directory)
     with FolderLock(config.log.directory):
         _serve(config, stop)
 
@@ -83,8 +83,8 @@ def _serve(config: Config, stop: Stop) -> None:
     log.info("stopped: %d rows written", core.rows)
 
 
-def _make(directory: Path) -> None:
-    """The folder of the logs, on the disk before anything in it is. Raises BadInput where no folder can be or may be
+def make_log_folder(directory: Path) -> None:
+    """Make the folder of the logs, on the disk before anything in it is. Raises BadInput where none can be made, or
     written to."""
     try:
         missing = [folder for folder in (directory, *directory.parents) if not folder.exists()]

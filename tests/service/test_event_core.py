@@ -16,6 +16,7 @@ from logger.demo.simulated_drive import Drive, simulate_drive
 from logger.errors import BadInput
 from logger.service.config import Config, GpsConfig, PipelineConfig
 from logger.service.event_core import STEP_US
+from logger.service.pipeline import Pipeline
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
@@ -231,14 +232,14 @@ def test_an_event_now_and_then_costs_little_time(
     said = next(event.data for event in short_drive.events if event.source == source)
     core, _ = core_for(short_drive.header)
     steps = 0
-    step = core._pipeline.step
+    step = Pipeline.step
 
     def counted(*arguments: Any) -> Any:
         nonlocal steps
         steps += 1
         return step(*arguments)
 
-    monkeypatch.setattr(core._pipeline, "step", counted)
+    monkeypatch.setattr(Pipeline, "step", counted)
     for number in range(60):
         core.feed(Event(number * 119_000_000, source, said))
     core.finish()

@@ -76,7 +76,7 @@ def test_what_was_written_is_synced_before_it_is_as_old_as_the_settings_allow(sy
         now_us += 500_000 + rng.randrange(3_000)  # a round, and what it wrote
         oldest_us = now_us if oldest_us is None else oldest_us
         before = storage.count
-        service._sync(now_us)
+        service.sync_in_time(now_us)
         if storage.count > before:
             ages_us.append(now_us - oldest_us)
             oldest_us = None

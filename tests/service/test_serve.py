@@ -66,10 +66,10 @@ def test_a_folder_that_is_made_is_on_the_disk_before_anything_in_it(tmp_path: Pa
                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[Path] = []
     monkeypatch.setattr(FileSystem, "sync_directory", lambda _, directory: synced.append(directory))
-    serve._make(tmp_path / "var" / "lib" / "log")
+    serve.make_log_folder(tmp_path / "var" / "lib" / "log")
     assert synced == [tmp_path, tmp_path / "var", tmp_path / "var" / "lib"]
     synced.clear()
-    serve._make(tmp_path / "var" / "lib" / "log")
+    serve.make_log_folder(tmp_path / "var" / "lib" / "log")
     assert synced == []
 
 

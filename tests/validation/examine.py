@@ -3,9 +3,14 @@
     python -m tests.validation.examine                    the whole of it, and the report
     python -m tests.validation.examine --one 20 --none 0 --two 0 --outsider 0 --wandering 0 --docs DIR
     python -m tests.validation.examine --report-only
+    python -m tests.validation.examine --release             what is published
 
 Each case is one line of the results file as soon as it is over: stopped, the examination goes on where it was. Remove
 the file to begin anew, as one should after a change of the program. Writes examination.md, .html and .svg.
+
+Seeds 2000 to 2099 are for development: the lab may be changed by what comes of them. Seeds 7000 to 7999 are for
+releases: no development run uses them, they are refused without --release, and the report says of which kind its cases
+are (``cases.seeds``).
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from .cases.random_case import KINDS
+from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
 from .marking.marks import hidden, right, said
 from .marking.sitting import Question, Record, sit
 from .report.pages import Matrix, markdown, page
@@ -24,13 +30,13 @@ from .report.pages import Matrix, markdown, page
 ROOT = Path(__file__).resolve().parents[2]
 COUNTS = {"none": 40, "one": 100, "two": 40, "outsider": 39, "two_outsider": 0, "wandering": 38}
 """Five of each effect of the list, three of each off it; two of each that distances that wander do not imitate."""
-FIRST_SEED = 2000
 
 
-def questions(counts: dict[str, int], first_seed: int) -> list[Question]:
-    """Which cases, the kinds evenly mixed, so that a part of an examination says something of all of them."""
-    planned = [((number + 0.5) / count, Question(kind, first_seed + number))
-               for kind, count in counts.items() for number in range(count)]
+def questions(counts: dict[str, int], first_seed: int, release: bool = False) -> list[Question]:
+    """Which cases, the kinds evenly mixed, so that a part of an examination says something of all of them. ValueError
+    as in ``seeds``."""
+    planned = [((number + 0.5) / count, Question(kind, seed)) for kind, count in counts.items() if count
+               for number, seed in enumerate(seeds(first_seed, count, release))]
     return [question for _, question in sorted(planned)]
 
 
@@ -79,14 +85,22 @@ def main() -> None:
     for kind in KINDS:
         parser.add_argument(f"--{kind.replace('_', '-')}", type=int, default=COUNTS[kind], metavar="N",
                             help=f"how many cases of this kind (default: {COUNTS[kind]})")
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--first-seed", type=int,
+                        help=f"default: {DEVELOPMENT_SEEDS[0]}, of a release {RELEASE_SEEDS[0]}")
+    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "examination.jsonl")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where the report goes")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--in-process", action="store_true", help="call the commands instead of starting them")
     parser.add_argument("--report-only", action="store_true", help="of the results that are there")
     options = parser.parse_args()
-    asked = questions({kind: getattr(options, kind) for kind in KINDS}, options.first_seed)
+    first_seed = options.first_seed
+    if first_seed is None:
+        first_seed = (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
+    try:
+        asked = questions({kind: getattr(options, kind) for kind in KINDS}, first_seed, options.release)
+    except ValueError as error:
+        parser.error(str(error))
     if not options.report_only:
         known = read_results(options.results)
         examine([one for one in asked if one not in known], options.results, options.workers, options.in_process)

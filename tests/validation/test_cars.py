@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from .simulator.cars import GRAVITY_MPS2, Axle, Car, Physics, _damper, _damper_rate, assemble, integrate, ride
+from .simulator.cars import GRAVITY_MPS2, Axle, Car, Physics, assemble, damper_force, damper_rate_of, integrate, ride
 
 CAR = Car("half_car", 650.0, 1000.0, Axle(1.2, 45.0, 24_000.0, 1500.0, 210_000.0),
           Axle(1.5, 40.0, 21_000.0, 1350.0, 190_000.0), 0.2)
@@ -176,10 +176,10 @@ def test_dampers_take_what_the_body_loses(extra: Physics, force) -> None:
 
 def test_every_damper_knows_its_inverse() -> None:
     for v in (-0.7, -0.05, 0.0, 0.03, 0.9):
-        force = _damper(v, 1000.0, 2200.0, 0.1, 0.4)
-        assert _damper_rate(force, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(v)
-    assert _damper(0.2, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(1000 * 0.14)
-    assert _damper(-0.05, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(-110)
+        force = damper_force(v, 1000.0, 2200.0, 0.1, 0.4)
+        assert damper_rate_of(force, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(v)
+    assert damper_force(0.2, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(1000 * 0.14)
+    assert damper_force(-0.05, 1000.0, 2200.0, 0.1, 0.4) == pytest.approx(-110)
 
 
 def test_a_stiff_mount_is_none_and_a_soft_one_frees_the_damper() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from .cases import random_case as cases
 from .cases.random_case import case
+from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS
 from .cases.visibility import UNSEEN, remainders
 from .examine import questions, read_results
 from .marking.marks import Share, alarm, all_named, first_right, goals, numbers, numbers_right, said, share
@@ -134,6 +135,24 @@ def test_a_part_of_the_plan_holds_all_kinds() -> None:
     assert len(set(plan)) == 60
     assert {question.kind for question in plan[:8]} == {"none", "one", "two"}
     assert {question.seed for question in plan if question.kind == "one"} == set(range(2000, 2040))
+
+
+def test_seeds_of_a_release_are_asked_for_by_name() -> None:
+    assert questions({"one": 2, "none": 0}, RELEASE_SEEDS[0], release=True) == [
+        Question("one", RELEASE_SEEDS[0]), Question("one", RELEASE_SEEDS[1])]
+    for first_seed, release in ((RELEASE_SEEDS[0], False), (RELEASE_SEEDS[0] - 1, False), (RELEASE_SEEDS[-1], False),
+                                (RELEASE_SEEDS[-1], True), (DEVELOPMENT_SEEDS[0], True)):
+        with pytest.raises(ValueError, match="release"):
+            questions({"one": 2}, first_seed, release)
+    assert not set(DEVELOPMENT_SEEDS) & set(RELEASE_SEEDS)
+
+
+def test_the_report_says_which_seeds_were_asked() -> None:
+    assert "development seeds 1 to 11: the lab may have been tuned to them" in markdown(RECORDS, 11, "m.svg")
+    kept_back = [record | {"seed": RELEASE_SEEDS[0] + record["seed"]} for record in RECORDS]
+    text = markdown(kept_back, 11, "m.svg")
+    assert "release seeds 7001 to 7011: no run of the lab's development has used them" in text
+    assert "examine --release" in text
 
 
 def test_a_line_that_a_stop_has_torn_is_left_out(tmp_path: Path) -> None:

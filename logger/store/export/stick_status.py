@@ -72,10 +72,10 @@ def read_note(path: Path) -> StickNote | None:
 def read_notes(folder: Path = FOLDER) -> list[StickNote]:
     """All notes of sticks that are plugged in, by their names."""
     return [note for path in sorted(folder.glob("*.json"))
-            if _is_plugged_in(path) and (note := read_note(path)) is not None]
+            if is_plugged_in(path) and (note := read_note(path)) is not None]
 
 
-def _is_plugged_in(path: Path) -> bool:
+def is_plugged_in(path: Path) -> bool:
     """False for the note of a disk that has gone, or is another by now; a note without a number is somebody's own."""
     device, _, number = path.stem.partition(".")
     if not number.isdecimal():

@@ -54,7 +54,7 @@ def test_notes_are_read_as_written_and_in_order(notes: Path) -> None:
 def test_a_stick_whose_note_is_still_empty_waits(led: Path, notes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The unit makes it before anything else, so that a stick is never without a note, nor with that of another."""
     (notes / "sda1.27.json").touch()
-    monkeypatch.setattr(stick_status, "_is_plugged_in", lambda path: True)
+    monkeypatch.setattr(stick_status, "is_plugged_in", lambda path: True)
     waiting, = read_notes(notes)
     assert (waiting.stick, waiting.state, waiting.ok) == ("sda1", "waiting", True)
     assert read_note(notes / "sda1.27.json") == waiting

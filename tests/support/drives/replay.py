@@ -9,6 +9,7 @@ from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
+from logger.service.pipeline import Pipeline
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.log.log_writer import ClockMap
 from logger.store.log.row_format import format_row
@@ -36,11 +37,17 @@ class Rows:
 
 
 def core_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows]:
+    core, rows, _ = parts_for(header, config)
+    return core, rows
+
+
+def parts_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows, Pipeline]:
     config = wiring.config_for_dump(header, config, None)
     sensor = wiring.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
     rows = Rows()
-    return EventCore(sensor.decoder, wiring.gps_decoder(config), wiring.pipeline(config, sensor, vehicle), rows), rows
+    pipeline = wiring.pipeline(config, sensor, vehicle)
+    return EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, rows), rows, pipeline
 
 
 def rows_of(header: DumpHeader, events: Iterable[Event], config: Config | None = None) -> Rows:

@@ -43,7 +43,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.log.disk_quota import Limits
 from logger.store.log.row_format import read_log
 
-from ..drives.replay import Rows, core_for
+from ..drives.replay import Rows, parts_for
 from .trials import Found, Hazard, found
 
 STEP_US = 10_000
@@ -477,7 +477,7 @@ def peaks_beyond_the_range(folder: Path, at_s: float) -> Found:
 
 def hour_without_fix(folder: Path, case: None) -> Found:
     """Rows go on, in constant memory, and are blind; with the fix the distance goes on where it was."""
-    core, rows = core_for(DumpHeader(None, {"driver": "bma220", "range_g": 2}, {}, "rav4-2009"))
+    core, rows, pipeline = parts_for(DumpHeader(None, {"driver": "bma220", "range_g": 2}, {}, "rav4-2009"))
     rng = random.Random(2)
     waiting = []
     for second in range(3720):
@@ -485,7 +485,7 @@ def hour_without_fix(folder: Path, case: None) -> Found:
         core.feed(Event(t_us, "nmea", epoch(second, 12, 12 * second, fix=not 30 <= second < 3630)))
         for tick in range(100):
             core.feed(Event(t_us + tick * STEP_US, "bma220", bytes((0, 0, 4 * (16 + rng.randrange(-2, 3))))))
-        waiting.append(sum(len(part) for part in core._pipeline._pending))
+        waiting.append(pipeline.waiting_samples)
     core.finish()
     lost = [record for record in rows.records if 50 < (record.t_us - BEGIN_US) / 1e6 < 3620]
     assert abs(len(lost) - 3570 / 5) <= 3
@@ -499,8 +499,9 @@ def hour_without_fix(folder: Path, case: None) -> Found:
     return found(rows=len(lost))
 
 
-def dated_rows(jump: Callable[[int], timedelta], seconds: int) -> tuple[EventCore, Rows]:
-    core, rows = core_for(DumpHeader(None, {"driver": "bma220", "range_g": 2}, {}, "rav4-2009"))
+def dated_rows(jump: Callable[[int], timedelta], seconds: int) -> tuple[Rows, int]:
+    """Rows, and how often the date was found to have jumped."""
+    core, rows, pipeline = parts_for(DumpHeader(None, {"driver": "bma220", "range_g": 2}, {}, "rav4-2009"))
     rng = random.Random(2)
     for second in range(seconds):
         t_us = BEGIN_US + second * 1_000_000
@@ -508,26 +509,26 @@ def dated_rows(jump: Callable[[int], timedelta], seconds: int) -> tuple[EventCor
         for tick in range(100):
             core.feed(Event(t_us + tick * STEP_US, "bma220", bytes((0, 0, 4 * (16 + rng.randrange(-2, 3))))))
     core.finish()
-    return core, rows
+    return rows, pipeline.timebase.time_jumps
 
 
 @cache
 def straight_rows(seconds: int) -> Rows:
     """With dates that do not jump."""
-    return dated_rows(lambda second: timedelta(), seconds)[1]
+    return dated_rows(lambda second: timedelta(), seconds)[0]
 
 
 def date_jumps_for_seconds(folder: Path, case: tuple[timedelta, int]) -> Found:
     jump, lasts_s = case
-    core, rows = dated_rows(lambda second: jump if 30 <= second < 30 + lasts_s else timedelta(), 60)
+    rows, jumps = dated_rows(lambda second: jump if 30 <= second < 30 + lasts_s else timedelta(), 60)
     assert rows.records == straight_rows(60).records
-    assert core._pipeline.timebase.time_jumps == 0
+    assert jumps == 0
     return found(rows=len(rows.records))
 
 
 def date_jumps_for_good(folder: Path, jump: timedelta) -> Found:
     straight = straight_rows(100)
-    core, rows = dated_rows(lambda second: jump if second >= 30 else timedelta(), 100)
+    rows, jumps = dated_rows(lambda second: jump if second >= 30 else timedelta(), 100)
     assert [replace(record, utc_us=None) for record in rows.records] == [
         replace(record, utc_us=None) for record in straight.records]
     week_us = round(jump.total_seconds() * 1e6)
@@ -537,7 +538,7 @@ def date_jumps_for_good(folder: Path, jump: timedelta) -> Found:
     first_us = min(t_us for t_us, by in moved if by)
     assert first_us + 30_000_000 > 15_000_000 + OTHER_DATE_US
     assert first_us < 30_000_000 + OTHER_DATE_US + 2_000_000
-    assert core._pipeline.timebase.time_jumps == 1
+    assert jumps == 1
     return found(after_s=first_us / 1e6 - 30)
 
 

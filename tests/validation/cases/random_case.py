@@ -300,10 +300,10 @@ def case(kind: str, seed: int, effect: str | None = None) -> Case:
         least = [max(0.9 * low, 0.5 * each.wanted) for each, (_, _, low) in zip(hidden, chosen, strict=True)]
         if all(value >= low for value, low in zip(strengths, least, strict=True)):
             break
-    return _record(rng, kind, seed, scene, noise, hidden)
+    return recorded(rng, kind, seed, scene, noise, hidden)
 
 
-def _record(
+def recorded(
     rng: np.random.Generator, kind: str, seed: int, scene: Scene, noise: Noise, hidden: tuple[Hidden, ...],
 ) -> Case:
     full = with_effects(scene, hidden)

@@ -7,7 +7,7 @@ import numpy as np
 from ..simulator.effects import EFFECTS
 from ..simulator.roads import random_road
 from ..simulator.scene import Drive, Scene
-from .random_case import Case, _record, draw_car, draw_noise, generator, hide
+from .random_case import Case, draw_car, draw_noise, generator, hide, recorded
 
 KIND = "same_road"
 _GRADES = "BC"
@@ -27,9 +27,9 @@ def same_road_case(
         for speed in speeds_mps)
     noise, scene = draw_noise(rng), Scene(car, drives)
     if effect is None:
-        return _record(rng, "none", seed, scene, noise, ())
+        return recorded(rng, "none", seed, scene, noise, ())
     scene, hidden = hide(rng, scene, (), EFFECTS[effect], strength, noise)
-    return _record(rng, "one", seed, scene, noise, (hidden,))
+    return recorded(rng, "one", seed, scene, noise, (hidden,))
 
 
 def speeds(case: Case) -> list[float]:

@@ -16,6 +16,7 @@ from logger.report.document import document, grid, paragraphs, section
 from logger.report.html import Html, html
 
 from ..cases.random_case import WRONG_FOR_S, WRONG_MPS
+from ..cases.seeds import RELEASE_SEEDS
 from ..marking.marks import (
     CLASSES,
     FAILED,
@@ -101,12 +102,15 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
     kinds = Counter(record["kind"] for record in records)
     counts = ", ".join(f"{count} with {_WORDS[kind]}" for kind, count in kinds.items())
     seeds = [record["seed"] for record in records]
-    lines = [f"{len(records)} random cases ({counts}; seeds {min(seeds)} to {max(seeds)}) made by a simulator that "
-             "shares nothing with ridelog: other equations, another integrator, roads, cars, speeds and noise of its "
-             "own, the car's file off by up to 4 %, distances right to two centimetres but where they wander: there "
+    release = all(seed in RELEASE_SEEDS for seed in seeds)
+    which = "no run of the lab's development has used them" if release else "the lab may have been tuned to them"
+    lines = [f"{len(records)} random cases ({counts}; {'release' if release else 'development'} seeds {min(seeds)} to "
+             f"{max(seeds)}: {which}) made by a simulator that shares nothing with ridelog: other equations, another "
+             "integrator, roads, cars, speeds and noise of its own, the car's file off by up to 4 %, "
+             "distances right to two centimetres but where they wander: there "
              f"they are integrals of a speed that is wrong by {WRONG_MPS[0]:g} to {WRONG_MPS[1]:g} m/s for "
              f"{WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s on end. Each was put before `ridelog diagnose`, and what "
-             f"that named was added by `ridelog add-effect`. Made by `{COMMAND}`."]
+             f"that named was added by `ridelog add-effect`. Made by `{COMMAND}{' --release' if release else ''}`."]
     if len(records) < asked:
         lines.append(f"The examination is not over: {len(records)} of {asked} cases sat.")
     if (programs := len({record["source"] for record in records})) > 1:

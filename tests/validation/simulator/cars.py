@@ -206,7 +206,7 @@ def _fit(corner: np.void, axle: Axle, extra: Physics) -> None:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _damper(rate, bump, rebound, knee, slope):
+def damper_force(rate, bump, rebound, knee, slope):
     """Force of a damper on the body at a compression rate: two slopes, each smaller beyond the knee."""
     speed = abs(rate)
     shape = speed if speed <= knee else knee + slope * (speed - knee)
@@ -214,7 +214,7 @@ def _damper(rate, bump, rebound, knee, slope):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _damper_rate(force, bump, rebound, knee, slope):
+def damper_rate_of(force, bump, rebound, knee, slope):
     """The rate at which the same damper gives this force."""
     shape = force / bump if force >= 0 else -force / rebound
     speed = shape if shape <= knee else knee + (shape - knee) / slope
@@ -241,10 +241,10 @@ def _rates(state, out, body, corners, road, road_rate, dry, health):
             strain = x - state[inner + i]
             strain = max(strain - c.gap, 0.0) + min(strain + c.gap, 0.0)
             pull = c.mount * strain
-            out[inner + i] = _damper_rate(pull, bump, rebound, c.knee, c.slope)
+            out[inner + i] = damper_rate_of(pull, bump, rebound, c.knee, c.slope)
             force += pull
         else:
-            force += _damper(v, bump, rebound, c.knee, c.slope)
+            force += damper_force(v, bump, rebound, c.knee, c.slope)
             out[inner + i] = v
         if c.rubber > 0:
             pull = c.rubber * (x - state[inner + n + i])
