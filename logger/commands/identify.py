@@ -7,6 +7,10 @@ driven on. What is free is named as in the vehicle's file; both.NAME is the fron
   ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
       --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --low-pass 20 --out fitted.yaml
 
+The numbers of an effect that the vehicle's file has are free by the effect's name:
+
+  ridelog identify run --vehicle mycar.yaml --free sprung_mass_kg,dry_friction.friction_force_n
+
 What is not known of the road can be free as well: a bump (Eq 4.41) or a step of which only the kind is known, and the
 scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle, and its start is
 looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a single run, NAME).
@@ -31,6 +35,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -41,13 +47,13 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.identification.frequency_domain_model import VehicleModel
+    from logger.identification.drive_model import DriveModel
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.prediction_error_fit import Fit, Options
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.runs import Run
-    from logger.vehicle.frequency_response import AxleResponse
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.named_parameters import Free
     from logger.vehicle.vehicle import Vehicle
 
@@ -109,14 +115,16 @@ def _measured(args: argparse.Namespace) -> int:
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.report.identification_text import as_json, common_words, lines, tests
     from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_model
 
     if args.waviness is not None:
         raise BadInput("--waviness: expected --unmeasured-road or --same-road with it")
-    vehicle = read_vehicle(vehicle_path(args.vehicle))
+    given = read_model(vehicle_path(args.vehicle))
+    vehicle = given.vehicle
     road, unplaced = _road(args)
     records = _records(args, flat_will_do=bool(road.obstacles))
-    model_of = partial(_model, args, vehicle, road, unplaced)
+    _check_effects(args, given, records)
+    model_of = partial(_model, args, given, road, unplaced)
     model = model_of(records)
     try:
         found = upright_fit(model_of, records, partial(_options, args))
@@ -134,7 +142,7 @@ def _measured(args: argparse.Namespace) -> int:
     common = with_common_roughness(model, found)
     found = common.fit
     if args.out is not None:
-        _write(args.out, model, found)
+        _write(args.out, _fitted(given, model, found), found)
     if args.json:
         print(json.dumps({**as_json(found, *checks), "common_roughness": common.share,
                           "runs": [str(folder) for folder in args.runs]}, allow_nan=False))
@@ -148,41 +156,63 @@ def _measured(args: argparse.Namespace) -> int:
     return EXIT_DONE if found.converged else EXIT_CHECK_FAILED
 
 
-def _model(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, unplaced: list[str],
-           records: list[Run]) -> VehicleModel:
-    from logger.identification.frequency_domain_model import VehicleModel
-    from logger.identification.session import obstacle_starts
+def _model(args: argparse.Namespace, given: Model, road: RoadInput, unplaced: list[str],
+           records: list[Run]) -> DriveModel:
+    from logger.identification.session import drive_model, obstacle_starts
 
     try:
-        starts = obstacle_starts(vehicle, records, road, unplaced)
+        starts = obstacle_starts(given.vehicle, records, road, unplaced)
     except ValueError as error:
         raise BadInput(f"--{error}") from None
-    free = _free(args, vehicle, road, starts)
+    free = _free(args, given, road, starts)
     try:
-        return VehicleModel(vehicle, free, records, road)
+        return drive_model(given.vehicle, given.effects, free, records, road)
     except ValueError as error:
         raise BadInput(f"--free: {error}") from None
 
 
+def _check_effects(args: argparse.Namespace, given: Model, records: Sequence[Run]) -> None:
+    """Raise BadInput for an effect that cannot be there on these roads, or one that is to be found and is not there."""
+    from logger.commands.lab_model import tell_slow
+    from logger.store.formats.effect_file import check_on, shipped_effects
+
+    for one in given.effects:
+        check_on(given.vehicle, one, all(record.two_tracks for record in records))
+    tell_slow([one.effect for one in given.effects])
+    there = [one.effect.name for one in given.effects]
+    for name in map(str.strip, args.free.split(",")):
+        effect = name.partition(".")[0]
+        if "." in name and effect in shipped_effects() and effect not in there:
+            raise BadInput(f"--free {name}: expected an effect that is in the vehicle's file, {args.vehicle} has "
+                           f"{', '.join(there) or 'none'}; add it with 'ridelog add-effect {effect} --vehicle "
+                           f"{args.vehicle} --out FILE RUN...', or write it under 'effects' in the file")
+
+
 def _unmeasured(args: argparse.Namespace) -> int:
     """A fit over roads of which only the kind is known."""
+    import numpy as np
+
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, drives_of
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.road_fit import fit_roads
     from logger.report.unknown_road_text import as_json, lines
     from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import Model, read_model
     from logger.vehicle.frequency_response import AxleResponse
 
     options = _road_options(args)
-    vehicle = read_vehicle(vehicle_path(args.vehicle))
+    given = read_model(vehicle_path(args.vehicle))
+    if given.effects:
+        raise BadInput(f"{args.vehicle}: expected a car without effects where the road was not measured, found "
+                       f"{', '.join(one.effect.name for one in given.effects)}")
+    vehicle = given.vehicle
     records = _records(args, flat_will_do=True)
     try:
         drives = drives_of(records)
     except UnusableRun as error:
         raise BadInput(f"{args.runs[error.run]}: {error}") from None
-    free = _free(args, vehicle, RoadInput(), {})
+    free = _free(args, given, RoadInput(), {})
     try:
         car = AxleResponse(vehicle, free, drives[0].rate_hz)
     except ValueError as error:
@@ -196,7 +226,7 @@ def _unmeasured(args: argparse.Namespace) -> int:
         print(f"ridelog: {refusal}", file=sys.stderr)
         return EXIT_CHECK_FAILED
     if args.out is not None:
-        _write(args.out, car, found)
+        _write(args.out, Model(car.vehicle_with(np.array(list(found.parameters.values())))), found)
     if args.json:
         print(json.dumps({**as_json(found, free), "runs": [str(path) for path in args.runs]}, allow_nan=False))
     else:
@@ -229,11 +259,10 @@ def _road_options(args: argparse.Namespace) -> Any:
                    scale_off=_SCALE_OFF)
 
 
-def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: dict[str, float]) -> list[Free]:
+def _free(args: argparse.Namespace, given: Model, road: RoadInput, found: dict[str, float]) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
-    from logger.identification.unknown_inputs import EACH, expanded, free_input, is_input, run_and_name
-    from logger.vehicle.named_parameters import free
+    from logger.identification.unknown_inputs import EACH, expanded, is_input, run_and_name
 
     runs = len(args.runs)
     wanted = [name.strip() for name in args.free.split(",") if name.strip()]
@@ -248,16 +277,29 @@ def _free(args: argparse.Namespace, vehicle: Vehicle, road: RoadInput, found: di
              for one in expanded(name, runs)}
     between = {one: (values[0], values[1]) for name, values in (_numbers(text, "--bounds", 2) for text in args.bounds)
                for one in expanded(name, runs)}
-    for option, given in (("--start", start), ("--bounds", between)):
-        if unknown := set(given) - set(names):
+    for option, said in (("--start", start), ("--bounds", between)):
+        if unknown := set(said) - set(names):
             raise BadInput(f"{option} {sorted(unknown)[0]}: expected one of what is free ({', '.join(names)})")
     first = {run_and_name(name)[1]: place for name, place in reversed(found.items())}
     start = {**first, **found, **start}
     try:
-        return [free_input(road, name, start.get(name), between.get(name)) if is_input(name)
-                else free(vehicle, name, start.get(name), between.get(name)) for name in names]
+        return [_free_number(given, road, name, start.get(name), between.get(name)) for name in names]
     except ValueError as error:
         raise BadInput(f"--free: {error}") from None
+
+
+def _free_number(given: Model, road: RoadInput, name: str, start: float | None,
+                 between: tuple[float, float] | None) -> Free:
+    """A number of the road, of an effect or of the car. ValueError for one that none of them has."""
+    from logger.identification.unknown_inputs import free_input, is_input
+    from logger.vehicle.effect_parameters import free_number, move_named
+    from logger.vehicle.named_parameters import free
+
+    if is_input(name):
+        return free_input(road, name, start, between)
+    if (move := move_named(given.effects, name)) is not None:
+        return free_number(given.effects, move, start, between)
+    return free(given.vehicle, name, start, between)
 
 
 def _road(args: argparse.Namespace) -> tuple[RoadInput, list[str]]:
@@ -332,7 +374,7 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     return Run(str(path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
 
 
-def _options(args: argparse.Namespace, model: VehicleModel) -> Options:
+def _options(args: argparse.Namespace, model: DriveModel) -> Options:
     from logger.identification.session import fit_options
 
     rate_hz = model.records[0].rate_hz
@@ -355,15 +397,26 @@ def _nothing_told(refusal: NotIdentifiable, before: float | None) -> dict[str, A
             "cannot_tell": [finding.words for finding in refusal.findings]}
 
 
-def _write(path: Path, car: VehicleModel | AxleResponse, found: Fit | RoadFit) -> None:
-    """The fitted vehicle, its standard errors as comments."""
+def _fitted(given: Model, model: DriveModel, found: Fit) -> Model:
+    """The model with the numbers that were found, and the standard errors of its effects'."""
     import numpy as np
 
-    from logger.store.formats.vehicle_file import write_vehicle
+    values = np.array(list(found.parameters.values()))
+    effects = []
+    for one in model.effects_with(values):
+        errors = {name.partition(".")[2]: error for name, error in found.standard_errors.items()
+                  if name.partition(".")[0] == one.effect.name and name.partition(".")[2] in one.values}
+        effects.append(replace(one, standard_errors={**one.standard_errors, **errors}))
+    return replace(given, vehicle=model.vehicle_with(values), effects=tuple(effects))
 
-    write_vehicle(path, car.vehicle_with(np.array(list(found.parameters.values()))))
-    comments = [f"# {car.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} before, "
-                f"{found.error_after:.4f} after"]
+
+def _write(path: Path, made: Model, found: Fit | RoadFit) -> None:
+    """The fitted vehicle, its standard errors as comments."""
+    from logger.store.formats.vehicle_file import write_model
+
+    write_model(path, made)
+    comments = [f"# {made.vehicle.name} with numbers fitted by ridelog identify; error {found.error_before:.4f} "
+                f"before, {found.error_after:.4f} after"]
     comments += [f"# {name}: {value:.6g}, standard error {found.standard_errors[name]:.2g}"
                  for name, value in found.parameters.items()]
     write_text(path, "\n".join([*comments, path.read_text("utf-8")]))

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.frequency_domain_model import VehicleModel
-from logger.identification.noise_models import LEAST_SHARE
-from logger.identification.prediction_error_fit import Fit
+from logger.identification.drive_model import DriveModel
+from logger.identification.prediction_error_fit import Fit, least_share
 from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
 from logger.vehicle.named_parameters import Coordinates
@@ -19,10 +18,10 @@ _MENTIONED = 0.7
 _DOUBTFUL = 0.1
 
 
-def tests(model: VehicleModel, fit: Fit) -> tuple[Test, Test]:
+def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
     """Whether the fit's residuals are white, and whether they are free of the road; untested where they are no more
     than the predictions' own inaccuracy."""
-    if fit.error_after < LEAST_SHARE:
+    if fit.error_after < least_share(model):
         return UNTESTED, UNTESTED
     inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
               zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
@@ -94,7 +93,7 @@ def lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield from _limits(fit, sound=not any(doubts(fit, white, free_of_road)))
 
 
-def common_words(model: VehicleModel, common: CommonRoughness) -> Iterator[str]:
+def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
     """Whether drives over one obstacle, or one profile, were over one road, and what that means for the errors."""
     runs = len(model.records)
     if common.share:

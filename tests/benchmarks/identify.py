@@ -21,6 +21,7 @@ from logger.identification.noise_models import Autoregressive, Noise, RoadNoise,
 from logger.identification.obstacle_paths import Bump
 from logger.identification.prediction_error_fit import Fit, Options, fit
 from logger.identification.shared_road_covariance import with_common_roughness
+from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.road_fit import fit_roads
@@ -28,14 +29,18 @@ from logger.profiles.track import Track
 from logger.roads.iso8608 import HIGHEST_CPM, LOWEST_CPM, displacement_psd, gd_n0_from_iri
 from logger.runs import Run
 from logger.shipped import vehicle_file
+from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import BUMP_MPS, RATE_HZ, SPACING_M, recorded
+from logger.vehicle.effect import chosen
+from logger.vehicle.effect_parameters import free_number, move_named
 from logger.vehicle.frequency_response import AxleResponse, body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from ..support.drives.bumps import bump_record, road_record
+from ..support.drives.rubbing import FRICTION_N, GROWN_AT_MPS, rubbing_run
 from .figures import Figures
 
 Array = npt.NDArray[np.float64]
@@ -47,6 +52,7 @@ IRI, NOISE_MPS2, SECONDS, BUMP_AT_M = 5.0, 0.05, 12.0, 8.0
 DRAWS, START_DRAWS = 200, 4
 GRID = 8192
 PASS_DRAWS = 100
+FRICTION, RUBBING_DRAWS, RUBBING_ROADS = "dry_friction.friction_force_n", 40, 4
 INPUT_DRAWS, ROAD_DRAWS, ROAD_M, GD_N0_CM3 = 100, 100, 400.0, 64.0
 ROAD_TABLE = {MASS: 875.0, "both.suspension_damping_n_s_per_m": 1776.0}
 
@@ -60,6 +66,7 @@ def main() -> int:
     eight(figures)
     refusals(figures)
     unknown_bump(figures)
+    rubbing(figures)
     passes(figures)
     unmeasured(figures)
     no_answer_without_a_road(figures)
@@ -218,6 +225,31 @@ def unknown_bump(figures: Figures) -> None:
     judged(figures, "bump unknown", np.array(errors), np.array(expected), bound)
     figures.at_most("bump unknown: error of the mass, rms", 100 * rms([one[0] / 875 for one in errors]), 0.5, "%")
     print(f"   {', '.join(truth)}: bounds {bound.round(5)}; {np.median(times):.2f} s of the processor a fit")
+
+
+def rubbing(figures: Figures) -> None:
+    """Mass and dry friction together, on drives by Newton's laws that SciPy integrated."""
+    truth = {MASS: 875.0, FRICTION: FRICTION_N}
+    law = shipped_effects()["dry_friction"]
+    there = [chosen(law, {"friction_force_n": 60.0, "transition_velocity_m_per_s": GROWN_AT_MPS})]
+    move = move_named(there, FRICTION)
+    assert move is not None
+    errors, times = [], []
+    for seed in range(RUBBING_DRAWS):
+        model = SimulatedModel(CAR, [free(CAR, MASS, 800.0), free_number(there, move)],
+                               [rubbing_run(seed, road_seed=seed % RUBBING_ROADS)], effects=there)
+        noise: list[Noise] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
+        began = time.process_time()
+        found = fit(model, model.measured, Options(noise=noise, starts=model.trials()))
+        times.append(time.process_time() - began)
+        errors.append([(found.parameters[name] - value) / found.standard_errors[name] for name, value in truth.items()])
+    off = np.array(errors)
+    figures.at_most("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 1.3, "")
+    figures.at_least("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 0.7, "")
+    figures.at_least("mass and friction: within two standard errors", 100 * float((np.abs(off) < 2).mean()), 90.0, "%")
+    print(f"   {RUBBING_DRAWS} draws on {RUBBING_ROADS} roads, 10 s each; standard errors of the last "
+          f"{found.standard_errors[MASS]:.1f} kg and {found.standard_errors[FRICTION]:.1f} N; "
+          f"{np.median(times):.1f} s of the processor a fit")
 
 
 def passes(figures: Figures) -> None:

@@ -49,7 +49,7 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
 _SHORTEST_WHEELBASE_M = 0.1
 _ROUNDING = 1e-12
-KNOW_EFFECTS = "simulate, compare, diagnose, add-effect and lab"
+KNOW_EFFECTS = "simulate, compare, diagnose, add-effect, identify and lab"
 
 
 @dataclass(frozen=True)
