@@ -14,9 +14,9 @@ import pytest
 
 from logger.demo.simulated_drive import Drive, record, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
-from drives import SHORT_PLAN
+from .support.drives.short_drive import SHORT_PLAN
 
 
 @pytest.fixture(scope="session")

@@ -4,30 +4,37 @@ import ast
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import drivers
 import logger
+import ridelog
 
+ROOT = Path(__file__).parents[1]
 TREES = {
     ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): ast.parse(path.read_text("utf-8"))
-    for package in (drivers, logger) for root in [Path(str(package.__file__)).parent] for path in root.rglob("*.py")
+    for package in (drivers, logger, ridelog) for root in [Path(str(package.__file__)).parent]
+    for path in root.rglob("*.py")
 }
 FLOORS = (
-    "errors", "units", "geodesy", "records", "chart_data", "printable",
+    "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab",
-    "files", "shipped", "plugins", "store", "studies", "service", "report", "demo", "commands",
+    "files", "shipped", "plugins", "installation", "store", "studies", "service", "report", "demo", "api",
+    "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
+STORE = ("formats", "log", "export", "integrity")
+"""The same inside ``logger.store``."""
 NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
     "errors", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle", "roads",
-    "estimation", "files", "shipped", "plugins", "store", "service", "commands",
+    "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in TREES if name.startswith("logger.service.")] + [
@@ -77,6 +84,18 @@ def test_imports_run_downwards(module: str) -> None:
     assert not {name for name in ours if floor_of(name) not in below}
 
 
+def test_imports_inside_the_store_run_downwards() -> None:
+    stored = [name for name in MODULES if floor_of(name) == "store" and name.count(".") > 1 and "__init__" not in name]
+    ranks = {name: STORE.index(name.split(".")[2]) for name in stored}
+    assert not {(name, used) for name in stored for used in imports(name) & set(stored) if ranks[used] > ranks[name]}
+
+
+def test_every_folder_with_code_is_installed() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    packages = {name.rpartition(".")[0].removesuffix(".__init__") for name in TREES}
+    assert packages <= set(settings["tool"]["setuptools"]["packages"])
+
+
 @pytest.mark.parametrize("module", [name for name in MODULES if floor_of(name) in NUMERICAL])
 def test_numerical_folders_know_no_files_and_no_clocks(module: str) -> None:
     assert not {name for name in imports(module) if name.split(".")[0] in OUTSIDE}
@@ -85,6 +104,12 @@ def test_numerical_folders_know_no_files_and_no_clocks(module: str) -> None:
 @pytest.mark.parametrize("module", [name for name in TREES if name.startswith("drivers.")])
 def test_drivers_know_nothing_of_the_logger(module: str) -> None:
     assert not {name for name in imports(module) if name.split(".")[0] == "logger"}
+
+
+def test_the_public_interface_names_what_the_api_has_and_nothing_of_ours_uses_it() -> None:
+    taken = imports("ridelog.__init__") & set(TREES)
+    assert {floor_of(name) for name in taken} - {"errors", "identification"} == {"api"}
+    assert not {module for module in TREES if "ridelog" in {name.split(".")[0] for name in imports(module)}}
 
 
 def test_no_file_imports_itself_through_others() -> None:
@@ -107,15 +132,15 @@ def test_a_service_that_logs_a_drive_has_loaded_nothing_of_the_desk(short_dump: 
 import importlib, json, pkgutil, sys
 import logger.service
 from logger.commands.main import main
-for module in pkgutil.iter_modules(logger.service.__path__):
-    importlib.import_module("logger.service." + module.name)
+for module in pkgutil.walk_packages(logger.service.__path__, "logger.service."):
+    importlib.import_module(module.name)
 import logger.commands.run
 assert main(["replay", {str(short_dump)!r}, "--out", {str(tmp_path)!r}, "--json"]) == 0
 print(json.dumps(sorted(sys.modules)))
 """
     played = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = json.loads(played.stdout.splitlines()[-1])
-    assert "logger.service.start" in loaded
+    assert "logger.service.serve" in loaded
     assert list(tmp_path.glob("*.csv"))
     assert {"lab", "identification", "modal", "studies"} <= DESK
     desk = {"scipy"} | {f"logger.{folder}" for folder in DESK - {"report"}}  # a replay ends with a summary

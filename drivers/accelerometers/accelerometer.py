@@ -151,7 +151,7 @@ class SerialAccelerometer(Accelerometer[Settings]):
 
     def played(self, settings: Settings, now_us: Callable[[], int]) -> Played:
         """A recorded port."""
-        from drivers.replay import RecordedPort
+        from drivers.recorded_wires import RecordedPort
 
         port = RecordedPort()
         return Played(SerialSource(self.name, lambda: port, now_us, wait_s=0.0), port.load, port.has_bytes)

@@ -370,7 +370,7 @@ class _Bma220(Accelerometer[Bma220Config]):
     def played(self, settings: Bma220Config, now_us: Callable[[], int]) -> Played:
         """The driver reads the chip on a recorded bus."""
         from drivers.accelerometers._bma220_chip import Bma220Chip
-        from drivers.replay import RecordedBus
+        from drivers.recorded_wires import RecordedBus
 
         bus = RecordedBus(Bma220Chip())
         return Played(chip_source(lambda: bus, settings.chip, now_us, _no_wait), bus.load, lambda: False)
@@ -401,7 +401,7 @@ def _bus_opener(bus: int | Path, machine: Machine) -> Callable[[], I2cBus]:
     def play() -> I2cBus:
         from drivers.accelerometers._bma220_chip import Bma220Chip
         from drivers.dump import open_dump
-        from drivers.replay import RecordedBus
+        from drivers.recorded_wires import RecordedBus
 
         with open_dump(bus) as reader:
             events = [event for event in reader if event.source == "bma220"]

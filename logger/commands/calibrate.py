@@ -58,9 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog calibrate``."""
     from logger.estimation.rms_calibration import loaded
-    from logger.service.chain import recorder_gain
+    from logger.service.signal_chain import recorder_gain
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_vehicle
 
     path = vehicle_path(args.vehicle)
     vehicle = read_vehicle(path)
@@ -119,7 +119,7 @@ class Load:
 def answer(ask: Question, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
     """The stored calibration of this vehicle, or a new one, which is then stored. Says on stderr which it is."""
     from logger.estimation.rms_calibration import calibrate
-    from logger.store.calibration_file import find, fingerprint, keep, places
+    from logger.store.formats.calibration_file import find, fingerprint, keep, places
 
     kept_in, key = places(ask.path), fingerprint(vehicle, ask.gain, ask.settings)
     found = None if ask.recompute else find(kept_in, key)

@@ -20,7 +20,7 @@ from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import open_serial
 from drivers.ports import BytePort
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.service.stop import stopped_by_signals
+from logger.service.shutdown_signals import stopped_by_signals
 from logger.units import US_PER_S
 
 _CHUNK_BYTES = 4096
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"recording {args.port} at {args.baud} baud to {args.out}; Ctrl-C ends it", file=sys.stderr)
         try:
             with stopped_by_signals() as stop:
-                look, total, duration_s, fault = _record(port, writer, args.seconds, stop.is_set, _now_us)
+                look, total, duration_s, fault = _record(port, writer, args.seconds, stop.is_set, now_us)
         finally:
             writer.close()
     finally:
@@ -146,5 +146,5 @@ def _hex_rows(data: bytes) -> list[str]:
             for start in range(0, len(data), 16)]
 
 
-def _now_us() -> int:
+def now_us() -> int:
     return time.monotonic_ns() // 1000

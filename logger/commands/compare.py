@@ -15,18 +15,10 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import add_tolerance, check_model, check_out, deviation_of, paragraphs
-from logger.commands.lab_runs import lab_runs
-from logger.errors import EXIT_DONE, BadInput
+from logger.commands.lab_model import add_tolerance, check_out, warned
+from logger.errors import EXIT_DONE
 from logger.files import write_text
-
-if TYPE_CHECKING:
-    from logger.lab.beside import Part
-    from logger.lab.compare import Comparison
-
-_PLACES = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,22 +33,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog compare``."""
-    from logger.lab.compare import as_json, compare
-    from logger.lab.nuisance import Tolerance
+    from logger.api.bench import bench_of, deviation_of
+    from logger.api.run_checks import lab_runs
+    from logger.lab.compare import as_json
+    from logger.report.lab_text import comparison_lines
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
-    tolerance = Tolerance(numbers=deviation_of(args.tolerance))
     path = vehicle_path(args.vehicle)
     model = read_model(path)
     if args.out is not None:
         check_out(args.out, args.runs, [path, *(Path(one.file) for one in model.effects if one.file is not None)])
     runs = lab_runs(args.runs, thin=False)  # an error is that of all samples
-    check_model(args.vehicle, model, runs)
-    try:
-        found = compare(runs, model.vehicle, model.effects, model.given, tolerance)
-    except ValueError as error:
-        raise BadInput(f"{args.vehicle}: {error}") from None
+    found = bench_of(args.vehicle, model, runs, (), deviation_of(args.tolerance), warn=warned).compared()
     if args.out is not None:
         from logger.report.lab_page import page
 
@@ -64,49 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:
-        print("\n".join(_lines(found)))
+        print("\n".join(comparison_lines(found)))
         if args.out is not None:
             print(f"\nPage: {args.out}")
     return EXIT_DONE
-
-
-def _lines(found: Comparison) -> list[str]:
-    from logger.lab.compare import conclusion, evidence, headline
-
-    beside = found.plain.beside
-    seconds = sum(map(len, beside.left)) / beside.rate_hz
-    return [
-        f"{found.vehicle} on {len(beside.runs)} run{'s' * (len(beside.runs) != 1)}, {seconds:.0f} s", "",
-        paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
-        paragraphs([conclusion(found)]), "",
-        *_tables(found),
-    ]
-
-
-def _tables(found: Comparison) -> list[str]:
-    """Where what is left sits, as the model stands and refitted."""
-    from logger.lab.beside import paired, short_names
-    from logger.lab.marks import worst_places
-
-    lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
-                                                                    f"{'refit':>8}"]
-    plain, refitted = found.plain.where, found.refitted.where
-    for title, unit, one, other in (
-        ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
-    ):
-        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))]
-    lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
-    names = short_names(found.plain.beside.runs)
-    lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]
-    return lines
-
-
-def _row(plain: Part | None, refitted: Part, unit: str) -> str:
-    name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", plain.error_told(3)) if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_told(3):>8}"
-
-
-def _place(part: Part, run: str) -> str:
-    name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_told(3):>8}"

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from zipfile import ZipFile
 
 from logger.commands.lab import STORY, say, silent, take, walk
-from logger.commands.lab_model import TOLERANCE, bench_of, columns, paragraphs, require_compiler
+from logger.commands.lab_model import bench_from
 from logger.errors import BadInput
 from logger.files import naming
+from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
     from logger.lab.story import Story
@@ -35,9 +36,10 @@ _EXPLAINED = {
 
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
+    from logger.api.bench import require_compiler
     from logger.demo.lab_drives import VEHICLE
     from logger.lab.story import as_json as story_json
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", shipped_effects().values())
@@ -49,7 +51,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
         return
     if not as_json:
         print(paragraphs([_INTRODUCTION]))
-    given = bench_of(VEHICLE, folders, [], TOLERANCE)
+    given = bench_from(VEHICLE, folders)
     story = walk(given, out, take, silent if as_json else say, _EXPLAINED)
     if as_json:
         print(json.dumps(story_json(story) | {"story": str(out / STORY)}, allow_nan=False))

@@ -14,24 +14,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import (
-    Bench,
-    add_bench_arguments,
-    bench,
-    check_out,
-    columns,
-    on_screen,
-    paragraphs,
-    wipe,
-)
-from logger.errors import EXIT_DONE, BadInput
+from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress
+from logger.errors import EXIT_DONE
 from logger.files import write_text
+from logger.report.text_layout import paragraphs
 
 if TYPE_CHECKING:
+    from logger.api.bench import Bench
     from logger.lab.verdict import Verdict
 
 _SHOWN = 8
@@ -50,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose``."""
     from logger.lab.verdict import as_json
+    from logger.report.lab_text import diagnosis_lines
 
     if args.same_road:
         from logger.commands.diagnose_same_road import run_same_road
@@ -66,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
         return EXIT_DONE
-    print(paragraphs([_compared(given)]), "", *lines(found, None if args.all else _SHOWN), "",
+    print(paragraphs([_compared(given)]), "", *diagnosis_lines(found, None if args.all else _SHOWN), "",
           _next(args, given, found), sep="\n")
     if args.out is not None:
         print(f"\nPage: {args.out}")
@@ -74,41 +67,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
-    """The diagnosis of a model, without some effects, with its progress on the screen. BadInput where the vehicle lacks
-    what it needs."""
-    from logger.lab.diagnosis import diagnose
-    from logger.lab.verdict import told
-
-    tell = on_screen()
-    effects = {name: effect for name, effect in given.effects.items() if name not in left_out}
-    try:
-        recorded = given.problem(whole=False, firm=True)
-        found = diagnose(recorded, effects, given.model.effects, tell)
-        finely = recorded.entire()  # a search simulates less finely
-        said_error = finely.error(finely.start(given.model.effects))
-        return told(replace(found, baseline_error=said_error), effects, tell)
-    except ValueError as error:
-        raise BadInput(f"{given.word}: {error}") from None
-    finally:
-        wipe()
-
-
-def lines(found: Verdict, most: int | None) -> list[str]:
-    """What a person reads of a diagnosis."""
-    from logger.lab.verdict import looks_like, summary, table, untested
-
-    shown = [paragraphs(summary(found))]
-    if described := looks_like(found):
-        shown += ["", "What it looks like:", paragraphs(described, "- ")]
-    rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
-    more = len(found.diagnosis.candidates) - len(rows) + 1
-    shown += ["", "Each tried by itself, those of the verdict first, then the least likely to be chance:",
-              *columns(rows)]
-    if more > 0:
-        shown.append(f"and {more} more (ridelog diagnose --all)")
-    if hidden := untested(found):
-        shown += ["", "What these runs cannot tell:", paragraphs(hidden, "- ")]
-    return shown
+    """The diagnosis of a model, without some effects, with its progress on the screen."""
+    with progress() as tell:
+        return given.diagnosed(tell, left_out)
 
 
 def _compared(given: Bench) -> str:

@@ -13,25 +13,26 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import columns, deviation_of, known_effects, on_screen, paragraphs, wipe
-from logger.commands.lab_runs import check_record, thinned_runs
+from logger.commands.lab_model import progress
 from logger.errors import EXIT_DONE, BadInput
+from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
     from logger.lab.unmeasured_diagnosis import Found
     from logger.runs import Run
-    from logger.store.drive_file import Drive
+    from logger.store.formats.drive_file import Drive
 
 _SHOWN = 8
 
 
 def run_same_road(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose --same-road``."""
+    from logger.api.bench import deviation_of, known_effects
     from logger.lab.nuisance import Tolerance
     from logger.lab.unmeasured import NotOneRoad, SameRoad
     from logger.lab.unmeasured_diagnosis import as_json, diagnose_same_road
     from logger.shipped import vehicle_path
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.vehicle_file import read_model
 
     if args.out is not None:
         raise BadInput("--out: expected a diagnosis with profiles; there is no page of one without")
@@ -44,13 +45,12 @@ def run_same_road(args: argparse.Namespace) -> int:
     effects, _ = known_effects(model, args.effect_file)
     try:
         problem = SameRoad(runs, model.given or model.vehicle, tolerance, model.vehicle)
-        found = diagnose_same_road(problem, effects, model.effects, on_screen())
+        with progress() as tell:
+            found = diagnose_same_road(problem, effects, model.effects, tell)
     except NotOneRoad as error:
         raise BadInput(str(error)) from None
     except ValueError as error:
         raise BadInput(f"{args.vehicle}: {error}") from None
-    finally:
-        wipe()
     if args.json:
         print(json.dumps(as_json(found), allow_nan=False))
     else:
@@ -62,9 +62,10 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
     """The drives in some folders. BadInput for fewer than two, or one that the others cannot be used with."""
     import numpy as np
 
+    from logger.api.run_checks import check_record, thinned_runs
     from logger.profiles.track import Track
     from logger.runs import Run
-    from logger.store.drive_file import DRIVE, read_drive
+    from logger.store.formats.drive_file import DRIVE, read_drive
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")

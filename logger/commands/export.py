@@ -20,11 +20,11 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.files import read_bounded
 from logger.printable import printable
 from logger.service.config import Config, find_config, load_config, load_pairing
-from logger.store.export import ExportResult, Progress, export
-from logger.store.pairing import OFF, PAIRED_NAME, Pairing
-from logger.store.set_aside import is_taken
-from logger.store.stick_notes import StickNote, StickState, read_note, show_on_led, stick_of, write_note
-from logger.store.yaml_lines import MAX_BYTES
+from logger.store.export.export import ExportResult, Progress, export
+from logger.store.export.pairing import OFF, PAIRED_NAME, Pairing
+from logger.store.export.stick_status import StickNote, StickState, read_note, show_on_led, stick_of, write_note
+from logger.store.formats.yaml_nodes import MAX_BYTES
+from logger.store.log.quarantine import is_taken
 
 _PULL = "it may be pulled"
 

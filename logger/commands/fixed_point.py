@@ -67,7 +67,7 @@ class _Header:
 
     def text(self) -> str:
         from logger.shipped import version
-        from logger.store.c_header import c_header
+        from logger.store.formats.c_header import c_header
 
         return c_header(self.name, self.title, self.unit, self.notes, self.cascade, version())
 

@@ -28,9 +28,9 @@ from drivers.events import GPS
 from drivers.hardware import open_serial
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.records import WindowRecord
-from logger.service.agreement import Agreement, Difference, compare, read_sessions
 from logger.service.config import Config, find_config, load_config
-from logger.service.hil import Sent, Wired, expected_rows, send, wired
+from logger.service.hil.log_comparison import Agreement, Difference, compare, read_sessions
+from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
 
 LATE_MS = 50.0
 LATE_WHY = "the service itself waits as long between two looks at a port"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import logger
 from logger.errors import EXIT_DONE, BadInput
-from logger.store.installation import PROGRAM, Installation, Step, hidden_from_services, run_command
+from logger.installation import PROGRAM, Installation, Step, hidden_from_services, run_command
 
 _THIS_MACHINE = Path("/")
 

@@ -17,19 +17,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.add_effect import added, asked_for, model_of, searched
-from logger.commands.add_effect import lines as added_lines
+from logger.commands.add_effect import asked_for
 from logger.commands.diagnose import diagnosed
-from logger.commands.diagnose import lines as diagnosis_lines
-from logger.commands.lab_model import Bench, add_bench_arguments, bench, check_out, on_screen, paragraphs, wipe
+from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
+from logger.report.text_layout import paragraphs
 
 if TYPE_CHECKING:
+    from logger.api.bench import Bench
     from logger.lab.compare import Comparison
     from logger.lab.story import Round, Story
     from logger.lab.verdict import Verdict
-    from logger.store.vehicle_file import Model
+    from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen
 
 STORY = "story.html"
@@ -68,6 +68,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
     explained    what to tell of compare, diagnose, add and again, beside what they find
     """
     from logger.lab.story import Story, ending
+    from logger.report.lab_text import addition_lines, diagnosis_lines
     from logger.report.story_page import page
 
     why = explained or {}
@@ -100,7 +101,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
             same = wanted == one.effect.name
             made, model = _round(given, one if same else _searched(given, wanted), out, len(rounds) + 1)
             rounds.append(made)
-            tell([*added_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
+            tell([*addition_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
             tell(_chapter("Compare again", why.get("again")))
             tell(_comparison_lines(rounds[-1].comparison))
             given = replace(given, model=model)
@@ -117,13 +118,11 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
 def _round(given: Bench, start: Chosen, out: Path, number: int) -> tuple[Round, Model]:
     """Add an effect, write the vehicle and compare it; the model with it."""
     from logger.lab.story import Round
-    from logger.store.vehicle_file import write_model
+    from logger.store.formats.vehicle_file import write_model
 
-    try:
-        gained = added(given, start, len(start.effect.trials()))
-    finally:
-        wipe()
-    model = model_of(given, gained)
+    with progress() as tell:
+        gained = given.added(start, len(start.effect.trials()), tell)
+    model = given.model_with(gained)
     file = _vehicle_file(out, number)
     write_model(file, model)
     return Round(gained, _compared(replace(given, model=model)), str(file)), model
@@ -134,24 +133,14 @@ def _vehicle_file(out: Path, number: int) -> Path:
 
 
 def _searched(given: Bench, name: str) -> Chosen:
-    try:
-        return searched(given, given.effects[name], {})
-    finally:
-        wipe()
+    with progress() as tell:
+        return given.searched(given.effects[name], {}, tell)
 
 
 def _compared(given: Bench) -> Comparison:
-    from logger.lab.compare import compare
-    from logger.lab.nuisance import Tolerance
-
-    on_screen()("comparing")
-    try:
-        return compare(given.runs, given.model.vehicle, given.model.effects, given.model.given,
-                       Tolerance(numbers=given.numbers))
-    except ValueError as error:
-        raise BadInput(f"{given.word}: {error}") from None
-    finally:
-        wipe()
+    with progress() as tell:
+        tell("comparing")
+        return given.compared()
 
 
 # --- at the terminal ---

@@ -18,7 +18,7 @@ from logger.files import write_text
 
 if TYPE_CHECKING:
     from logger.modal.mode import FoundMode, ModalResult
-    from logger.store.channel_file import ChannelRecord
+    from logger.store.formats.channel_file import ChannelRecord
 
 SPECTRUM = "fft"
 DECREMENT = "decrement"
@@ -110,7 +110,7 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
 
     import numpy as np
 
-    from logger.store.channel_file import read_channels
+    from logger.store.formats.channel_file import read_channels
 
     file = str(args.file)
     wished = () if args.columns is None else tuple(name.strip() for name in args.columns.split(","))
@@ -138,7 +138,7 @@ def _read(args: argparse.Namespace) -> tuple[ChannelRecord, Any]:
 
 def _find(args: argparse.Namespace, record: ChannelRecord, inputs: Any) -> ModalResult:
     from logger.modal.analysis import find_modes
-    from logger.modal.spectrum import peak_modes
+    from logger.modal.spectral_peaks import peak_modes
 
     if args.method == SPECTRUM:
         return peak_modes(record.samples, record.rate_hz, _SEGMENTS if args.segments is None else args.segments)

@@ -1,8 +1,9 @@
-"""Options that are numbers within a range, checked where they are declared."""
+"""Options that are numbers within a range, checked where they are declared, and numbers by name."""
 
 from __future__ import annotations
 
 import argparse
+from math import isfinite
 from typing import Any
 
 from logger.errors import BadInput
@@ -24,3 +25,18 @@ def add_number(
 
     number.__name__ = kind.__name__  # argparse names it when a text is no number at all
     parser.add_argument(option, type=number, **rest)
+
+
+def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
+    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
+    name, _, rest = text.partition(":")
+    found: dict[str, float] = {}
+    for piece in rest.split(",") if rest else ():
+        parameter, _, value = piece.partition("=")
+        try:
+            found[parameter] = float(value)
+        except ValueError:
+            found[parameter] = float("nan")
+        if not isfinite(found[parameter]):
+            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
+    return name, found

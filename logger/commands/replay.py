@@ -83,26 +83,26 @@ class Outcome:
 
 def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: str | None, quiet: bool) -> Outcome:
     """Play ``dump`` into logs below ``out``. Progress goes to stderr unless ``quiet``."""
-    from logger.service import assemble
-    from logger.service.core import Core
-    from logger.service.replay import Player
-    from logger.store.folder_lock import FolderLock
-    from logger.store.rotation import SegmentLog, next_session, repair
-    from logger.store.vehicle_file import read_vehicle
+    from logger.service import wiring
+    from logger.service.dump_player import Player
+    from logger.service.event_core import EventCore
+    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.store.log.folder_lock import FolderLock
+    from logger.store.log.log_writer import SegmentLog, next_session, repair
 
     with open_dump(dump) as reader:
-        config = assemble.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
+        config = wiring.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         config = replace(config, log=replace(config.log, directory=out))
-        sensor = assemble.instrument(config.accelerometer)
+        sensor = wiring.instrument(config.accelerometer)
         car = read_vehicle(config.vehicle)
-        facts = assemble.sidecar(config, sensor, car) | {"replayed_from": dump.name}
+        facts = wiring.sidecar(config, sensor, car) | {"replayed_from": dump.name}
         out.mkdir(parents=True, exist_ok=True)
         with FolderLock(out):
             repair(out)
             session = next_session(out)
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-            pipeline = assemble.pipeline(config, sensor, car)
-            core = Core(sensor.decoder, assemble.gps_decoder(config), pipeline, segment_log)
+            pipeline = wiring.pipeline(config, sensor, car)
+            core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
             player = Player(core, config.accelerometer, rate, _progress(quiet))
             started_s = time.monotonic()
             played = player.play(reader)
@@ -114,7 +114,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
 
 def _outcome(out: Path, session: int, rows: int, duration_s: float, wall_s: float, torn: bool) -> Outcome:
     from logger.report.summary import summarise
-    from logger.store.segment_log import read_log
+    from logger.store.log.row_format import read_log
 
     files = sorted(out.glob(f"{session:05d}-*.csv"))
     records = [record for path in files for record in read_log(path).records]

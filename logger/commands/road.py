@@ -10,7 +10,6 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,9 +19,8 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
 if TYPE_CHECKING:
-    from logger.roads.gd_iri import Expected
-    from logger.roads.spectrum import Array, Roughness
-    from logger.store.profile_file import Profile
+    from logger.roads.elevation_spectrum import Array, Roughness
+    from logger.store.formats.profile_file import Profile
 
 _SHORTEST_M = 11.0  # for an IRI
 _MOST_SAMPLES = 20_000_000
@@ -128,82 +126,29 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 
 
 def _classify(args: argparse.Namespace) -> int:
-    from logger.store.profile_file import read_profile
+    from logger.report.road_text import as_json, lines
+    from logger.roads.track_class import track_class
+    from logger.store.formats.profile_file import read_profile
 
     if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
         raise BadInput(f"--psd {args.psd}: expected another file than the profile")
     profile = read_profile(args.profile, args.resample)
     tracks = [profile.elevation_m] + ([profile.elevation_right_m] if profile.elevation_right_m is not None else [])
     try:
-        told = [tell(track, profile) for track in tracks]
+        told = [track_class(track, profile.spacing_m, profile.widest_step_m) for track in tracks]
     except ValueError as error:
         raise BadInput(f"{args.profile}: {error}") from None
     if args.psd is not None:
         write_text(args.psd, _psd_csv(profile, told[0].roughness), "ascii")
     if args.json:
-        print(json.dumps(told[0].as_json() | ({"right": told[1].as_json()} if len(told) > 1 else {})))
-        return EXIT_DONE
-    length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
-    print(f"{args.profile.name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm")
-    for name, track in zip(("left track", "right track") if len(told) > 1 else ("",), told, strict=True):
-        print(f"\n{name}\n" if name else "")
-        print("\n".join(track.lines()))
+        print(json.dumps(as_json(told)))
+    else:
+        print("\n".join(lines(told, profile, args.profile.name)))
     return EXIT_DONE
 
 
-@dataclass(frozen=True)
-class Told:
-    """What one wheel track is: its spectrum's line, its exact IRI, and the IRI that such a line lets expect."""
-
-    roughness: Roughness
-    iri_m_per_km: float
-    expected: Expected
-
-    def as_json(self) -> dict[str, Any]:
-        """Named fields, SI units in the names."""
-        from logger.roads.iso8608 import iri_from_gd_n0
-
-        found = self.roughness
-        return {
-            "class": found.road_class, "gd_n0_cm3": found.gd_n0_cm3, "waviness": found.waviness,
-            "iri_m_per_km": self.iri_m_per_km, "gd_n0_std_cm3": found.gd_n0_std_cm3,
-            "waviness_std": found.waviness_std, "classes_possible": list(found.classes),
-            "iri_of_gd_m_per_km": iri_from_gd_n0(found.gd_n0_cm3),
-            "iri_expected_m_per_km": self.expected.value, "iri_expected_std_m_per_km": self.expected.std,
-            "lowest_cpm": found.lowest_cpm, "highest_cpm": found.highest_cpm,
-        }
-
-    def lines(self) -> list[str]:
-        """For a person."""
-        from logger.report.summary import IRI_CLASSES
-        from logger.roads.iso8608 import iri_from_gd_n0
-
-        found = self.roughness
-        doubt = "" if len(found.classes) == 1 else \
-            f"; the road is too short or too odd to be sure: it may be {' or '.join(found.classes)}"
-        return [
-            f"class      {found.road_class}: {IRI_CLASSES[found.road_class]}{doubt}",
-            f"Gd(n0)     {found.gd_n0_cm3:.4g} +- {found.gd_n0_std_cm3:.2g} cm3, from waves of "
-            f"{1 / found.highest_cpm:.2g} to {1 / found.lowest_cpm:.2g} m",
-            f"waviness   {found.waviness:.2f} +- {found.waviness_std:.2f} (the classes have 2)",
-            f"IRI        {self.iri_m_per_km:.2f} m/km; this Gd(n0) means {iri_from_gd_n0(found.gd_n0_cm3):.2f} by "
-            f"Eq 4.39, with this waviness {self.expected.value:.2f} +- {self.expected.std:.2f}",
-        ]
-
-
-def tell(elevation_m: Array, profile: Profile) -> Told:
-    """Measure one track of a profile. ValueError as in ``logger.roads.spectrum.classify``."""
-    from logger.roads.gd_iri import iri_of_road
-    from logger.roads.iri import iri
-    from logger.roads.spectrum import classify
-
-    roughness = classify(elevation_m, profile.spacing_m, profile.widest_step_m)
-    expected = iri_of_road(roughness.gd_n0_cm3, (len(elevation_m) - 1) * profile.spacing_m, roughness.waviness)
-    return Told(roughness, iri(elevation_m, profile.spacing_m), expected)
-
-
 def _psd_csv(profile: Profile, found: Roughness) -> str:
-    from logger.roads.spectrum import acceleration_psd, band_edges, smooth, spectrum
+    from logger.roads.elevation_spectrum import acceleration_psd, band_edges, smooth, spectrum
 
     bands = smooth(spectrum(profile.elevation_m, profile.spacing_m), band_edges(found.lowest_cpm, found.highest_cpm))
     columns = (bands.edges_cpm[:-1], bands.edges_cpm[1:], bands.psd_m3,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
 from logger.service.config import find_config, load_config
-from logger.service.stop import Stop, stopped_by_signals
+from logger.service.shutdown_signals import Stop, stopped_by_signals
 
 PAUSE_S = 30
 
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
 def _served(args: argparse.Namespace, stop: Stop) -> int:
     try:
         config = load_config(find_config(args.config))
-        from logger.service.start import serve
+        from logger.service.serve import serve
 
         serve(config, stop)
     except RidelogError as error:

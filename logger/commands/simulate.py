@@ -18,19 +18,17 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.commands.lab_model import check_out
-from logger.commands.numbers import add_number
+from logger.commands.numbers import add_number, named_numbers
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import Motion
-    from logger.vehicle.compose import Car
     from logger.vehicle.effect import Chosen, Effect, Parameter
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
@@ -95,8 +93,9 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
-    from logger.simulation.virtual_drive import SENSOR, as_sensed, response, response_with_effects
-    from logger.store.drive_file import write_drive, write_profile
+    from logger.api.vehicles import car_on
+    from logger.simulation.virtual_drive import SensorErrors, recorded_drive
+    from logger.store.formats.drive_file import COLUMNS, write_drive, write_profile
 
     _check_given(args)
     _check_files(args)
@@ -105,28 +104,26 @@ def _simulate(args: argparse.Namespace) -> None:
         check_out(args.profile_out, (), option="--profile-out")
     vehicle, effects, said = _model(args.vehicle, args.effect)
     track = _road(args)
-    car = _car(vehicle, effects, said, track)
+    car = car_on(vehicle, effects, said, track)
     outputs = _outputs(args.output, car.vehicle, car.structure)
     motion = _motion(args, track, float(car.structure.behind_m.max()))
-    if effects:
-        try:
-            columns, motion = response_with_effects(car, outputs, track, motion, args.rate)
-        except ValueError as error:
-            raise BadInput(f"{car.vehicle.name}: {error}") from None
-    else:
-        columns = response(car.structure, outputs, track, motion, args.rate)
-    accel = as_sensed(columns.pop(SENSOR), args.noise, args.step, args.seed)
-    write_drive(args.out, {"t_s": motion.time_s, SENSOR: accel, "speed_mps": motion.speed_mps,
-                           "distance_m": motion.distance_m, **columns})
+    try:
+        columns = recorded_drive(car, bool(effects), outputs, track, motion, args.rate,
+                                 SensorErrors(args.noise, args.step, args.seed))
+    except ValueError as error:
+        raise BadInput(f"{car.vehicle.name}: {error}") from None
+    write_drive(args.out, columns)
     if args.profile_out is not None:
         write_profile(args.profile_out, track)
+    accel, speed_mps, distance_m = (columns[name] for name in COLUMNS[1:])
     made: dict[str, Any] = {
         "vehicle": vehicle.name, "model": vehicle.model, "file": str(args.out), "samples": len(accel),
         "rate_hz": args.rate, "duration_s": len(accel) / args.rate,
-        "distance_start_m": float(motion.distance_m[0]), "distance_end_m": float(motion.distance_m[-1]),
-        "speed_mean_mps": float(motion.speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
+        "distance_start_m": float(distance_m[0]), "distance_end_m": float(distance_m[-1]),
+        "speed_mean_mps": float(speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
-        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed, "more_columns": list(columns),
+        "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed,
+        "more_columns": list(columns)[len(COLUMNS):],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
     print(json.dumps(made) if args.json else _in_words(made))
@@ -167,8 +164,8 @@ def _check_files(args: argparse.Namespace) -> None:
 def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], dict[str, str]]:
     """The vehicle and its effects, those of its file and those asked for, and where each was said, by name."""
     from logger.shipped import vehicle_path
-    from logger.store.effect_file import effect_named
-    from logger.store.vehicle_file import read_model
+    from logger.store.formats.effect_file import effect_named
+    from logger.store.formats.vehicle_file import read_model
     from logger.vehicle.compose import with_effect
     from logger.vehicle.effect import chosen
 
@@ -185,39 +182,6 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
         except ValueError as error:
             raise BadInput(f"--effect {text}: {error}") from None
     return model.vehicle, effects, {one.effect.name: name for one in model.effects} | asked
-
-
-def _car(vehicle: Vehicle, effects: tuple[Chosen, ...], said: Mapping[str, str], track: Track) -> Car:
-    """The vehicle with its effects, which are possible on this road; ``said`` where, by name."""
-    from logger.store.effect_file import check_on
-    from logger.vehicle.compose import compose
-
-    for one in effects:
-        try:
-            check_on(vehicle, one, track.elevation_m.ndim == 2)
-        except BadInput as error:
-            raise BadInput(f"{said[one.effect.name]}: {error}") from None
-    try:
-        return compose(vehicle, effects)
-    except ValueError as error:
-        raise BadInput(f"{vehicle.name}: {error}") from None
-
-
-def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
-    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
-    from math import isfinite
-
-    name, _, rest = text.partition(":")
-    found: dict[str, float] = {}
-    for piece in rest.split(",") if rest else ():
-        parameter, _, value = piece.partition("=")
-        try:
-            found[parameter] = float(value)
-        except ValueError:
-            found[parameter] = float("nan")
-        if not isfinite(found[parameter]):
-            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
-    return name, found
 
 
 def _outputs(wanted: list[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
@@ -254,8 +218,8 @@ def _road(args: argparse.Namespace) -> Track:
 
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import Obstacle, with_obstacles
-    from logger.store.drive_file import track_of
-    from logger.store.profile_file import read_profile
+    from logger.store.formats.drive_file import track_of
+    from logger.store.formats.profile_file import read_profile
 
     track = Track(args.flat, np.zeros(2)) if args.flat is not None else track_of(read_profile(args.profile))
     wanted = [Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in args.obstacle]
@@ -267,7 +231,7 @@ def _road(args: argparse.Namespace) -> Track:
 
 def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motion:
     from logger.simulation.virtual_drive import at_one_speed, motion_along
-    from logger.store.drive_file import read_speeds
+    from logger.store.formats.drive_file import read_speeds
 
     knots = (at_one_speed(track, wheelbase_m, args.speed) if args.speed is not None else read_speeds(args.speed_file))
     try:
@@ -280,7 +244,7 @@ def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motio
 
 
 def _list_effects(as_json: bool) -> None:
-    from logger.store.effect_file import shipped_effects
+    from logger.store.formats.effect_file import shipped_effects
 
     if as_json:
         print(json.dumps({"effects": [_told(effect) for effect in shipped_effects().values()]}))

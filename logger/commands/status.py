@@ -14,8 +14,8 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
-from logger.store.set_aside import READ_ONLY
-from logger.store.stick_notes import FOLDER, StickNote, read_notes
+from logger.store.export.stick_status import FOLDER, StickNote, read_notes
+from logger.store.log.quarantine import READ_ONLY
 
 _START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
 _JOURNAL = "See why: journalctl -u ridelog -n 50"

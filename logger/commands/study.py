@@ -54,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
     if args.name is None:
         raise BadInput("study: expected the NAME of a study, or --list")
     study = study_of(args.name, known)
-    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, _tell if sys.stderr.isatty() else _say_nothing))
+    tell = show_progress if sys.stderr.isatty() else _say_nothing
+    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell))
     if args.out is not None:
         from logger.report.study_page import page
 
@@ -68,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _tell(done: int, of: int) -> None:
-    """Progress, on one line that is wiped at the end."""
+def show_progress(done: int, of: int) -> None:
+    """Show a bar with ``done`` parts of so many, on one line that is wiped at the end."""
     bar = "#" * (_BAR * done // of)
     print(f"\r[{bar:{_BAR}}] {done} of {of}" if done < of else "\r" + " " * (_BAR + 30) + "\r", end="", file=sys.stderr,
           flush=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
-from logger.store.verify import FileCheck, verify
+from logger.store.integrity import FileCheck, verify
 
 _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
 

@@ -21,9 +21,9 @@ from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
-from logger.store.drive_file import DRIVE, PROFILE, write_drive, write_profile
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import DRIVE, PROFILE, write_drive, write_profile
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import changed, read

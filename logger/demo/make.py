@@ -12,7 +12,7 @@ from logger.demo.motion import Bump, Stretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 PLAN = DrivePlan(
     speed_knots=(

@@ -88,7 +88,7 @@ class Block:
         self.spacing_m = spacing_m
         first_m = distance_m[0] - car.behind_m.max() - _MARGIN_M
         self.start_m = float(np.floor(first_m / align_m) * align_m)
-        self.count = _fft_length((distance_m[-1] + _MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
+        self.count = quick_fft_length((distance_m[-1] + _MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
         self.wave_number_cpm = np.asarray(np.fft.rfftfreq(self.count, spacing_m), dtype=np.float64)
         speed_mps = np.gradient(distance_m) * rate_hz
         # Not the highest speed: a single place that is wrong by metres must not cost the short waves of the block.
@@ -236,7 +236,7 @@ def _product(one: ComplexArray, other: ComplexArray) -> float:
     return float(both - (one[0] * other[0]).real - (one[-1] * other[-1]).real)
 
 
-def _fft_length(least: float) -> int:
-    """The next of 4, 5, 6, 7 times a power of two: quick to transform, and even."""
+def quick_fft_length(least: float) -> int:
+    """The next of 4, 5, 6, 7 times a power of two from ``least`` samples up: quick to transform, and even."""
     power = 1 << max(int(np.ceil(np.log2(least))) - 3, 1)
     return next(factor * power for factor in (4, 5, 6, 7, 8) if factor * power >= least)

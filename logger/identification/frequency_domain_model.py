@@ -10,97 +10,25 @@ same solution, with one for the sensor's row beside it (the matrices are symmetr
 A transform takes a record for one period of an endless one. Behind the record the road therefore comes back to where it
 began and the car comes to rest; and the transform is taken along s = damping + i omega, which makes what comes round
 from the end a ten-thousandth of what is left of it there.
-
-Everything that fits knows only ``Model``, or ``Differentiable`` where a model has derivatives of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
-
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.road_transform import RoadInTime
-from logger.identification.unknown_inputs import (
-    RoadInput,
-    changed_input,
-    check_names,
-    is_input,
-    read_input,
-    run_and_name,
-)
-from logger.roads.iso8608 import displacement_psd
-from logger.runs import Run
-from logger.vehicle.frequency_response import (
-    SensedCar,
-    Sensitivity,
-    body_acceleration_response,
-    sensed_car,
-    sensitivity,
-)
-from logger.vehicle.models import structure_of
-from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, read
-from logger.vehicle.simulate import recorder_gain
-from logger.vehicle.vehicle import Vehicle
+from logger.identification.drive_model import DriveModel
+from logger.identification.unknown_inputs import is_input, run_and_name
+from logger.vehicle.frequency_response import SensedCar, Sensitivity, sensed_car, sensitivity
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-# Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
-_SPEEDS = 12
-_SLOWEST_MPS = 0.5
-_LONGEST_S = 100.0
 
+class VehicleModel(DriveModel):
+    """A linear car without effects."""
 
-class Model(Protocol):
-    """What can be fitted: numbers in, one prediction per record out, as long as what was measured."""
-
-    @property
-    def parameters(self) -> Sequence[Free]: ...
-
-    def predict(self, values: Array) -> list[Array]:
-        """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
-
-
-@runtime_checkable
-class Differentiable(Model, Protocol):
-    """A model that knows its derivatives."""
-
-    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
-
-
-class VehicleModel:
-    """A linear car on the runs of ``records``: free numbers ``parameters``, all others as in ``vehicle`` and ``road``.
-
-    A free number is the car's (``named_parameters.names``) or the road's (``unknown_inputs``). The car comes to the
-    first sample of a record at the speed it has there, over the road that the track has there. ValueError for a name
-    that neither has a number of, or that sets what another one sets.
-    """
-
-    def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
-                 road: RoadInput | None = None) -> None:
-        self.vehicle, self.parameters, self.records = vehicle, list(parameters), list(records)
-        self.road = road or RoadInput()
-        wanted = [one.name for one in parameters]
-        check_names(wanted, len(records))
-        for name in wanted:
-            read_input(self.road, name) if is_input(name) else read(vehicle, name)
-            part, _, leaf = name.rpartition(".")
-            if wanted.count(name) > 1 or (part in AXLES and f"{BOTH}.{leaf}" in wanted):
-                raise ValueError(f"expected every number once, found {name} twice")
-        self._roads = [RoadInTime(record) for record in records]
-        self.measured = [record.kept_mps2 for record in records]
-
-    def vehicle_with(self, values: Array) -> Vehicle:
-        """The vehicle with these values of its free numbers."""
-        return changed(self.vehicle, {name: value for name, value in self._named(values) if not is_input(name)})
-
-    def road_with(self, values: Array, run: int) -> RoadInput:
-        """The road's input in a run, counted from 0, with these values of the free numbers."""
-        return changed_input(self.road, {name: value for name, value in self._named(values) if is_input(name)}, run)
+    exact = True
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
@@ -137,32 +65,6 @@ class VehicleModel:
         """Which free numbers change the road's input in a run: their indices, and their names for all runs."""
         names = [(index, *run_and_name(one.name)) for index, one in enumerate(self.parameters) if is_input(one.name)]
         return [(index, name) for index, only, name in names if only in (None, run)]
-
-    def _named(self, values: Array) -> list[tuple[str, float]]:
-        return list(zip([one.name for one in self.parameters], map(float, values), strict=True))
-
-    def road_spectra(self, values: Array, f_hz: Array) -> list[Array]:
-        """What the sensor makes of a random road of Gd(n0) = 1 cm3 under the whole of each record: one-sided spectra
-        (f,) behind the recorder's filter [m2/s4/Hz per cm3], the mean over the speeds that were driven."""
-        vehicle = self.vehicle_with(values)
-        structure = structure_of(vehicle)
-        spectra = []
-        for run, record in enumerate(self.records):
-            true_mps = record.speed_mps[record.first:] / self.road_with(values, run).speed_scale
-            speed = np.quantile(true_mps, (np.arange(_SPEEDS) + 0.5) / _SPEEDS)[:, None]
-            speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
-            f = np.maximum(f_hz, 1 / _LONGEST_S)
-            response = np.abs(body_acceleration_response(structure, f, speed, vehicle.sensor)) ** 2
-            recorder = recorder_gain(f_hz / record.rate_hz) ** 2
-            spectra.append((response * displacement_psd(f / speed, 1.0) / speed).mean(axis=0) * recorder)
-        return spectra
-
-    def inputs(self, values: Array) -> list[Array]:
-        """Vertical acceleration of the road under the wheels (n, w) per record with these values [m/s2], band-limited,
-        for tests."""
-        structure = structure_of(self.vehicle)
-        return [road.samples(road.s**2 * road.under_wheels(structure, self.road_with(values, run)).T).T
-                for run, road in enumerate(self._roads)]
 
 
 def _response(car: SensedCar, s: Complex, under: Complex) -> Complex:

@@ -32,7 +32,8 @@ NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
 NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their distances disagree by more than can be "
                 "found")
-_PART_OF = 0.1  # shares of a direction below this, of its largest, are not named
+# Of a direction is named what has this share of its largest change, or of the largest trace that one alone would leave.
+_PART_OF, _TRACE_OF = 0.1, 0.9
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
 # Rms of what is left over that of what was measured; and how much less of it is clearly less.
 _EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
@@ -54,11 +55,12 @@ class Finding:
 
 
 class NotIdentifiable(CheckFailed):
-    """The data do not tell what was asked. ``findings`` say what, and its text says it in words."""
+    """The data do not tell what was asked. ``findings`` say what, and its text says it in words; ``error_before`` that
+    of the model where every free number starts, None: not known."""
 
-    def __init__(self, findings: Sequence[Finding]) -> None:
+    def __init__(self, findings: Sequence[Finding], error_before: float | None = None) -> None:
         super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))
-        self.findings = list(findings)
+        self.findings, self.error_before = list(findings), error_before
 
 
 def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
@@ -81,7 +83,7 @@ def structural(names: Sequence[str], derivatives: Array, size: float, nothing: f
     _, values, directions = np.linalg.svd(derivatives[:, heard] / lengths[heard], full_matrices=False)
     for value, direction in zip(values, directions, strict=True):
         if value < nothing * len(kept):
-            findings.append(_together(kept, direction / lengths[heard]))
+            findings.append(_together(kept, direction / lengths[heard], direction))
     return findings
 
 
@@ -97,10 +99,11 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         return []
     findings = []
     powers, directions = np.linalg.eigh(covariance / np.outer(limits, limits))
+    traces = np.sqrt(np.maximum(np.diag(np.linalg.pinv(covariance, hermitian=True)), 0.0))
     for power, direction in zip(powers[::-1], directions.T[::-1], strict=True):
         if power <= 1 or not weak.any():
             break
-        shares = _shares(names, direction * limits)
+        shares = _shares(names, direction * limits, direction * limits * traces)
         told = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
         if len(shares) == 1:
             (name, error), = told.items()
@@ -134,8 +137,8 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
                     "other sign then, or the sensor does, or it lies elsewhere than was said.")]
 
 
-def _together(names: Sequence[str], direction: Array) -> Finding:
-    shares = _shares(names, direction)
+def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:
+    shares = _shares(names, direction, trace)
     if len(shares) > 1 and _one_scale(shares, _EQUAL):
         words = (f"{_listed(list(shares))} share one scale: all of them larger by one factor give the same record. "
                  "Hold one of them fixed at a value that is known.")
@@ -145,10 +148,12 @@ def _together(names: Sequence[str], direction: Array) -> Finding:
     return Finding(TOGETHER, shares, words)
 
 
-def _shares(names: Sequence[str], direction: Array) -> dict[str, float]:
-    """The parts of a direction that count, the largest 1."""
+def _shares(names: Sequence[str], direction: Array, trace: Array) -> dict[str, float]:
+    """The parts of a direction that count, the largest 1; ``trace`` (p,) is what each alone would leave."""
     scaled = direction / direction[np.argmax(np.abs(direction))]
-    return {name: float(share) for name, share in zip(names, scaled, strict=True) if abs(share) > _PART_OF}
+    felt = np.abs(trace) / np.abs(trace).max()
+    return {name: float(share) for name, share, one in zip(names, scaled, felt, strict=True)
+            if abs(share) > _PART_OF or one > _TRACE_OF}
 
 
 def _one_scale(shares: dict[str, float], apart: float) -> bool:

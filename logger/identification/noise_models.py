@@ -29,6 +29,8 @@ Array = npt.NDArray[np.float64]
 LEAST_SHARE = 1e-5
 """Noise is never taken for less than this share of the measurement: predictions are not more accurate themselves, and
 what they leave of a record without noise is no process at all."""
+LEAST_SHARE_SIMULATED = 0.002
+"""The same where predictions are stepped through time: two right simulations of one car differ by so much."""
 ROAD_LEVEL = "gd_n0_cm3"
 _MOST_ORDER = 60
 _SAMPLES_PER_ORDER = 20

@@ -4,9 +4,9 @@ Problem: find the numbers for which the model's predictions leave the least, say
 the data cannot tell. Solution, in this order:
 
 1. ask whether the data could tell at all (``identifiability``), before any fit;
-2. Levenberg and Marquardt's steps, in the logarithm of what can only be positive, within bounds, on residuals as they
-   are (output error), from every start that was given; the best goes on; by squares, as far from the end a robust
-   loss has hills of its own;
+2. go downhill, in the logarithm of what can only be positive, within bounds, on residuals as they are (output error),
+   from every start that was given; the best goes on; by squares, as far from the end a robust loss has hills of its
+   own;
 3. fit a noise model to what is left, weigh by it (innovations form), and repeat 2 from there, until neither moves;
 4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
    whether the model at its best has anything to do with what was measured.
@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.decimating_low_pass import LowPass
-from logger.identification.frequency_domain_model import Differentiable, Model
+from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
     NOTHING_BY_DIFFERENCES,
     NOTHING_EXACT,
@@ -33,9 +34,16 @@ from logger.identification.identifiability import (
     structural,
     unexplained,
 )
-from logger.identification.noise_models import LEAST_SHARE, Autoregressive, Noise, White, Whitening
+from logger.identification.noise_models import (
+    LEAST_SHARE,
+    LEAST_SHARE_SIMULATED,
+    Autoregressive,
+    Noise,
+    White,
+    Whitening,
+)
 from logger.runs import normalised_rms
-from logger.vehicle.named_parameters import Free
+from logger.vehicle.named_parameters import Coordinates, Free
 
 Array = npt.NDArray[np.float64]
 
@@ -44,17 +52,40 @@ HUBER = 1.345
 _MAD_TO_DEVIATION = 1.4826
 _TAME = 4.0
 _LONGEST_STEP = 1.0
-_FIRST_DAMPING = 1e-3
-_LARGEST_DAMPING = 1e12
-_FLAT = 1e-12  # of the steepest coordinate: what one without a slope is damped by
-# Converged: what is left of the way is this share of a standard error, or this much of a relative change.
-_CLOSE, _CLOSE_NOISE, _CLOSE_RELATIVE = 1e-5, 1e-4, 1e-11
+# Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
+_CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
 _MOST_NOISE_ROUNDS = 20
 _DIFFERENCE = 1e-4
 _NUDGE = 0.03
 _AT_BOUND = 1e-6
 _FAR = 3.0
 _ROOT_STEPS = 60
+
+
+class Model(Protocol):
+    """What can be fitted: numbers in, one prediction per record out, as long as what was measured."""
+
+    @property
+    def parameters(self) -> Sequence[Free]: ...
+
+    def predict(self, values: Array) -> list[Array]:
+        """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
+
+
+@runtime_checkable
+class Differentiable(Model, Protocol):
+    """A model that knows its derivatives: exact ones, at the price of a prediction, or differences of predictions."""
+
+    @property
+    def exact(self) -> bool: ...
+
+    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
+        """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
+
+
+def least_share(model: Model) -> float:
+    """What is left of a measurement is taken for no less than this share of it, as predictions are no better."""
+    return LEAST_SHARE_SIMULATED if isinstance(model, Differentiable) and not model.exact else LEAST_SHARE
 
 
 @dataclass(frozen=True)
@@ -135,11 +166,11 @@ def fit(model: Model, measured: Sequence[Array], options: Options | None = None)
     if findings and problem.options.refuse:
         raise NotIdentifiable(findings)
     descents = [_descend(problem, start, problem.plain, robust=False) for start in starts]
-    best = descents[int(np.argmin([one.cost for one in descents]))]
-    iterations = sum(one.steps for one in descents)
-    noise, best, rounds, settled = _innovations(problem, best)
-    return _result(problem, best, noise, findings, iterations + rounds, settled,
-                   np.array([problem.values(one.x) for one in descents]))
+    best = descents[int(np.argmin([one.at.cost for one in descents]))]
+    iterations = sum(one.rounds for one in descents)
+    noise, point, rounds, settled = _innovations(problem, best.at)
+    return _result(problem, point, noise, findings, iterations + rounds, settled,
+                   np.array([problem.coordinates.values(one.x) for one in descents]))
 
 
 def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
@@ -160,7 +191,9 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
                 low, high = max(one.low, near), min(one.high, far)
                 start[one.name] = float(low * (high / low) ** share)
             else:
-                start[one.name] = one.low + share * (one.high - one.low)
+                reach = np.inf if one.usual is None else _FAR * one.usual
+                low, high = max(one.low, one.start - reach), min(one.high, one.start + reach)
+                start[one.name] = low + share * (high - low)
         starts.append(start)
     return starts
 
@@ -170,22 +203,27 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A place, and what the residuals are there: white (N,), derivatives of the predictions (N, p), weights (N,)."""
+    """A place, and what the residuals are there: white (N,), weights (N,), and as they are, per record."""
 
     x: Array
     cost: float
     white: Array
-    slopes: Array
     weights: Array
     plain: list[Array]
-    steps: int = 0
-    converged: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """Predictions at a place and their derivatives (n, p) by coordinates, behind the low-pass, per record."""
+
+    x: Array
+    predictions: list[Array]
+    slopes: list[Array]
 
 
 @dataclass(eq=False)
 class _Problem:
-    """A model and its measurements. A coordinate is the logarithm of the size of a number that keeps its sign; of any
-    other, the number over half the width of its bounds."""
+    """A model and its measurements."""
 
     model: Model
     measured: Sequence[Array]
@@ -196,30 +234,21 @@ class _Problem:
         if not self.free:
             raise ValueError("expected at least one free number")
         self.low_pass = LowPass(self.options.rate_hz, self.options.low_pass_hz)
-        self.log = np.array([one.by_factors for one in self.free])
-        self.unit = np.array([np.sign(one.start) if one.by_factors else (one.high - one.low) / 2 for one in self.free])
-        low, high = (self.coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high"))
-        self.low, self.high = np.minimum(low, high), np.maximum(low, high)
+        self.coordinates = Coordinates(self.free)
+        self.low, self.high = self.coordinates.low, self.coordinates.high
+        self.exact = isinstance(self.model, Differentiable) and self.model.exact
+        self.simulated = isinstance(self.model, Differentiable) and not self.model.exact
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         if not any(one.any() for one in self.measured):
             raise ValueError("expected measurements that move, found nothing but 0")
-        self.floor = LEAST_SHARE * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
+        self.floor = least_share(self.model) * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
-
-    def coordinates(self, values: Array) -> Array:
-        return np.where(self.log, np.log(np.where(self.log, np.abs(values), 1.0)), values / self.unit)
-
-    def values(self, x: Array) -> Array:
-        return self.unit * np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x)
-
-    def per_coordinate(self, values: Array) -> Array:
-        """Derivatives of the numbers by their coordinates (p,)."""
-        return np.where(self.log, values, self.unit)
+        self._linearised: _Linearised | None = None
 
     def starts(self) -> list[Array]:
         first = {one.name: one.start for one in self.free}
         chosen = [first, *({**first, **more} for more in self.options.starts)]
-        starts = [self.coordinates(np.array([start[one.name] for one in self.free])) for start in chosen]
+        starts = [self.coordinates.of(np.array([start[one.name] for one in self.free])) for start in chosen]
         for start in starts:
             if not ((start >= self.low - _AT_BOUND) & (start <= self.high + _AT_BOUND)).all():
                 raise ValueError("expected every start between its bounds")
@@ -227,30 +256,50 @@ class _Problem:
 
     def at(self, x: Array, noise: Whitening, deviation: float | None) -> _Point:
         """The residuals at a place, weighed by a noise model; by Huber's loss if they have a deviation."""
-        values = self.values(x)
-        predictions, slopes = self._linearised(values)
-        if [len(one) for one in predictions] != [len(one) for one in self.measured]:
-            raise ValueError("expected measurements as long as the predictions")
-        scale = self.per_coordinate(values)
-        plain = [seen - self.low_pass.apply(one) for seen, one in zip(self.observed, predictions, strict=True)]
+        predictions = self.linearised(x).predictions if self.exact else self._behind(self._predicted(x))
+        plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
-        weighed = noise([self.low_pass.apply(slope) * scale for slope in slopes])
         if deviation is None:
-            return _Point(x, 0.5 * float(white @ white), white, weighed, np.ones_like(white), plain)
+            return _Point(x, 0.5 * float(white @ white), white, np.ones_like(white), plain)
         size = np.abs(white) / (HUBER * deviation)
         loss = np.where(size <= 1, 0.5 * white**2, (HUBER * deviation) ** 2 * (size - 0.5))
-        return _Point(x, float(loss.sum()), white, weighed, 1 / np.maximum(size, 1.0), plain)
+        return _Point(x, float(loss.sum()), white, 1 / np.maximum(size, 1.0), plain)
 
-    def _linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        if isinstance(self.model, Differentiable):
-            return self.model.linearised(values)
-        predictions = self.model.predict(values)
-        steps = _DIFFERENCE * self.per_coordinate(values)
+    def linearised(self, x: Array) -> _Linearised:
+        """Predictions and derivatives at a place; of the one that was asked for last they are known."""
+        known = self._linearised
+        if known is None or not np.array_equal(known.x, x):
+            values = self.coordinates.values(x)
+            if isinstance(self.model, Differentiable):
+                predictions, slopes = self.model.linearised(values)
+                self._check(predictions)
+            else:
+                predictions, slopes = self._predicted(x), self._by_differences(x)
+            scale = self.coordinates.slopes(values)
+            known = _Linearised(x, self._behind(predictions), [self.low_pass.apply(one) * scale for one in slopes])
+            self._linearised = known
+        return known
+
+    def _predicted(self, x: Array) -> list[Array]:
+        predictions = self.model.predict(self.coordinates.values(x))
+        self._check(predictions)
+        return predictions
+
+    def _check(self, predictions: Sequence[Array]) -> None:
+        if [len(one) for one in predictions] != [len(one) for one in self.measured]:
+            raise ValueError("expected measurements as long as the predictions")
+
+    def _behind(self, parts: Sequence[Array]) -> list[Array]:
+        return [self.low_pass.apply(one) for one in parts]
+
+    def _by_differences(self, x: Array) -> list[Array]:
+        """Derivatives [(n, p), ...] of the predictions by the values."""
+        values = self.coordinates.values(x)
         columns = []
-        for index, step in enumerate(steps):
+        for index, step in enumerate(_DIFFERENCE * self.coordinates.slopes(values)):
             ends = [self.model.predict(values + sign * step * (np.arange(len(values)) == index)) for sign in (-1, 1)]
             columns.append([(high - low) / (2 * step) for low, high in zip(*ends, strict=True)])
-        return predictions, [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
+        return [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
     def beside(self, start: Array) -> Array:
         """A place a little beside a start, where no symmetry of the start hides anything."""
@@ -259,13 +308,10 @@ class _Problem:
 
     def structural_findings(self, x: Array) -> list[Finding]:
         """What no such data could tell at a place."""
-        nothing = NOTHING_EXACT if isinstance(self.model, Differentiable) else NOTHING_BY_DIFFERENCES
-        values = self.values(x)
-        predictions, slopes = self._linearised(values)
-        predictions = [self.low_pass.apply(one) for one in predictions]
-        derivatives = np.concatenate([self.low_pass.apply(slope) * self.per_coordinate(values) for slope in slopes])
-        size = float(np.sqrt(sum((one**2).sum() for one in predictions)))
-        return structural([one.name for one in self.free], derivatives, size, nothing)
+        here = self.linearised(x)
+        size = float(np.sqrt(sum((one**2).sum() for one in here.predictions)))
+        return structural([one.name for one in self.free], np.concatenate(here.slopes), size,
+                          NOTHING_EXACT if self.exact else NOTHING_BY_DIFFERENCES)
 
 
 def robust_deviation(white: Array) -> float:
@@ -276,68 +322,32 @@ def robust_deviation(white: Array) -> float:
 # --- descent ---
 
 
-def _descend(problem: _Problem, start: Array, noise: Whitening, robust: bool) -> _Point:
-    """Levenberg and Marquardt's steps with Nielsen's rule for the damping; a number at a bound that it presses against
-    stays there."""
+def _descend(problem: _Problem, start: Array, noise: Whitening, robust: bool) -> Minimum[_Point]:
+    """The nearest minimum: by squares, or by Huber's loss with the deviation that residuals have at the start."""
     deviation = None
-    point = problem.at(np.clip(start, problem.low, problem.high), noise, deviation)
     if robust:
-        deviation = robust_deviation(point.white)
-        point = problem.at(point.x, noise, deviation)
-    damping, growth = _FIRST_DAMPING, 2.0
-    for count in range(1, problem.options.most_steps + 1):
-        gradient, hessian, moving = _normal(problem, point)
-        if not moving.any() or _left_of_the_way(point, gradient, hessian) < _CLOSE:
-            return _arrived(point, count)
-        size = np.diag(hessian)
-        damped = hessian + damping * np.diag(size + _FLAT * size.max())
-        step = np.zeros_like(point.x)
-        step[moving] = np.linalg.solve(damped, gradient)
-        step *= min(1.0, _LONGEST_STEP / np.abs(step).max())
-        x = np.clip(point.x + step, problem.low, problem.high)
-        if np.abs(x - point.x).max() < _CLOSE_RELATIVE:
-            return _arrived(point, count)
-        new = problem.at(x, noise, deviation)
-        taken = (x - point.x)[moving]
-        promised = float(taken @ gradient - 0.5 * taken @ hessian @ taken)
-        gained = point.cost - new.cost
-        if gained > 0:
-            share = min(gained / max(promised, 1e-300), 1.0)
-            damping *= max(1 / 3, 1 - (2 * share - 1) ** 3)
-            point, growth = new, 2.0
-        else:
-            damping, growth = damping * growth, growth * 2
-            if damping > _LARGEST_DAMPING:
-                return _arrived(point, count)
-    return _Point(**{**vars(point), "steps": problem.options.most_steps})
+        deviation = robust_deviation(problem.at(np.clip(start, problem.low, problem.high), noise, None).white)
+    slopes = np.empty((0, 0))
 
+    def normal_equations(x: Array, point: _Point, fresh: bool) -> tuple[Array, Array]:
+        nonlocal slopes
+        if fresh:
+            slopes = noise(problem.linearised(x).slopes)
+        return slopes.T @ (point.weights * point.white), slopes.T @ (point.weights[:, None] * slopes)
 
-def _arrived(point: _Point, steps: int) -> _Point:
-    return _Point(**{**vars(point), "steps": steps, "converged": True})
-
-
-def _normal(problem: _Problem, point: _Point) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Downhill direction and Gauss and Newton's matrix of the coordinates that may move, and which these are."""
-    downhill = point.slopes.T @ (point.weights * point.white)
-    moving = ~(((point.x <= problem.low) & (downhill < 0)) | ((point.x >= problem.high) & (downhill > 0)))
-    slopes = point.slopes[:, moving]
-    return downhill[moving], slopes.T @ (point.weights[:, None] * slopes), moving
-
-
-def _left_of_the_way(point: _Point, gradient: Array, hessian: Array) -> float:
-    """Length of Gauss and Newton's step in standard errors."""
-    scale = 1 / np.sqrt(np.diag(hessian) + 1e-300)
-    step = np.linalg.lstsq(hessian * np.outer(scale, scale), gradient * scale, rcond=1e-12)[0]
-    variance = 2 * point.cost / len(point.white)
-    decrement = float(step @ (gradient * scale))
-    return float(np.sqrt(max(0.0, decrement) / max(variance, 1e-300)))
+    # A step of so small a share of a standard error gains half its square in units of the residuals' variance.
+    close = _CLOSE_SIMULATED if problem.simulated else _CLOSE
+    return minimise(start, lambda x: problem.at(x, noise, deviation), normal_equations,
+                    small_gain=lambda point: close**2 * point.cost / len(point.white),
+                    most_rounds=problem.options.most_steps, keep_derivatives=problem.simulated,
+                    low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
 def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, int, bool]:
     """Noise model and numbers in turn, until neither moves: (noise, place, steps, whether they came to rest)."""
     kinds, steps = list(problem.options.noise), 0
     for _ in range(_MOST_NOISE_ROUNDS):
-        values, residuals = problem.values(point.x), point.plain
+        values, residuals = problem.coordinates.values(point.x), point.plain
         if problem.options.robust:
             most = _TAME * robust_deviation(np.concatenate(residuals))
             residuals = [np.clip(one, -most, most) for one in residuals]
@@ -347,13 +357,12 @@ def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, i
         kinds = [kinds[best]]
         if noise.name == "ar":
             kinds = [Autoregressive(int(noise.levels["order"]))]
-        before = point.x
-        point = _descend(problem, before, noise, problem.options.robust)
-        steps += point.steps
-        moved = point.x - before
-        _, hessian, moving = _normal(problem, point)
-        if np.sqrt(moved[moving] @ hessian @ moved[moving]) < _CLOSE_NOISE:
-            return noise, point, steps, point.converged
+        found = _descend(problem, point.x, noise, problem.options.robust)
+        steps += found.rounds
+        moved = found.x - point.x
+        point = found.at
+        if np.sqrt(moved @ found.information @ moved) < _CLOSE_NOISE:
+            return noise, point, steps, found.converged
     return noise, point, steps, False
 
 
@@ -363,17 +372,18 @@ def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, i
 def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[Finding], iterations: int,
             settled: bool, ends: Array) -> Fit:
     names = [one.name for one in problem.free]
-    relative = _covariance(problem, point)
+    slopes = noise(problem.linearised(point.x).slopes)
+    relative = _covariance(problem, point, slopes)
     at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
                 if x - low < _AT_BOUND or high - x < _AT_BOUND]
+    values = problem.coordinates.values(point.x)
     if not findings:
-        findings = (problem.structural_findings(point.x)
-                    or statistical(names, relative, np.array([one.weakest for one in problem.free]))
+        weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
+        findings = (problem.structural_findings(point.x) or statistical(names, relative, np.array(weakest))
                     or unexplained(normalised_rms(point.plain, problem.observed)))
         if findings and problem.options.refuse:
             raise NotIdentifiable(findings)
-    values = problem.values(point.x)
-    scale = problem.per_coordinate(values)
+    scale = problem.coordinates.slopes(values)
     covariance = relative * np.outer(scale, scale)
     errors = np.sqrt(np.diag(covariance))
     start = np.array([one.start for one in problem.free])
@@ -388,15 +398,15 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
         error_before=normalised_rms(before, problem.measured),
         error_after=normalised_rms(after, problem.measured), residuals=after,
         white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
-        sensitivities=point.slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
+        sensitivities=slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
         iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
     )
 
 
-def _covariance(problem: _Problem, point: _Point) -> Array:
+def _covariance(problem: _Problem, point: _Point, slopes: Array) -> Array:
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
-    count, p = point.slopes.shape
-    information = point.slopes.T @ point.slopes
+    count, p = slopes.shape
+    information = slopes.T @ slopes
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15, hermitian=True) * np.outer(scale, scale)
     variance = float(point.white @ point.white) / max(count - p, 1)

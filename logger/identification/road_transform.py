@@ -12,9 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.obstacle_paths import ObstaclePath
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
-from logger.profiles.track import TirePath
+from logger.profiles.track import WheelPath
 from logger.runs import Run
 from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
@@ -98,7 +97,7 @@ class RoadInTime:
                                               self._track.tire_paths(structure.contact_patch_m))
         return self._known[place]
 
-    def _wheels(self, structure: Structure, speed_scale: float, paths: Sequence[TirePath | ObstaclePath],
+    def _wheels(self, structure: Structure, speed_scale: float, paths: Sequence[WheelPath],
                 by_scale: bool = False) -> Complex:
         """Transforms of what the wheels meet on their paths, left and right, or of its derivative by the scale."""
         wheels = []

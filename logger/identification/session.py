@@ -13,14 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from logger.dsp.decimating_low_pass import LowPass
+from logger.identification.drive_model import DriveModel
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_search import located
 from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
+from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.drive_operator import Drive
 from logger.runs import Run, normalised_rms
+from logger.vehicle.effect import Chosen
+from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import Vehicle
 
 LEAST_SAMPLES = 50
@@ -77,7 +81,15 @@ def obstacle_starts(
             for name, record in zip(expanded(f"{EACH}.{part}.start_m", len(records)), records, strict=True)}
 
 
-def fit_options(model: VehicleModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> Options:
+def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequence[Free], records: Sequence[Run],
+                road: RoadInput) -> DriveModel:
+    """The model of these drives: in frequency where the car has no effects. ValueError as ``DriveModel``."""
+    if effects:
+        return SimulatedModel(vehicle, parameters, records, road, effects)
+    return VehicleModel(vehicle, parameters, records, road)
+
+
+def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> Options:
     """How to fit a model of records at one rate.
 
     noise          noise model: white, ar, road, or auto, the likeliest of them
@@ -95,11 +107,11 @@ def fit_options(model: VehicleModel, noise: str, low_pass_hz: float | None, robu
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return Options(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
-                   starts=spread_starts(model.parameters, tries))
+                   starts=[*model.trials(), *spread_starts(model.parameters, tries)])
 
 
 def upright_fit(
-    model_of: Callable[[list[Run]], VehicleModel], records: list[Run], options: Callable[[VehicleModel], Options]
+    model_of: Callable[[list[Run]], DriveModel], records: list[Run], options: Callable[[DriveModel], Options]
 ) -> Fit:
     """The fit of the model of records. NotIdentifiable for what they do not tell, or tell only when they are turned
     over; ValueError as ``fit``."""
@@ -125,7 +137,7 @@ def upright_fit(
     return found
 
 
-def error_before(model: VehicleModel) -> float:
+def error_before(model: DriveModel) -> float:
     """rms(measured - model) / rms(measured) with every free number where it starts."""
     predictions = model.predict(np.array([one.start for one in model.parameters]))
     return normalised_rms([measured - one for measured, one in zip(model.measured, predictions, strict=True)],

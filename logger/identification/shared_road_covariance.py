@@ -21,12 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import ROAD_LEVEL, Whitener
 from logger.identification.prediction_error_fit import Fit
 from logger.roads.iso8608 import displacement_psd
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.models import structure_of
+from logger.vehicle.named_parameters import Coordinates
 from logger.vehicle.simulate import recorder_gain
 
 Array = npt.NDArray[np.float64]
@@ -52,7 +51,7 @@ class CommonRoughness:
     growth: float
 
 
-def with_common_roughness(model: VehicleModel, fit: Fit) -> CommonRoughness:
+def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
     """A fit whose standard errors count what its drives have in common, where they are several over one obstacle, or
     one profile, and what is left is a road's."""
     alone = CommonRoughness(fit, 0.0, 1.0)
@@ -74,8 +73,7 @@ def with_common_roughness(model: VehicleModel, fit: Fit) -> CommonRoughness:
     if likeness < _CERTAIN * np.sqrt(size):
         return alone
     share = min(likeness / size, 1.0)
-    scale = np.array([value if one.by_factors else (one.high - one.low) / 2
-                      for one, value in zip(fit.free, values, strict=True)])
+    scale = Coordinates(fit.free).slopes(values)
     independent = np.linalg.pinv(fit.sensitivities.T @ fit.sensitivities, hermitian=True)
     wider = fit.covariance + share * np.outer(scale, scale) * (independent @ crossed @ independent)
     variances = np.maximum(np.diag(wider), np.diag(fit.covariance))
@@ -99,7 +97,7 @@ class _Drive:
     response: Complex
 
 
-def may_have_common(model: VehicleModel) -> bool:
+def may_have_common(model: DriveModel) -> bool:
     """Whether there are several drives whose roads are told to be alike."""
     first = model.records[0].track
     alike = [one.track.start_m == first.start_m and np.array_equal(one.track.elevation_m, first.elevation_m)
@@ -107,16 +105,15 @@ def may_have_common(model: VehicleModel) -> bool:
     return len(alike) > 1 and all(alike)
 
 
-def _drive(model: VehicleModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Drive:
+def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Drive:
     record, road = model.records[run], model.road_with(values, run)
     start_m = min((one.start_m for one in road.obstacles.values()), default=0.0)
     way_m = fit.low_pass.apply(record.distance_m[record.first:]) / road.speed_scale - start_m
     first = max(0, int(np.argmax(way_m >= 0)) - _BEFORE_SAMPLES) if road.obstacles else 0
     stretch = slice(first, first + _MOST_SAMPLES)
     speed_mps = max(float(np.median(record.speed_mps[record.first:])) / road.speed_scale, _SLOWEST_MPS)
-    vehicle = model.vehicle_with(values)
     f_hz = np.maximum(_waves_cpm() * speed_mps, 1e-3)
-    response = body_acceleration_response(structure_of(vehicle), f_hz, speed_mps, vehicle.sensor)
+    response = model.response(values, f_hz, speed_mps)
     gain = recorder_gain(f_hz / record.rate_hz) * fit.low_pass.gain(np.minimum(f_hz, record.rate_hz / 2))
     return _Drive(way_m[stretch], fit.white[run][stretch], slopes[stretch], fit.noise.whiteners[run], response * gain)
 

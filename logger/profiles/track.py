@@ -11,8 +11,10 @@ Then the average over the patch is made of parabolas, and the integral of that a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +28,20 @@ _SHORT_STEP_M = 1e-4
 # Knots nearer to each other than this share of a spacing are one.
 _SAME_KNOT = 1e-9
 _KEPT_PATHS = 3
+
+
+class WheelPath(Protocol):
+    """What the tires of one side meet."""
+
+    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
+        """As ``TirePath``."""
+
+
+class WheelTracks(Protocol):
+    """A road, as cars need it."""
+
+    def tire_paths(self, patch_m: float) -> Sequence[WheelPath]:
+        """As ``Track``."""
 
 
 @dataclass(frozen=True, eq=False)

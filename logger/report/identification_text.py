@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from logger.identification.frequency_domain_model import VehicleModel
-from logger.identification.noise_models import LEAST_SHARE
-from logger.identification.prediction_error_fit import Fit
+from logger.identification.drive_model import DriveModel
+from logger.identification.prediction_error_fit import Fit, least_share
 from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
+from logger.vehicle.named_parameters import Coordinates
 
 NORMAL_95 = 1.959964
 _MENTIONED = 0.7
 _DOUBTFUL = 0.1
 
 
-def tests(model: VehicleModel, fit: Fit) -> tuple[Test, Test]:
+def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
     """Whether the fit's residuals are white, and whether they are free of the road; untested where they are no more
     than the predictions' own inaccuracy."""
-    if fit.error_after < LEAST_SHARE:
+    if fit.error_after < least_share(model):
         return UNTESTED, UNTESTED
     inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
               zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
@@ -93,7 +93,7 @@ def lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield from _limits(fit, sound=not any(doubts(fit, white, free_of_road)))
 
 
-def common_words(model: VehicleModel, common: CommonRoughness) -> Iterator[str]:
+def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
     """Whether drives over one obstacle, or one profile, were over one road, and what that means for the errors."""
     runs = len(model.records)
     if common.share:
@@ -169,8 +169,7 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
 def _least_known(fit: Fit) -> str:
     """The combination that is known worst: the longest axis of the error ellipsoid in relative changes."""
     names = list(fit.parameters)
-    scale = np.array([abs(fit.parameters[one.name]) if one.by_factors else (one.high - one.low) / 2
-                      for one in fit.free])
+    scale = np.abs(Coordinates(fit.free).slopes(np.array(list(fit.parameters.values()))))
     powers, directions = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
     ends = [directions[:, 0], directions[:, -1]]
     said = []

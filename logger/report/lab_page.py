@@ -69,17 +69,22 @@ def _worst_place(standing: Standing) -> Html:
 
 def spectra_section(beside: Beside) -> Html:
     """What was measured, what the model says and what is left, by frequency."""
+    return section("By frequency", concatenated(map(chart, spectra(beside))))
+
+
+def spectra(beside: Beside) -> tuple[Curves, Curves]:
+    """The charts of it: of the body, and of the wheels and above."""
     f_hz = frequencies(beside)
     density = [np.mean(np.abs(segments(beside, one)) ** 2, axis=0) / f_hz[1]
                for one in (beside.measured, beside.left, beside.model)]
 
-    def drawn(title: str, low_hz: float, high_hz: float) -> Html:
+    def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
-        return chart(Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
+        return Curves(title, "frequency [Hz]", "power [dB of (m/s2)2/Hz]", tuple(
             Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
-            for name, one in zip(("measured", "what is left", "model"), density, strict=True))))
+            for name, one in zip(("measured", "what is left", "model"), density, strict=True)))
 
-    return section("By frequency", drawn("The body", 0.0, _BODY_HZ) + drawn("Wheels and above", _BODY_HZ, f_hz[-1]))
+    return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 
 
 def _places(standing: Standing) -> Html:

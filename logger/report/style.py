@@ -4,12 +4,35 @@ The eight class colours run from blue over yellow and red to purple, fall in lig
 apart with any common colour vision; a casing around them carries the light ones on white and the dark ones on black.
 """
 
-STYLE = """
-:root{--ink:#1d242b;--soft:#5c6873;--line:#d9dee3;--faint:#eef1f4;--ground:#fff;--panel:#f7f9fa;--casing:#3c464f;
+_LIGHT = """
+--ink:#1d242b;--soft:#5c6873;--line:#d9dee3;--faint:#eef1f4;--ground:#fff;--panel:#f7f9fa;--casing:#3c464f;
 --c0:#2f6db5;--c1:#58a9d4;--c2:#f2c744;--c3:#ef8d32;--c4:#d0402b;--c5:#9e1b5e;--c6:#651a70;--c7:#35104a;
---none:#9aa4ad}
-@media(prefers-color-scheme:dark){:root{--ink:#e7ebee;--soft:#9ba7b1;--line:#343d45;--faint:#252d34;--ground:#14191e;
---panel:#1b2127;--casing:#c9d1d8}}
+--none:#9aa4ad;
+"""
+_DARK = """
+--ink:#e7ebee;--soft:#9ba7b1;--line:#343d45;--faint:#252d34;--ground:#14191e;
+--panel:#1b2127;--casing:#c9d1d8;
+"""
+_CHART = """
+svg{display:block;width:100%;height:auto}
+svg text{font:12px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif;fill:var(--soft)}
+.s0{stroke:var(--c0)}.s1{stroke:var(--c1)}.s2{stroke:var(--c2)}.s3{stroke:var(--c3)}.s4{stroke:var(--c4)}
+.s5{stroke:var(--c5)}
+.s6{stroke:var(--c6)}.s7{stroke:var(--c7)}.sx{stroke:var(--none)}
+.mark circle{fill:var(--ink);stroke:var(--ground);stroke-width:1.5}
+svg .mark text{fill:var(--ground);font-size:10.5px;font-weight:650}
+figure{margin:0 0 14px;overflow-x:auto}
+.plot{min-width:640px}
+figcaption{font-size:13.5px;font-weight:600;margin-bottom:2px}
+figcaption .unit{font-weight:400}
+.grid{stroke:var(--faint);stroke-width:1}
+.level{stroke:var(--line);stroke-dasharray:2 4}
+.line{fill:none;stroke:var(--ink);stroke-width:1;stroke-linejoin:round;stroke-linecap:round}
+.thick{fill:none;stroke-width:2;stroke-linejoin:round}.spread{stroke:none;fill:var(--c1);fill-opacity:.3}
+.cell{fill:var(--c0)}
+.band{fill:var(--c1);fill-opacity:.55}
+"""
+_PAGE = """
 *{box-sizing:border-box}
 body{margin:0;background:var(--ground);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,
 "Noto Sans",sans-serif}
@@ -34,16 +57,11 @@ border-radius:8px;overflow:hidden;margin:0}
 #pick-iri:focus-visible~.switch label[for=pick-iri],
 #pick-comfort:focus-visible~.switch label[for=pick-comfort]{outline:2px solid var(--c1);outline-offset:-3px}
 #pick-iri:checked~* .by-comfort,#pick-comfort:checked~* .by-iri{display:none}
-svg{display:block;width:100%;height:auto}
-svg text{font:12px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif;fill:var(--soft)}
 .map{background:var(--panel);border:1px solid var(--line);border-radius:8px}
 .map path{fill:none;stroke-linecap:round;stroke-linejoin:round}
 .casing{stroke:var(--casing);stroke-width:8.5;stroke-opacity:.85}
 .track path{stroke-width:5.5;stroke-linecap:butt}
 .track path[d$=h0]{stroke-linecap:round}
-.s0{stroke:var(--c0)}.s1{stroke:var(--c1)}.s2{stroke:var(--c2)}.s3{stroke:var(--c3)}.s4{stroke:var(--c4)}
-.s5{stroke:var(--c5)}
-.s6{stroke:var(--c6)}.s7{stroke:var(--c7)}.sx{stroke:var(--none)}
 .f0{background:var(--c0)}.f1{background:var(--c1)}.f2{background:var(--c2)}.f3{background:var(--c3)}
 .f4{background:var(--c4)}.f5{background:var(--c5)}
 .f6{background:var(--c6)}.f7{background:var(--c7)}.fx{background:var(--none)}
@@ -51,22 +69,10 @@ svg text{font:12px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-se
 .map .start text,.map .end text{font-weight:600;fill:var(--ink);paint-order:stroke;stroke:var(--panel);
 stroke-width:4;stroke-linejoin:round}
 .scale path{stroke:var(--soft);stroke-width:1.5}
-.mark circle{fill:var(--ink);stroke:var(--ground);stroke-width:1.5}
-svg .mark text{fill:var(--ground);font-size:10.5px;font-weight:650}
 .legend{display:flex;flex-wrap:wrap;gap:4px 18px;margin:10px 0 0;padding:0;list-style:none;font-size:13px;
 color:var(--soft)}
 .legend i,.bars i{display:inline-block;width:18px;height:6px;border-radius:3px;margin-right:7px;
 vertical-align:2px;box-shadow:0 0 0 1px var(--casing)}
-figure{margin:0 0 14px;overflow-x:auto}
-.plot{min-width:640px}
-figcaption{font-size:13.5px;font-weight:600;margin-bottom:2px}
-figcaption .unit{font-weight:400}
-.grid{stroke:var(--faint);stroke-width:1}
-.level{stroke:var(--line);stroke-dasharray:2 4}
-.line{fill:none;stroke:var(--ink);stroke-width:1;stroke-linejoin:round;stroke-linecap:round}
-.thick{fill:none;stroke-width:2;stroke-linejoin:round}.spread{stroke:none;fill:var(--c1);fill-opacity:.3}
-.cell{fill:var(--c0)}
-.band{fill:var(--c1);fill-opacity:.55}
 .columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,1fr));gap:0 48px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:13.5px;font-variant-numeric:tabular-nums}
@@ -89,3 +95,8 @@ max-height:520px;font-size:12.5px;line-height:1.45}
 .warn{font-weight:600}
 @media print{main{padding:0}.switch{display:none}}
 """
+STYLE = f":root{{{_LIGHT}}}@media(prefers-color-scheme:dark){{:root{{{_DARK}}}}}{_CHART}{_PAGE}"
+"""Of a page."""
+CELL_STYLE = f".ridelog{{{_LIGHT}{_CHART}}}@media(prefers-color-scheme:dark){{.ridelog{{{_DARK}}}}}"
+"""Of charts in somebody else's page: inside an element of the class ``ridelog`` and nowhere else (nested rules, CSS
+Nesting Module)."""

@@ -21,8 +21,8 @@ from drivers.nmea import ROLLOVERS_MAX
 from drivers.settings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
-from logger.store.pairing import MODES, NOT_PAIRED, Pairing
-from logger.store.yaml_lines import Node, load_mapping
+from logger.store.export.pairing import MODES, NOT_PAIRED, Pairing
+from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.units import WINDOW_M
 
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")

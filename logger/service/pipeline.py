@@ -20,11 +20,11 @@ from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
-from logger.service.chain import GRID_STEP_US, SignalChain
+from logger.service.frozen_sensor import Stillness
+from logger.service.iri_queue import RoughnessQueue, Waiting
 from logger.service.odometer import Odometer
-from logger.service.roughness import RoughnessQueue, Waiting
+from logger.service.signal_chain import GRID_STEP_US, SignalChain
 from logger.service.speed_check import SpeedCheck
-from logger.service.stillness import Stillness
 from logger.service.timebase import Timebase
 from logger.units import US_PER_S
 
@@ -88,6 +88,11 @@ class Pipeline:
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
         self.stillness = Stillness()
         self.speed_check = SpeedCheck()
+
+    @property
+    def waiting_samples(self) -> int:
+        """Samples on the grid that wait for their distance or their window."""
+        return sum(map(len, self._pending))
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""

@@ -14,7 +14,7 @@ place that is put right after a tunnel makes one; neither makes a way shorter. S
 car crept do not count.
 
 On simulated drives through a town half or twice the speed is found after 12 to 17 s of driving, 0.8 of it after 42 s,
-1.2 times after 68 s (medians); in 10 h with a good receiver none is doubted (``tests/bench/speed_check.py``).
+1.2 times after 68 s (medians); in 10 h with a good receiver none is doubted (``tests/benchmarks/speed_check.py``).
 
 A stretch in which they disagree is doubtful, and so is what follows until they have been seen to agree.
 """

@@ -15,12 +15,13 @@ from typing import Any
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, Event
 from logger.service.status import StorageStatus
-from logger.store.exported import exported_names
-from logger.store.lasting import LastingLog
-from logger.store.recording import Recording, repair_recordings
-from logger.store.rotation import SegmentLog, next_session, repair
-from logger.store.set_aside import names_set_aside
-from logger.store.space import Limits, SpaceKeeper
+from logger.store.export.export_marks import exported_names
+from logger.store.export.pairing import NOT_PAIRED, Pairing
+from logger.store.log.disk_quota import DiskQuota, Limits
+from logger.store.log.dump_recording import Recording, repair_recordings
+from logger.store.log.log_writer import SegmentLog, next_session, repair
+from logger.store.log.outage_buffer import BufferedLog
+from logger.store.log.quarantine import names_set_aside
 from logger.units import US_PER_S
 
 LOOK_US = 10 * US_PER_S
@@ -36,21 +37,23 @@ class Storage:
     facts     what lies beside each log file
     header    of the raw dump; None: none is recorded
     now_us    the monotonic clock
+    pairing   on whose sticks a copy lets a file be removed
     """
 
     def __init__(self, directory: Path, facts: dict[str, Any], max_file_bytes: int, header: DumpHeader | None,
-                 limits: Limits, now_us: Callable[[], int], files: FileSystem | None = None) -> None:
+                 limits: Limits, now_us: Callable[[], int], files: FileSystem | None = None,
+                 pairing: Pairing = NOT_PAIRED) -> None:
         self._directory = directory
         self._facts = facts
         self._max_file_bytes = max_file_bytes
         self._now_us = now_us
         self._files = files or FileSystem()
-        self._space = SpaceKeeper(directory, limits, partial(exported_names, pairing=limits.pairing), self._files)
+        self._space = DiskQuota(directory, limits, partial(exported_names, pairing=pairing), self._files)
         self._notices: list[str] = []
         self._warned: set[str] = set()
         self._looked_us = now_us()
         self._look()
-        self.log = LastingLog(self._begin, now_us)
+        self.log = BufferedLog(self._begin, now_us)
         self._recording = (
             Recording(directory, header, lambda: self.log.session, now_us, self._files) if header else None
         )

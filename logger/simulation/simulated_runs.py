@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.track import WheelTracks
 from logger.runs import Run
 from logger.vehicle.compose import MOST_MPS2, Car, Response, recorded, respond
 from logger.vehicle.passage import Passage
@@ -34,19 +35,21 @@ class SimulatedRuns:
     def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
         self._steppers = ThreadPoolExecutor(_STEPPERS)
-        self._passages: list[dict[tuple[float, bytes], Passage]] = [{} for _ in self.runs]
+        self._passages: list[dict[tuple[float, bytes, WheelTracks], Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
         return len(self.runs)
 
-    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False) -> list[Array]:
+    def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False,
+                tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
         """What would have been recorded in each run, (n,) whole [m/s2].
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         rough      step a car that rubs no finer than others: what a change does is told well enough by that
+        tracks     roads in place of the runs' own; runs are laid out anew for each such object
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            passages = self._laid_out(car, moved_m, rough)
+            passages = self._laid_out(car, moved_m, rough, tracks)
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(partial(_recorded, car), passages)
         return list(each)
 
@@ -55,16 +58,18 @@ class SimulatedRuns:
         with np.errstate(over="ignore", invalid="ignore"):
             return [respond(car, passage) for passage in self._laid_out(car, moved_m)]
 
-    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False) -> list[Passage]:
+    def _laid_out(self, car: Car, moved_m: Sequence[Array] | None, rough: bool = False,
+                  tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
         fine_hz = _FINER_IF_IT_RUBS * self.fine_hz if car.rubs and not rough else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
             distance = run.distance_m if moved_m is None else run.distance_m + moved_m[index]
             distance = car.driven(distance)
-            key = fine_hz, distance.tobytes()
+            track: WheelTracks = run.track if tracks is None else tracks[index]
+            key = fine_hz, distance.tobytes(), track
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(run.track, run.rate_hz, distance, fine_hz)
+                passage = Passage(track, run.rate_hz, distance, fine_hz)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)

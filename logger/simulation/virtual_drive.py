@@ -58,6 +58,16 @@ class Motion:
     distance_m: Array
 
 
+@dataclass(frozen=True)
+class SensorErrors:
+    """What a sensor adds: r.m.s. noise [m/s2], which ``seed`` it is made of, and the step that it rounds to [m/s2]; 0:
+    none."""
+
+    noise_mps2: float = 0.0
+    step_mps2: float = 0.0
+    seed: int = 1
+
+
 # --- the road ---
 
 
@@ -194,8 +204,26 @@ def _accelerations(car: Car, passage: Passage) -> Array:
     return accel
 
 
-def as_sensed(accel_mps2: Array, noise_mps2: float, step_mps2: float, seed: int) -> Array:
-    """An acceleration (n,) with a sensor's noise, then rounded to its steps; 0: without [m/s2]."""
-    if noise_mps2:
-        accel_mps2 = accel_mps2 + noise_mps2 * np.random.default_rng(seed).standard_normal(len(accel_mps2))
-    return step_mps2 * np.round(accel_mps2 / step_mps2) if step_mps2 else accel_mps2
+def recorded_drive(
+    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float,
+    errors: SensorErrors,
+) -> dict[str, Array]:
+    """The columns (n,) of a drive's file, by name: those of the outputs last, but for that of ``SENSOR``.
+
+    ValueError as ``response_with_effects``.
+    """
+    if has_effects:
+        columns, motion = response_with_effects(car, outputs, track, motion, rate_hz)
+    else:
+        columns = response(car.structure, outputs, track, motion, rate_hz)
+    accel_mps2 = as_sensed(columns.pop(SENSOR), errors)
+    return {"t_s": motion.time_s, SENSOR: accel_mps2, "speed_mps": motion.speed_mps, "distance_m": motion.distance_m,
+            **columns}
+
+
+def as_sensed(accel_mps2: Array, errors: SensorErrors) -> Array:
+    """An acceleration (n,) with a sensor's noise, then rounded to its steps [m/s2]."""
+    if errors.noise_mps2:
+        noise = np.random.default_rng(errors.seed).standard_normal(len(accel_mps2))
+        accel_mps2 = accel_mps2 + errors.noise_mps2 * noise
+    return errors.step_mps2 * np.round(accel_mps2 / errors.step_mps2) if errors.step_mps2 else accel_mps2

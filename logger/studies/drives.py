@@ -21,7 +21,7 @@ from logger.roads.iso8608 import gd_n0_from_iri, generate
 from logger.roads.obstacles import step
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive

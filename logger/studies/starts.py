@@ -15,7 +15,7 @@ import numpy as np
 from logger.identification.prediction_error_fit import Fit
 from logger.runs import Run
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of
-from logger.studies.fitting import FRONT, MASS, REAR, error_percent, fitted, standard_error_percent
+from logger.studies.fit_methods import FRONT, MASS, REAR, error_percent, fitted, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Table
 
 START_MASSES_KG = (700.0, 800.0, 900.0, 1000.0, 1100.0)

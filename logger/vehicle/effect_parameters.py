@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.effect import Chosen, Parameter, Scale
+from logger.vehicle.named_parameters import Free
 
 Array = npt.NDArray[np.float64]
 
@@ -84,3 +85,50 @@ def steps_apart(one: Chosen, other: Chosen) -> float:
     moves = moves_of([one])
     here, there = (coordinates_of([each], moves) for each in (one, other))
     return float(np.max(np.abs(there - here) / np.abs(steps_of([one], moves)), initial=0.0))
+
+
+# --- by name: ``dry_friction.friction_force_n`` ---
+
+
+def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
+    """The number of that name; None for one that is of none of these effects.
+
+    ValueError, which lists those there are, for a number that the effect lacks or that no fit may move.
+    """
+    effect, _, leaf = name.partition(".")
+    names = [one.effect.name for one in effects]
+    if effect not in names:
+        return None
+    index = names.index(effect)
+    numbers = [one.name for one in effects[index].effect.parameters]
+    moves = moves_of(effects, [index])
+    if leaf not in numbers or Move(index, numbers.index(leaf)) not in moves:
+        known = ", ".join(f"{effect}.{numbers[move.parameter]}" for move in moves) or "none of it"
+        raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
+    return Move(index, numbers.index(leaf))
+
+
+def free_number(effects: Sequence[Chosen], move: Move, start: float | None = None,
+                bounds: tuple[float, float] | None = None) -> Free:
+    """A number of an effect as a fit may change it: from its present value, within what it may be, unless something
+    else is said. ValueError as ``Free``, and for bounds beyond what it may be."""
+    one = effects[move.effect]
+    parameter = one.effect.parameters[move.parameter]
+    name = f"{one.effect.name}.{parameter.name}"
+    value = one.values[parameter.name] if start is None else start
+    low, high = bounds or (parameter.low, parameter.high)
+    if not parameter.low <= low < high <= parameter.high:
+        raise ValueError(f"{name}: expected bounds within {parameter.low:g} to {parameter.high:g}, found {low:g} to "
+                         f"{high:g}")
+    return Free(name, value, low, high, usual=_usual(parameter, value) if parameter.scale is Scale.LINEAR else None)
+
+
+def _usual(parameter: Parameter, value: float) -> float:
+    return max(abs(value), parameter.usual_way())
+
+
+def slope_of(parameter: Parameter, value: float) -> float:
+    """Derivative of a number's coordinate by its value."""
+    if parameter.scale is Scale.LOG:
+        return 1.0 / value
+    return -1.0 / value**2 if parameter.scale is Scale.RECIPROCAL else 1.0

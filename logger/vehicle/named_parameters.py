@@ -8,11 +8,16 @@ then get the same value.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from logger.vehicle.vehicle import Axle, Vehicle
+
+Array = npt.NDArray[np.float64]
 
 BOTH, AXLES, SENSOR = "both", ("front", "rear"), "sensor"
 _BODY = ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m", "contact_patch_m")
@@ -38,6 +43,7 @@ class Free:
     place       it is one, whatever its bounds
     weakest     the largest standard error of what is still an estimate, as a share of its size or, of a place, of half
                 the width of its bounds
+    usual       of a strength that may be 0, as that of an effect: how large it usually is; it moves by differences
 
     ValueError unless low < high and the start lies between them.
     """
@@ -48,6 +54,7 @@ class Free:
     high: float
     place: bool = False
     weakest: float = WEAKEST
+    usual: float | None = None
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -58,7 +65,46 @@ class Free:
     def by_factors(self) -> bool:
         """Whether it is a size, which keeps its sign and moves by factors, and not a place, which moves by
         differences."""
-        return not self.place and self.low * self.high > 0
+        return not self.place and self.usual is None and self.low * self.high > 0
+
+    @property
+    def unit(self) -> float:
+        """What a fit counts it in: its sign where it moves by factors, which are counted by their logarithm, or else
+        how large it usually is, or half the width of its bounds."""
+        if self.by_factors:
+            return 1.0 if self.start > 0 else -1.0
+        return (self.high - self.low) / 2 if self.usual is None else self.usual
+
+    def weakest_at(self, value: float) -> float:
+        """The largest standard error of what is still an estimate there, as a share of its size or in units."""
+        return self.weakest if self.usual is None else self.weakest * max(1.0, abs(value) / self.usual)
+
+
+class Coordinates:
+    """Where a fit has its free numbers: the logarithm of the size of one that moves by factors, any other in its unit.
+
+    low, high    (p,) bounds
+    """
+
+    def __init__(self, free: Sequence[Free]) -> None:
+        self.free = list(free)
+        self._by_factors = np.array([one.by_factors for one in free], dtype=bool)
+        self._unit = np.array([one.unit for one in free])
+        low, high = (self.of(np.array([getattr(one, end) for one in free])) for end in ("low", "high"))
+        self.low, self.high = np.minimum(low, high), np.maximum(low, high)
+
+    def of(self, values: Array) -> Array:
+        """Coordinates (p,) of values (p,)."""
+        size = np.abs(np.where(self._by_factors, values, 1.0))
+        return np.where(self._by_factors, np.log(size), values / self._unit)
+
+    def values(self, x: Array) -> Array:
+        """The reverse."""
+        return self._unit * np.where(self._by_factors, np.exp(np.where(self._by_factors, x, 0.0)), x)
+
+    def slopes(self, values: Array) -> Array:
+        """Derivatives (p,) of the numbers by their coordinates, at values (p,)."""
+        return np.where(self._by_factors, values, self._unit)
 
 
 def names(vehicle: Vehicle) -> list[str]:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import Track
+from logger.profiles.track import WheelTracks
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
 from logger.vehicle.structure import Structure
 
@@ -44,7 +44,7 @@ class Passage:
     ValueError unless there are two or more finite distances.
     """
 
-    def __init__(self, track: Track, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ) -> None:
+    def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ) -> None:
         if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m

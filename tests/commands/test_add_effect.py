@@ -10,9 +10,9 @@ import pytest
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_model
+from logger.store.formats.vehicle_file import read_model
 
-from lacking import OWN, named, write_runs
+from ..support.lab.runs_with_effects import OWN, named, write_runs
 
 
 @pytest.fixture(scope="module")

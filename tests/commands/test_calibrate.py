@@ -12,9 +12,9 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.estimation import rms_calibration
 from logger.estimation.rms_calibration import SPEEDS_MPS
-from logger.service.chain import recorder_gain
+from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
 CONTRACT = ["speed_mps", "iri_per_accel_rms", "spread"]
 TEXT = vehicle_file("rav4-2009").read_text(encoding="utf-8")

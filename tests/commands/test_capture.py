@@ -39,7 +39,7 @@ def run(monkeypatch: pytest.MonkeyPatch, port: Port, out: Path, *arguments: str)
     """Run the command on a port, with a clock that gains 0.1 s at each look."""
     ticks = iter(range(0, 10**9, 100_000))
     monkeypatch.setattr(capture, "open_serial", lambda path, baud: port)
-    monkeypatch.setattr(capture, "_now_us", lambda: next(ticks))
+    monkeypatch.setattr(capture, "now_us", lambda: next(ticks))
     return main.main(["capture", "/dev/any", "--out", str(out), *arguments])
 
 

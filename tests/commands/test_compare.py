@@ -10,9 +10,9 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.store.drive_file import write_drive, write_profile
+from logger.store.formats.drive_file import write_drive, write_profile
 
-from compared import RATE_HZ, beside_with, recorded_by
+from ..support.lab.runs_with_residual import RATE_HZ, beside_with, recorded_by
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 
 from logger.commands import demo_lab
 from logger.demo import lab_drives
-from logger.store.drive_file import read_run
+from logger.store.formats.drive_file import read_run
 
 DOC = Path(__file__).parents[2] / "docs" / "lab.md"
 

@@ -10,16 +10,16 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.store.drive_file import read_run
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.drive_file import read_run
+from logger.store.formats.effect_file import shipped_effects
 
-from lacking import FEW, OWN, named, out_of_balance, write_runs
+from ..support.lab.runs_with_effects import FEW, OWN, named, out_of_balance, write_runs
 
 
 @pytest.fixture(autouse=True)
 def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     few = {name: shipped_effects()[name] for name in FEW}
-    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     """As ``ridelog simulate`` writes them: a right model is right, and friction is no late clock besides."""
     names = ("dry_friction", "sensor_bandwidth", "sensor_offset", "time_offset")
     few = {name: shipped_effects()[name] for name in names}
-    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     right = write_runs(tmp_path / "right", [], noise_mps2=0.0)
     assert diagnose(*right, "--json") == 0
     told = json.loads(capsys.readouterr().out)

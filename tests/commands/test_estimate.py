@@ -18,8 +18,8 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import iri
 from logger.shipped import vehicle_file
-from logger.store.drive_file import write_profile
-from logger.store.profile_file import read_profile
+from logger.store.formats.drive_file import write_profile
+from logger.store.formats.profile_file import read_profile
 
 ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 800, 0.05, 12), 100.0)
 CAR = "rav4-2009"

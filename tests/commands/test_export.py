@@ -13,9 +13,9 @@ from logger.commands.main import main
 from logger.commands.status import stick_lines
 from logger.errors import BadInput, CheckFailed
 from logger.service.config import Config, LogConfig
-from logger.store import export as export_of_store
-from logger.store.exported import exported_names
-from logger.store.stick_notes import read_note
+from logger.store.export import export as export_of_store
+from logger.store.export.export_marks import exported_names
+from logger.store.export.stick_status import read_note
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from logger.commands.main import main
-from logger.store.record_file import TIME, VERTICAL
+from logger.store.formats.record_file import TIME, VERTICAL
 
 FULL = "/dev/full"
 

@@ -25,14 +25,14 @@ from logger.commands import hil as command
 from logger.commands import main
 from logger.errors import BadInput
 from logger.records import WindowRecord
-from logger.service.agreement import Session, compare, read_sessions
 from logger.service.config import AccelerometerConfig, Config
-from logger.service.hil import Sent, expected_rows, send, wired
+from logger.service.hil.log_comparison import Session, compare, read_sessions
+from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.pipeline import longest_wait_us
-from logger.store import segment_log
+from logger.store.log import row_format
 from logger.units import STANDARD_GRAVITY_MPS2
 
-from replaying import rows_of
+from ..support.drives.replay import rows_of
 
 PATIENCE_S = 120.0
 PIECE_S = 25
@@ -203,7 +203,7 @@ def test_one_row_may_lie_outside_and_two_of_these_not(rows: list[WindowRecord], 
     assert [each.outside for each in two.differences if each.tolerance.quantity == quantity] == [2]
 
 
-COLUMNS = {column.attribute for column in segment_log.COLUMNS} - {"flags", "comfort", "iri_class"}
+COLUMNS = {column.attribute for column in row_format.COLUMNS} - {"flags", "comfort", "iri_class"}
 
 
 @pytest.mark.parametrize("attribute", sorted(COLUMNS))
@@ -230,15 +230,15 @@ def test_drives_are_counted_from_where_the_service_was(rows: list[WindowRecord])
 
 
 def test_a_row_that_stands_twice_is_seen(rows: list[WindowRecord], tmp_path: Path) -> None:
-    texts = [segment_log.format_row(row) for row in rows]
+    texts = [row_format.format_row(row) for row in rows]
     log = tmp_path / "00004-001.csv"
     for repeated, agrees in (([], True), (texts[30:31], False)):
-        log.write_text("".join(f"{line}\n" for line in [segment_log.HEADER, *texts[:31], *repeated, *texts[31:]]))
+        log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *texts[:31], *repeated, *texts[31:]]))
         assert compare(rows, read_sessions(tmp_path), BRIDGE_S).ok is agrees
     # In another finished file; but not in an open one, which a disk that failed has left behind.
-    log.write_text("".join(f"{line}\n" for line in [segment_log.HEADER, *texts[:31]]))
+    log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *texts[:31]]))
     for name, repeated_rows in (("00004-002.csv", 1), ("00004-002.csv.part", 0)):
-        (tmp_path / name).write_text("".join(f"{line}\n" for line in [segment_log.HEADER, *texts[30:]]))
+        (tmp_path / name).write_text("".join(f"{line}\n" for line in [row_format.HEADER, *texts[30:]]))
         assert read_sessions(tmp_path)[0].repeated == repeated_rows
         (tmp_path / name).unlink()
 

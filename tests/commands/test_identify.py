@@ -14,15 +14,20 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
 from logger.shipped import vehicle_file
-from logger.store.drive_file import write_drive, write_profile
-from logger.store.vehicle_file import read_vehicle
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats.drive_file import write_drive, write_profile
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import Model, read_model, read_vehicle, write_model
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import chosen
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 MASS, DAMPERS = "sprung_mass_kg", "both.suspension_damping_n_s_per_m"
+FRICTION = "dry_friction.friction_force_n"
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +182,66 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
     assert told["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
     assert identify(files[:1], "step.height_m", "--step", "start_m=12,height_m=0.1", "--noise", "white") == 0
     assert "yes, the model misses something of the car" in capsys.readouterr().out
+
+
+def rubbing_vehicle(folder: Path, friction_n: float) -> str:
+    """The car with dry friction, as a file."""
+    file = folder / "rubbing.yaml"
+    write_model(file, Model(CAR, (chosen(shipped_effects()["dry_friction"], {"friction_force_n": friction_n}),)))
+    return str(file)
+
+
+@pytest.fixture(scope="module")
+def rubbing_run(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A drive of a car with 90 N of friction over a good road."""
+    folder = tmp_path_factory.mktemp("rubbing")
+    run = road_record(CAR, 15.0, 12.0, 1, gd_n0_cm3=16.0)
+    car = compose(CAR, (chosen(shipped_effects()["dry_friction"], {"friction_force_n": 90.0}),))
+    noise = 0.05 * np.random.default_rng(1).standard_normal(run.count)
+    write_drive(folder / "drive.csv", {"t_s": run.time_s, "accel_z_mps2": SimulatedRuns([run]).predict(car)[0] + noise,
+                                       "speed_mps": run.speed_mps, "distance_m": run.distance_m})
+    write_profile(folder / "profile.csv", run.track)
+    return str(folder)
+
+
+def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_path: Path,
+                                                       capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle, out = rubbing_vehicle(tmp_path, 50.0), tmp_path / "fitted.yaml"
+    asked = ["identify", rubbing_run, "--vehicle", vehicle, "--free", f"{MASS},{FRICTION}"]
+    assert main([*asked, "--start", f"{MASS}=820", "--json", "--out", str(out)]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["converged"], told["cannot_tell"]) == (True, [])
+    for name, truth in ((MASS, 875), (FRICTION, 90)):
+        assert told["parameters"][name] == pytest.approx(truth, abs=3 * told["standard_errors"][name])
+    assert (told["start"][FRICTION], told["bounds"][FRICTION]) == (50.0, [0.0, 2000.0])
+    written = read_model(out)
+    (friction,) = written.effects
+    assert written.vehicle.sprung_mass_kg == told["parameters"][MASS]
+    assert friction.values["friction_force_n"] == told["parameters"][FRICTION]
+    assert friction.standard_errors["friction_force_n"] == told["standard_errors"][FRICTION]
+    assert main(asked) == 0
+    text = capsys.readouterr().out
+    assert f"{FRICTION} " in text
+    assert "starts end at the same place" in text
+    assert "These runs tell all that was asked." in text
+
+
+@pytest.mark.parametrize(("free", "more", "message"), [
+    (f"{MASS},payload.mass_kg", (), "has dry_friction; add it with 'ridelog add-effect payload --vehicle"),
+    ("dry_friction.force_n", (), "expected dry_friction.friction_force_n, dry_friction.transition_velocity"),
+    ("dry_friction.friction_force_n", ("--start", "dry_friction.friction_force_n=-3"), "a start between its bounds"),
+    ("dry_friction.friction_force_n", ("--bounds", "dry_friction.friction_force_n=0,1e4"), "bounds within 0 to 2000"),
+    (MASS, ("--unmeasured-road",), "a car without effects where the road was not measured, found dry_friction"),
+])
+def test_effects_that_cannot_be_found_are_one_line(rubbing_run: str, tmp_path: Path, free: str, more: tuple[str, ...],
+                                                   message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        main(["identify", rubbing_run, "--vehicle", rubbing_vehicle(tmp_path, 50.0), "--free", free, *more])
+
+
+def test_an_effect_that_the_car_lacks_is_one_line(runs: list[str]) -> None:
+    with pytest.raises(BadInput, match="rav4-2009 has none; add it with 'ridelog add-effect dry_friction"):
+        identify(runs, FRICTION)
 
 
 def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,12 +10,10 @@ from pathlib import Path
 import pytest
 
 import logger
+from logger import installation as store
 from logger.commands.main import main
 from logger.errors import BadInput, CheckFailed
-from logger.service.config import load_config
-from logger.shipped import shipped
-from logger.store import installation as store
-from logger.store.installation import (
+from logger.installation import (
     COMMAND,
     CONFIG,
     ENABLED,
@@ -28,6 +26,8 @@ from logger.store.installation import (
     hidden_from_services,
     run_command,
 )
+from logger.service.config import load_config
+from logger.shipped import shipped
 
 UNIT = "etc/systemd/system/ridelog.service"
 OTHER_PROGRAM = Path("/srv/ridelog/bin/ridelog")

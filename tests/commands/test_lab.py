@@ -15,16 +15,16 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_model
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_model
 
-from lacking import FEW, named, write_runs
+from ..support.lab.runs_with_effects import FEW, named, write_runs
 
 
 @pytest.fixture(autouse=True)
 def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     few = {name: shipped_effects()[name] for name in FEW}
-    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +143,7 @@ def test_no_more_files_are_written_than_were_looked_at(
     monkeypatch.setattr("logger.commands.lab._MOST_ROUNDS", 1)
     two = [*named("sensor_offset", offset_m=0.5), *named("time_offset", delay_s=0.02)]
     few = {one.effect.name: one.effect for one in two}
-    monkeypatch.setattr("logger.store.effect_file.shipped_effects", lambda: few)
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
     assert lab(write_runs(tmp_path / "runs", two, lasts_s=12.0), tmp_path / "out", "--yes") == 0
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["story.html", "vehicle-1.yaml"]
     words = " ".join(capsys.readouterr().out.split())

@@ -11,16 +11,16 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.run_checks import lab_runs
 from logger.commands.lab_model import check_out
-from logger.commands.lab_runs import lab_runs
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.shipped import vehicle_file
-from logger.store.drive_file import read_run, write_drive, write_profile
+from logger.store.formats.drive_file import read_run, write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle
 
-from lacking import OWN, named, write_runs
+from ..support.lab.runs_with_effects import OWN, named, write_runs
 
 SHAKES = """\
 from dataclasses import replace

@@ -10,7 +10,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.roads import iso8608
 from logger.roads.iri import iri
-from logger.store.profile_file import read_profile
+from logger.store.formats.profile_file import read_profile
 
 
 def generate(path: Path, *arguments: str) -> None:

@@ -12,8 +12,8 @@ import pytest
 from logger.commands import run as command
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.service import start
-from logger.service.stop import Stop
+from logger.service import serve
+from logger.service.shutdown_signals import Stop
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,7 @@ def test_nor_is_a_disk_that_lets_nothing_begin(
 
     if watched:
         monkeypatch.setitem(os.environ, "NOTIFY_SOCKET", "/run/nobody")
-    monkeypatch.setattr(start, "serve", refuse)
+    monkeypatch.setattr(serve, "serve", refuse)
     (tmp_path / "ridelog.yaml").write_text("vehicle: rav4-2009\n")
     assert main(["run", "--config", str(tmp_path / "ridelog.yaml")]) == 1
     assert waited == [command.PAUSE_S] * watched

@@ -16,9 +16,9 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.drive_file import Run, read_run, write_profile
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import Run, read_run, write_profile
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from logger.commands.main import main
-from logger.commands.study import _tell
+from logger.commands.study import show_progress
 from logger.errors import BadInput
 
 
@@ -56,7 +56,7 @@ def test_wrong_use(arguments: list[str], complaint: str) -> None:
 
 def test_progress_wipes_itself(capsys: pytest.CaptureFixture[str]) -> None:
     for done in range(3):
-        _tell(done, 2)
+        show_progress(done, 2)
     shown = capsys.readouterr().err.split("\r")
     assert shown[1].startswith("[" + " " * 30 + "] 0 of 2")
     assert shown[2].startswith("[" + "#" * 15)

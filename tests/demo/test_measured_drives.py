@@ -7,13 +7,13 @@ import pytest
 
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle import half_car
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.vehicle import Vehicle
 
-from measured_drives import (
+from ..support.drives.measured import (
     SPACING_M,
     Accelerometer,
     Receiver,

@@ -17,7 +17,7 @@ from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
 from logger.roads import iso8608
 from logger.roads.iri import iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import half_car
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

@@ -14,8 +14,8 @@ from drivers.events import Event
 from drivers.readings import AccelerationBlock
 from drivers.sources import ChipSource, Deadlines, Source
 
-from accelerometer_fakes.adxl345 import FakeAdxl345
-from accelerometer_fakes.fake import Clock
+from ..support.accelerometer_fakes.adxl345 import FakeAdxl345
+from ..support.accelerometer_fakes.fake import Clock
 
 RAMP_MPS2_PER_S = 0.5
 COUNT_US = 9.80665 / 256 / RAMP_MPS2_PER_S * 1e6

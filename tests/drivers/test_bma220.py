@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from drivers.accelerometers._bma220_chip import Bma220Chip
 from drivers.accelerometers.bma220 import Bma220, Bma220Decoder, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, Timeout, WrongDevice
-from drivers.replay import RecordedBus
+from drivers.recorded_wires import RecordedBus
 
 SUSPEND, SOFT_RESET = 0x30, 0x32
 FILTER_BITS = {500: 1, 250: 2, 125: 3, 64: 4, 32: 5}

@@ -18,7 +18,7 @@ from drivers.accelerometers._bma220_registers import REGISTER_STEP
 from drivers.accelerometers.bma220 import Bma220, Bma220Settings, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
-from drivers.replay import RecordedBus
+from drivers.recorded_wires import RecordedBus
 
 BYTES = I2cFunc.SMBUS_READ_BYTE_DATA | I2cFunc.SMBUS_WRITE_BYTE_DATA
 Sample = tuple[int, int, int]

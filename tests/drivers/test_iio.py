@@ -20,8 +20,8 @@ from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.events import Event
 from drivers.readings import AccelerationBlock
 
-from accelerometer_fakes.fake import Clock
-from accelerometer_fakes.iio import SCALE, FakeIio
+from ..support.accelerometer_fakes.fake import Clock
+from ..support.accelerometer_fakes.iio import SCALE, FakeIio
 
 RAMP_MPS2_PER_S = 0.5
 STEP_US = SCALE / RAMP_MPS2_PER_S * 1e6
@@ -158,10 +158,10 @@ def test_a_buffer_that_the_kernel_refuses_is_not_used(tmp_path: Path, monkeypatc
 def test_a_timer_gives_the_rate_where_the_chip_has_no_trigger_of_its_own(tmp_path: Path) -> None:
     fake = fake_in(tmp_path, **{"../trigger0/name": "ridelog-timer", "../trigger0/sampling_frequency": "10",
                                 "sampling_frequency": None, "sampling_frequency_available": None})
-    source = IioSource(fake.settings, fake.machine())
-    source.open()
+    settings = fake.settings
+    device = _iio_device.IioDevice(fake.machine().root, settings.device, settings.rate_hz, settings.scale_mps2)
     assert (fake.device / "../trigger0/sampling_frequency").read_text() == "200"
-    assert source._description["rate_hz"] == "200"
+    assert device.describe()["rate_hz"] == "200"
 
 
 @pytest.mark.parametrize(("asked", "available", "taken"), [

@@ -9,19 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pynmeagps import NMEAReader
 
-from drivers.nmea import (
-    KMH_MPS,
-    KNOT_MPS,
-    Checksum,
-    Gga,
-    Gsa,
-    NmeaDecoder,
-    Rmc,
-    Vtg,
-    Zda,
-    check,
-    parse_sentence,
-)
+from drivers.nmea import NmeaDecoder
+from drivers.nmea_sentences import KMH_MPS, KNOT_MPS, Checksum, Gga, Gsa, Rmc, Vtg, Zda, check, parse_sentence
 
 TALKERS = ["GP", "GL", "GA", "GB", "BD", "GQ", "QZ", "GI", "GN"]
 DAY_US = 86_400_000_000

@@ -12,11 +12,11 @@ from logger.estimation.sensor_noise import Sensor
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
-from measured_drives import road_response
+from ..support.drives.measured import road_response
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 STRUCTURE = structure_of(CAR)

@@ -13,7 +13,7 @@ from logger.estimation.road_solver import Block, Solution, TimeGrid
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 

@@ -17,7 +17,7 @@ from logger.estimation.iri_posterior import (
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point

@@ -11,7 +11,7 @@ from logger.estimation.local_variance import LocalRoughness, RelativeVariance, m
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -21,10 +21,14 @@ RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 
 
 @cache
+def a_grid() -> TimeGrid:
+    return TimeGrid(CarResponse(RAV4, body_point(RAV4)), COUNT, 100.0)
+
+
+@cache
 def a_block() -> tuple[Block, np.ndarray, np.ndarray]:
     """A drive of ten seconds, its matrix B (t, count) column by column, and where the road was read."""
-    grid = TimeGrid(CarResponse(RAV4, body_point(RAV4)), COUNT, 100.0)
-    block = Block(grid, SPEED_MPS / 100 * np.arange(COUNT), SPACING_M, 7.62)
+    block = Block(a_grid(), SPEED_MPS / 100 * np.arange(COUNT), SPACING_M, 7.62)
     unit = np.fft.rfft(np.eye(block.count), axis=1)
     matrix = np.array([block.driven(row * block.wave_factors(ROAD)) for row in unit]).T
     return block, matrix, block.seen(weights() > 0) > 0
@@ -57,9 +61,9 @@ def settled(reading: np.ndarray, rounds: int = 12) -> RelativeVariance:
 
 def log_evidence(reading: np.ndarray, variance: np.ndarray) -> float:
     """log N(y; 0, B D B' + drift + noise) of what was read."""
-    block, matrix, _ = a_block()
-    drift = block._grid.drift
-    covariance = (matrix * variance) @ matrix.T + (drift / block._grid.drift_precision) @ drift.T
+    _, matrix, _ = a_block()
+    drift = a_grid().drift
+    covariance = (matrix * variance) @ matrix.T + (drift / a_grid().drift_precision) @ drift.T
     used = weights() > 0
     covariance = (covariance + NOISE_MPS2**2 * np.eye(COUNT))[np.ix_(used, used)]
     y = reading[used]

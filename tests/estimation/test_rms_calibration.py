@@ -13,7 +13,7 @@ from logger.roads import iso8608
 from logger.roads.gd_iri import iri_per_root_gd
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import WINDOW_M
 from logger.vehicle import half_car
 from logger.vehicle.quarter_car import GOLDEN_CAR

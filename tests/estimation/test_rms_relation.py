@@ -9,7 +9,7 @@ from scipy import signal
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import half_car
 from logger.vehicle.quarter_car import GOLDEN_CAR
 

@@ -8,10 +8,10 @@ import pytest
 from scipy.signal import lsim
 
 from logger.estimation.car_response import CarResponse, golden_car_slope
-from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, _fft_length
+from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid, quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure, body_point
@@ -305,7 +305,7 @@ def test_a_place_that_jumps_costs_no_short_waves() -> None:
 
 @pytest.mark.parametrize("least", [9.0, 100.2, 1024.0, 1025.0, 4700.0, 6000.5, 123_456.7])
 def test_lengths_are_even_long_enough_and_quick(least: float) -> None:
-    length = _fft_length(least)
+    length = quick_fft_length(least)
     assert least <= length <= 1.26 * least and length % 2 == 0
     for prime in (2, 3, 5, 7):
         while length % prime == 0:

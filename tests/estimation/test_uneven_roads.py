@@ -12,7 +12,7 @@ from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point

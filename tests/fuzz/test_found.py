@@ -13,15 +13,15 @@ from drivers.errors import DriverError, SettingsError
 from drivers.wire_profiles import Calibration, load_profile, shipped_profiles
 from logger.errors import BadInput
 from logger.records import WindowRecord
-from logger.service.assemble import config_for_dump
 from logger.service.config import load_config
-from logger.store.channel_file import read_channels
-from logger.store.drive_file import read_speeds
-from logger.store.profile_file import read_profile
-from logger.store.record_file import read_record
-from logger.store.segment_log import BadRow, format_row, parse_row
-from logger.store.vehicle_file import read_vehicle
-from logger.store.verify import verify
+from logger.service.wiring import config_for_dump
+from logger.store.formats.channel_file import read_channels
+from logger.store.formats.drive_file import read_speeds
+from logger.store.formats.profile_file import read_profile
+from logger.store.formats.record_file import read_record
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.integrity import verify
+from logger.store.log.row_format import BadRow, format_row, parse_row
 
 ERD = "ERDFILEV2.00\n1,-1,1,1,5,0.1\nXUNITS m\nUNITSNAMm\nEND\n"
 

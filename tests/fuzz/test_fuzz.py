@@ -1,6 +1,6 @@
 """A short seeded run of the fuzzer over every reader, and what must take neither time nor memory however large it is.
 
-``tests/bench/fuzz.py`` runs the same for as long as one likes.
+``tests/benchmarks/fuzz.py`` runs the same for as long as one likes.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-import huge_inputs
-from fuzz_targets import TARGETS, Workshop
-from fuzzing import Counts, fuzz, read_counts
+from ..support.fuzz import huge_inputs
+from ..support.fuzz.mutation import Counts, fuzz, read_counts
+from ..support.fuzz.targets import TARGETS, Workshop
 
 INPUTS = {"vehicle_yaml": 250, "config_yaml": 300, "pasco_profile_yaml": 250, "pasco_ps2119": 300}
 MEMORY_MB = 150
+ROOT = Path(__file__).resolve().parents[2]
 HUGE_GB = 0.02
 LONGEST_S = 20.0
 
@@ -31,8 +32,8 @@ def test_damaged_input_is_refused_in_one_line_or_read_as_it_stands(name: str) ->
 
 
 def test_what_is_huge_outside_or_inside_takes_little_time_and_memory(tmp_path: Path) -> None:
-    command = [sys.executable, huge_inputs.__file__, str(tmp_path), str(HUGE_GB)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", huge_inputs.__name__, str(tmp_path), str(HUGE_GB)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     rows = [line.split("\t") for line in done.stdout.splitlines()]
     assert len(rows) > 25

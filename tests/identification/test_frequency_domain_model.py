@@ -12,12 +12,12 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

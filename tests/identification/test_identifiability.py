@@ -12,11 +12,11 @@ from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIde
 from logger.identification.prediction_error_fit import Options, fit
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))
 BUMP = bump_record(CAR)

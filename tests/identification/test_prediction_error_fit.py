@@ -14,11 +14,11 @@ from logger.identification.noise_models import Autoregressive, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
 from logger.runs import normalised_rms
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import Free, changed, free
 
-from bump_drives import bump_record, road_record
+from ..support.drives.bumps import bump_record, road_record
 
 Array = npt.NDArray[np.float64]
 

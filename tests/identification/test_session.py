@@ -22,7 +22,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.named_parameters import changed, free
 from logger.vehicle.simulate import drive

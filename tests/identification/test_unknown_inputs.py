@@ -28,12 +28,12 @@ from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.named_parameters import free
 from logger.vehicle.vehicle import Vehicle
 
-from bump_drives import bump_record
+from ..support.drives.bumps import bump_record
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from logger.identification.unknown_road.road_state import GD_N0, NOISE, Options
 from logger.profiles.track import Track
 from logger.roads.iso8608 import generate
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
 from logger.vehicle.frequency_response import AxleResponse
 from logger.vehicle.named_parameters import changed, free

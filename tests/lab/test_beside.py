@@ -9,7 +9,7 @@ import pytest
 from logger.lab.beside import Part, located, paired, short_names
 from logger.runs import Run
 
-from compared import CAR, RATE_HZ, a_run, beside_with
+from ..support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
 
 Array = npt.NDArray[np.float64]
 

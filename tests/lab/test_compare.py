@@ -10,11 +10,11 @@ import pytest
 
 from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.vehicle import Vehicle
 
-from compared import CAR, beside_with, recorded_by, runs_of
+from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs_of
 
 NOISE_MPS2 = 0.015
 FRICTION = ("dry_friction", {"friction_force_n": 80.0})

@@ -13,10 +13,10 @@ from logger.lab.stretches import Cells
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
-from compared import CAR, a_run
+from ..support.lab.runs_with_residual import CAR, a_run
 
 EFFECTS = shipped_effects()
 

@@ -17,15 +17,15 @@ from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.settling import settled
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.drive_file import read_run
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.drive_file import read_run
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import moves_of, steps_apart, steps_of
 from logger.vehicle.named_parameters import read
 from logger.vehicle.vehicle import Vehicle
 
-EXAMINATION = Path(__file__).parents[1] / "examination"
+ROOT = Path(__file__).parents[2]
 EFFECTS = shipped_effects()
 
 
@@ -39,8 +39,9 @@ def examined(
 
     with TemporaryDirectory() as folder:
         named = [] if effect is None else ["--effect", effect]
-        subprocess.run([sys.executable, str(EXAMINATION / "make.py"), "--kind", kind, "--first-seed", str(seed), *named,
-                        "--out", f"{folder}/cases", "--truth", f"{folder}/truth"], check=True, capture_output=True)
+        command = [sys.executable, "-m", "tests.validation.make", "--kind", kind, "--first-seed", str(seed), *named]
+        subprocess.run([*command, "--out", f"{folder}/cases", "--truth", f"{folder}/truth"], cwd=ROOT, check=True,
+                       capture_output=True)
         case = next(Path(folder, "cases").iterdir())
         truth = json.loads(next(Path(folder, "truth").iterdir()).read_text())
         runs = []

@@ -16,7 +16,7 @@ from logger.lab.marks import Mark, Marks, read_marks, worst_places
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
-from compared import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
+from ..support.lab.runs_with_residual import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 
 Array = npt.NDArray[np.float64]
 NOISE_MPS2 = 0.05

@@ -10,7 +10,7 @@ from logger.lab.nuisance import Tolerance
 from logger.lab.stretches import Stretches
 from logger.simulation.simulated_runs import SimulatedRuns
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 
 def found_for(noise: np.ndarray) -> tuple[float, float]:

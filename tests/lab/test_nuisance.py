@@ -6,7 +6,7 @@ from scipy.optimize import approx_fprime
 
 from logger.lab.nuisance import Tolerance, nuisance_of, rate_of_change, wander_of
 
-from compared import CAR, a_run
+from ..support.lab.runs_with_residual import CAR, a_run
 
 RATE_HZ = 100.0
 INNER = slice(50, -50)

@@ -14,11 +14,11 @@ from logger.lab.diagnosis import diagnose
 from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 EFFECTS = shipped_effects()
 

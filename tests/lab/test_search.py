@@ -16,13 +16,13 @@ from logger.lab.settling import aligned, settled
 from logger.lab.verdict import as_json, told
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.vehicle import Vehicle
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 EFFECTS = shipped_effects()
 NOISE_MPS2 = 0.05

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from logger.lab.spread import with_errors
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.effect_parameters import moves_of
 

@@ -10,7 +10,7 @@ from logger.profiles.track import Track
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 
 def run_of(samples: int, rate_hz: float = 100.0) -> Run:

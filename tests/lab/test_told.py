@@ -12,11 +12,11 @@ from logger.lab.quantities import chance, measured, numbers_of, unit_of
 from logger.lab.unexplained import turns_of
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 
-from compared import CAR, a_run, beside_with, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, beside_with, measuring
 
 
 @pytest.mark.parametrize(("value", "error", "words"), [

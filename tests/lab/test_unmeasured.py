@@ -20,8 +20,8 @@ from logger.profiles.track import Track
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.runs import Run
 from logger.shipped import vehicle_file
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.passage import Passage

@@ -17,11 +17,11 @@ from logger.lab.spread import with_spread
 from logger.lab.verdict import summary, told
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.effect_file import shipped_effects
+from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 
-from compared import CAR, a_run, measuring
+from ..support.lab.runs_with_residual import CAR, a_run, measuring
 
 NOISE_MPS2 = 0.05
 EFFECTS = {name: shipped_effects()[name]

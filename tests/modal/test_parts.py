@@ -10,7 +10,7 @@ from logger.modal import five_storey
 from logger.modal.decrement import damping_of_two_peaks, log_decrement
 from logger.modal.mode import errors_of, mac
 from logger.modal.moments import segment_products
-from logger.modal.spectrum import peak_modes
+from logger.modal.spectral_peaks import peak_modes
 from logger.modal.structure_response import chain, free_decay, random_response, with_damping_ratios
 
 

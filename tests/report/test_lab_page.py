@@ -11,7 +11,7 @@ import pytest
 from logger.lab.compare import Comparison, compare, evidence, headline
 from logger.report.lab_page import page
 
-from compared import CAR, beside_with, recorded_by, runs_of
+from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs_of
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from logger.commands import main
 from logger.commands import report as report_command
 from logger.errors import BadInput
 from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, LoggedFile, page
-from logger.store.segment_log import COLUMNS, HEADER, format_row
+from logger.store.log.row_format import COLUMNS, HEADER, format_row
 
 SIDECAR: dict[str, Any] = {"ridelog_version": "1.2", "sensor": {"driver": "bma220", "verified": True},
                            "vehicle": {"name": "rav4-2009"}, "settings": {"gps": {"baud": 9600}}, "log": {"part": 1}}

@@ -21,19 +21,19 @@ from drivers.events import GPS
 from drivers.settings import Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.commands.status import advice
 from logger.errors import BadInput
-from logger.service import assemble
+from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, load_config
-from logger.service.core import Core
-from logger.service.observer import Progress
-from logger.service.replay import Player
+from logger.service.dump_player import Player
+from logger.service.event_core import EventCore
 from logger.service.status import SensorStatus, ServiceStatus
+from logger.service.status_reporter import Progress
 from logger.service.supervisor import Supervisor
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 
-from accelerometer_fakes import fakes
-from accelerometer_fakes.fake import Clock, Fake, Vector
-from replaying import Rows
-from sensor_faults import epoch
+from ..support.accelerometer_fakes import fakes
+from ..support.accelerometer_fakes.fake import Clock, Fake, Vector
+from ..support.drives.replay import Rows
+from ..support.faults.sensors import epoch
 
 NAMES = list(accelerometers())
 SPEED_MPS = 12.0
@@ -83,12 +83,12 @@ class Ride:
         self.events += self.supervisor.close()
         return sorted(self.events, key=lambda event: event.t_us)
 
-    def core(self) -> tuple[Core, Rows]:
+    def core(self) -> tuple[EventCore, Rows]:
         """A service with these settings."""
         rows = Rows()
-        sensor = assemble.instrument(self.config.accelerometer)
-        pipeline = assemble.pipeline(self.config, sensor, read_vehicle(self.config.vehicle))
-        return Core(sensor.decoder, assemble.gps_decoder(self.config), pipeline, rows), rows
+        sensor = wiring.instrument(self.config.accelerometer)
+        pipeline = wiring.pipeline(self.config, sensor, read_vehicle(self.config.vehicle))
+        return EventCore(sensor.decoder, wiring.gps_decoder(self.config), pipeline, rows), rows
 
     def rows(self) -> Rows:
         """What the live service makes of it."""
@@ -193,15 +193,15 @@ def test_the_header_of_a_recording_brings_its_settings_back(name: str, tmp_path:
         for text in examples(kind.keys[key])[0]:
             other = loaded(tmp_path / "ridelog.yaml", name, key, text)
             header = DumpHeader(None, {"driver": name, "vertical_axis": "-y", **kind.header(other)}, {}, "rav4-2009")
-            config = assemble.config_for_dump(header, None, None)
+            config = wiring.config_for_dump(header, None, None)
             assert config.accelerometer.driver == name
             assert config.accelerometer.vertical_axis == "-y"
             assert kind.header(config.accelerometer.settings) == kind.header(other)
         wrong = DumpHeader(None, {"driver": name, **said, key: ["no such"]}, {}, "rav4-2009")
         with pytest.raises(BadInput, match=r"^drive\.dump:1: "):
-            assemble.config_for_dump(wrong, None, None, "drive.dump:1")
+            wiring.config_for_dump(wrong, None, None, "drive.dump:1")
     header = DumpHeader(None, {"driver": name}, {}, "rav4-2009")
-    assert assemble.config_for_dump(header, None, None).accelerometer.settings == usual
+    assert wiring.config_for_dump(header, None, None).accelerometer.settings == usual
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -209,7 +209,7 @@ def test_a_recorded_drive_gives_the_same_rows_again(name: str, ride: Callable[[s
     driven = ride(name).drive(40)
     live = driven.rows()
     path = tmp_path / "drive.dump.gz"
-    header = assemble.dump_header(driven.config)
+    header = wiring.dump_header(driven.config)
     writer = DumpWriter(path, header)
     for event in driven.parked():
         writer.write(event)
@@ -217,7 +217,7 @@ def test_a_recorded_drive_gives_the_same_rows_again(name: str, ride: Callable[[s
     core, rows = driven.core()
     with open_dump(path) as reader:
         assert reader.header == header
-        config = assemble.config_for_dump(reader.header, driven.config, None)
+        config = wiring.config_for_dump(reader.header, driven.config, None)
         assert config.accelerometer.settings == driven.config.accelerometer.settings
         Player(core, config.accelerometer, 0.0, lambda _: None).play(reader)
     assert rows.rows == live.rows
@@ -330,8 +330,8 @@ def test_bytes_that_are_none_of_its_own_do_no_harm(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_its_facts_and_settings_stand_beside_the_log(name: str, ride: Callable[[str], Ride]) -> None:
     driven = ride(name)
-    sensor = assemble.instrument(driven.config.accelerometer)
-    facts = assemble.sidecar(driven.config, sensor, read_vehicle(driven.config.vehicle))
+    sensor = wiring.instrument(driven.config.accelerometer)
+    facts = wiring.sidecar(driven.config, sensor, read_vehicle(driven.config.vehicle))
     assert facts["sensor"]["driver"] == name
     section = json.loads(json.dumps(facts["settings"]["accelerometer"]))
     assert section["driver"] == name

@@ -10,7 +10,7 @@ from logger.demo.simulated_drive import Drive
 from logger.records import WindowRecord
 from logger.service.config import Config, PipelineConfig
 
-from replaying import rows_of
+from ..support.drives.replay import rows_of
 
 
 def numbers(record: WindowRecord) -> dict[str, float]:

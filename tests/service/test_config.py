@@ -10,7 +10,7 @@ import yaml
 from logger.errors import BadInput
 from logger.service.config import Config, find_config, load_config
 from logger.shipped import shipped, vehicle_file, vehicle_names
-from logger.store.pairing import Pairing
+from logger.store.export.pairing import Pairing
 
 SHIPPED = shipped("config") / "ridelog.yaml"
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.rotation import SegmentLog
+from logger.store.log.log_writer import SegmentLog
 
-from crashes import FACTS, window
-from disk_faults import HAZARDS
-from fault_trials import Hazard, cases_for_tests, label
-from faulty_disk import RefusingFiles
+from ..support.faults.crashes import FACTS, window
+from ..support.faults.disk_models import RefusingFiles
+from ..support.faults.disks import HAZARDS
+from ..support.faults.trials import Hazard, cases_for_tests, label
 
 
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)

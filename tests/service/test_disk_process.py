@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from killing import KILLS, SERVICES, WRITES_NO_MORE
+from ..support.faults.kills import KILLS, SERVICES, WRITES_NO_MORE
 
 
 def test_a_dozen_kills(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from logger.demo.simulated_drive import DrivePlan, simulate_drive
 from logger.service.config import Config, GpsConfig
 from logger.service.pipeline import FIX_DELAY_US, LONGEST_LAG_US, longest_wait_us
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import US_PER_S
 
-from replaying import core_for
+from ..support.drives.replay import core_for
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -16,7 +16,7 @@ from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
 from logger.service.config import Config, GpsConfig
 
-from replaying import rows_of
+from ..support.drives.replay import rows_of
 
 CONFIG = Config(gps=GpsConfig(latency_s=0.15))
 

@@ -10,8 +10,8 @@ import pytest
 import drivers
 import logger
 
-from fault_trials import Hazard, cases_for_tests, label
-from sensor_faults import HAZARDS
+from ..support.faults.sensors import HAZARDS
+from ..support.faults.trials import Hazard, cases_for_tests, label
 
 WALL_CLOCKS = {("time", "time"), ("time", "time_ns"), ("time", "localtime"), ("time", "gmtime"), ("time", "ctime"),
                ("time", "strftime"), ("datetime", "now"), ("datetime", "utcnow"), ("datetime", "today"),

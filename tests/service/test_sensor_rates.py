@@ -9,9 +9,8 @@ import pytest
 
 from logger.commands.status import advice
 
-from replaying import rows_of
-from sensor_faults import Car
-from serial_drives import (
+from ..support.drives.replay import rows_of
+from ..support.drives.serial_drives import (
     SPEED_MPS,
     drive_at,
     evenly_lost,
@@ -22,6 +21,7 @@ from serial_drives import (
     same_rows,
     without_lines,
 )
+from ..support.faults.sensors import Car
 
 WHOLE_ROWS = 185
 

@@ -1,4 +1,4 @@
-"""Half an hour of a car's day across New Year's midnight; ``tests/bench/soak.py`` lets the whole day happen."""
+"""Half an hour of a car's day across New Year's midnight; ``tests/benchmarks/soak.py`` lets the whole day happen."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.space import RESERVE_BYTES
+from logger.store.log.disk_quota import RESERVE_BYTES
 
-from car_days import START_US, CarDay
-from soaking import MAX_FILE_BYTES, soak
+from ..support.drives.car_days import START_US, CarDay
+from ..support.faults.soak import MAX_FILE_BYTES, soak
 
 
 def test_half_an_hour_of_driving_and_parking_leaves_what_it_should(tmp_path: Path) -> None:

@@ -10,9 +10,10 @@ from drivers.accelerometers._bma220_chip import Bma220Chip
 from drivers.accelerometers._bma220_registers import FILTER, RANGE
 from drivers.accelerometers.bma220 import Bma220Settings, chip_source
 from drivers.dump import Event
-from drivers.replay import RecordedBus
-from logger.service.live import Listener, LiveService
-from logger.service.merging import EventMerger
+from drivers.recorded_wires import RecordedBus
+from logger.service.event_merger import EventMerger
+from logger.service.listener import Listener
+from logger.service.main_loop import MainLoop
 from logger.service.supervisor import Supervisor
 
 SETTINGS = Bma220Settings(range_g=4)
@@ -107,7 +108,7 @@ def test_events_of_another_source_wait_for_the_readings_that_are_held_back() -> 
     bus = Bus(set())
     chip = Supervisor(chip_source(lambda: bus, SETTINGS, clock, lambda seconds: None), clock)
     listener = Listener(chip, queue, lambda: None)
-    service = LiveService(fed, fed, [listener], queue, 1.0, 1.0, lambda now_us: None)  # type: ignore[arg-type]
+    service = MainLoop(fed, fed, [listener], queue, 1.0, 1.0, lambda now_us: None)  # type: ignore[arg-type]
     for tick in range(500):
         listener.look()
         if tick % 7 == 0:

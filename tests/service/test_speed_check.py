@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from receivers import town_drive
 
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
@@ -17,8 +16,9 @@ from logger.commands.status import advice, screen
 from logger.service.speed_check import SpeedCheck
 from logger.service.timebase import TimedFix
 
-from replaying import rows_of
-from sensor_faults import NOON, Car, checked, epoch
+from ..support.drives.receivers import town_drive
+from ..support.drives.replay import rows_of
+from ..support.faults.sensors import NOON, Car, checked, epoch
 
 ROLLOVER = timedelta(weeks=1024)
 

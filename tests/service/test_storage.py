@@ -12,11 +12,11 @@ from logger.commands.status import advice
 from logger.service import storage as storage_module
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, read_status, write_status
 from logger.service.storage import LOOK_US, Storage
-from logger.store.rotation import SegmentLog
-from logger.store.segment_log import read_log
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.row_format import read_log
 
-from crashes import FACTS, WHOLE_DISK, window
-from faulty_disk import RefusingFiles
+from ..support.faults.crashes import FACTS, WHOLE_DISK, window
+from ..support.faults.disk_models import RefusingFiles
 
 
 def storage_in(folder: Path, files: RefusingFiles | None = None) -> Storage:

@@ -12,6 +12,7 @@ from logger.simulation.virtual_drive import (
     AFTER_S,
     SENSOR,
     Obstacle,
+    SensorErrors,
     as_sensed,
     at_one_speed,
     motion_along,
@@ -19,8 +20,8 @@ from logger.simulation.virtual_drive import (
     response_with_effects,
     with_obstacles,
 )
-from logger.store.effect_file import shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
 from logger.vehicle.models import structure_of
@@ -81,8 +82,8 @@ def test_a_stretched_distance_comes_with_a_stretched_speed() -> None:
 
 def test_a_sensor_adds_noise_of_one_seed_and_rounds() -> None:
     still = np.zeros(4000)
-    assert as_sensed(still, 0.0, 0.0, 1) is still
-    noisy = as_sensed(still, 0.2, 0.0, 1)
+    assert as_sensed(still, SensorErrors()) is still
+    noisy = as_sensed(still, SensorErrors(0.2))
     assert noisy.std() == pytest.approx(0.2, rel=0.05)
-    assert np.array_equal(noisy, as_sensed(still, 0.2, 0.0, 1))
-    assert set(np.unique(as_sensed(still, 0.2, 0.5, 1))) <= {-1.0, -0.5, 0.0, 0.5, 1.0}
+    assert np.array_equal(noisy, as_sensed(still, SensorErrors(0.2)))
+    assert set(np.unique(as_sensed(still, SensorErrors(0.2, 0.5)))) <= {-1.0, -0.5, 0.0, 0.5, 1.0}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import half_car, quarter_car
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.vehicle import Axle, Vehicle

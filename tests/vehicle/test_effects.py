@@ -16,8 +16,8 @@ from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
-from logger.store.effect_file import check_on, shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import check_on, shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded
 from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Scale, chosen
 from logger.vehicle.laws import CornerLaws, linear

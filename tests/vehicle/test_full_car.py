@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import full_car, half_car, quarter_car
 from logger.vehicle.frequency_response import body_acceleration_response, frequency_response
 from logger.vehicle.models import structure_of

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eig, eigh, expm
 
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import quarter_car
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, one_at_a_time, undamped_frequencies_hz

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.named_parameters import Free, changed, free, names, read
 
 CAR = read_vehicle(vehicle_file("rav4-2009"))

@@ -14,14 +14,14 @@ from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.roads.obstacles import pothole, step
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive, recorder_taps, simulate
 from logger.vehicle.structure import body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.vehicle import Vehicle
 
-from newton import Told, judge, road_under
+from ..support.drives.newton_car import Told, judge, road_under
 
 RMS_GOAL = 1e-4
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg, signal
 
 from logger.shipped import vehicle_file
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import half_car, quarter_car
 from logger.vehicle.state_space import driven_outputs, matrix_exponential, recursion, straight_step
 

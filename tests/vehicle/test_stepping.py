@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.effect_file import own_effect, shipped_effects
-from logger.store.vehicle_file import read_vehicle
+from logger.store.formats.effect_file import own_effect, shipped_effects
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import stepping_loop
 from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Chosen, chosen
@@ -29,7 +29,7 @@ from logger.vehicle.stepping import march, static_tire_loads_n
 from logger.vehicle.structure import suspension_travel, wheel
 from logger.vehicle.vehicle import Axle, Vehicle
 
-from newton import road_under
+from ..support.drives.newton_car import road_under
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 G = 9.80665

@@ -23,7 +23,7 @@ from logger.identification.unknown_road.road_state import (
     RoadState,
     at_n0,
 )
-from logger.vehicle.named_parameters import WEAKEST
+from logger.vehicle.named_parameters import WEAKEST, Coordinates
 
 Array = npt.NDArray[np.float64]
 
@@ -113,19 +113,16 @@ class Problem:
         self.names.append(NOISE)
         for part_of in self.places:
             part_of.append(len(self.names) - 1)
-        self.log = np.array([one.by_factors for one in self.free])
-        self.unit = np.array([np.sign(one.start) if one.by_factors else (one.high - one.low) / 2 for one in self.free])
-        low, high = (self._coordinates(np.array([getattr(one, end) for one in self.free])) for end in ("low", "high"))
+        self.coordinates = Coordinates(self.free)
         more = np.full(len(self.names) - len(self.free), np.inf)
-        self.low = np.append(np.minimum(low, high), -more)
-        self.high = np.append(np.maximum(low, high), more)
+        self.low, self.high = np.append(self.coordinates.low, -more), np.append(self.coordinates.high, more)
         self.low[self._where(WAVINESS)], self.high[self._where(WAVINESS)] = _WAVINESS
 
     def start(self) -> Array:
         """Where to begin: the car as it is said to be; levels and noise from the spectra; places by trying them."""
         values = np.array([one.start for one in self.free])
         x = np.zeros(len(self.names))
-        x[: len(self.free)] = self._coordinates(values)
+        x[: len(self.free)] = self.coordinates.of(values)
         x[self._where(WAVINESS)] = self.options.waviness
         noises = []
         for road, part in zip(self.roads, self.places, strict=True):
@@ -253,17 +250,13 @@ class Problem:
     def _where(self, what: str) -> npt.NDArray[np.bool_]:
         return np.array([name.endswith(f".{what}") for name in self.names])
 
-    def _coordinates(self, values: Array) -> Array:
-        return np.where(self.log, np.log(np.where(self.log, np.abs(values), 1.0)), values / self.unit)
-
     def _values(self, x: Array) -> Array:
-        own = x[: len(self.free)]
-        return self.unit * np.where(self.log, np.exp(np.where(self.log, own, 0.0)), own)
+        return self.coordinates.values(x[: len(self.free)])
 
     def _scale(self, x: Array) -> Array:
         """Derivatives of the numbers by the coordinates; a road's slopes are by logarithms and metres already."""
         scale = np.ones(len(x))
-        scale[: len(self.free)] = np.where(self.log, self._values(x), self.unit)
+        scale[: len(self.free)] = self.coordinates.slopes(self._values(x))
         return scale
 
     def state(self, x: Array, part: list[int]) -> RoadState:

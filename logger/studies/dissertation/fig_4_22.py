@@ -4,7 +4,7 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of
-from logger.studies.fitting import MASS, TRUTH, fitted
+from logger.studies.fit_methods import MASS, TRUTH, fitted
 from logger.studies.study import Column, Effort, Result, Study, Table
 
 PRINTED_STARTS_KG = tuple(np.linspace(700, 1100, 20).tolist())

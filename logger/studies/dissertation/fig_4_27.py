@@ -7,7 +7,7 @@ from logger.identification.obstacle_paths import Bump
 from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of, without_profile
-from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump
+from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, mass_and_bump
 from logger.studies.study import Column, Effort, Result, Study, Table
 
 HEIGHTS_M = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())

@@ -7,7 +7,7 @@ from logger.identification.obstacle_paths import Step
 from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
-from logger.studies.fitting import MASS, TRUTH, fitted
+from logger.studies.fit_methods import MASS, TRUTH, fitted
 from logger.studies.study import Column, Effort, Result, Study, Table
 
 HEIGHTS_M = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())

@@ -1,6 +1,6 @@
 """Table 4.4: error of the mass, found together with both stiffnesses, from 25 starts (4.4.4)."""
 
-from logger.studies.fitting import MASS
+from logger.studies.fit_methods import MASS
 from logger.studies.starts import HOW, from_25_starts
 from logger.studies.study import Effort, Result, Study
 

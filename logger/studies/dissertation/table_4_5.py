@@ -1,6 +1,6 @@
 """Table 4.5: error of the front stiffness, found together with mass and rear stiffness, from 25 starts (4.4.4)."""
 
-from logger.studies.fitting import FRONT
+from logger.studies.fit_methods import FRONT
 from logger.studies.starts import HOW, from_25_starts
 from logger.studies.study import Effort, Result, Study
 

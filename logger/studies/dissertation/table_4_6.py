@@ -1,6 +1,6 @@
 """Table 4.6: error of the rear stiffness, found together with mass and front stiffness, from 25 starts (4.4.4)."""
 
-from logger.studies.fitting import REAR
+from logger.studies.fit_methods import REAR
 from logger.studies.starts import HOW, from_25_starts
 from logger.studies.study import Effort, Result, Study
 

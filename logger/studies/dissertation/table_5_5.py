@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from logger.modal.spectrum import summed_spectrum
+from logger.modal.spectral_peaks import summed_spectrum
 from logger.studies.drives import PS_2119, RATE_HZ, bump, record_of
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table
 from logger.units import STANDARD_GRAVITY_MPS2

@@ -5,7 +5,7 @@ import numpy as np
 from logger.identification.obstacle_paths import Bump
 from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, PS_2119, bump, record_of, without_profile
-from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, mass_and_bump, standard_error_percent
+from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, mass_and_bump, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table
 
 PRINTED_KG = ((870.658, 844.053), (927.464, 911.141), (519.555, 660.512), (672.677, 817.204))

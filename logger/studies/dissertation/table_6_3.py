@@ -11,7 +11,7 @@ from logger.identification.prediction_error_fit import Fit
 from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, PS_2119, STEP_M, bridge, record_of, without_profile
-from logger.studies.fitting import MASS, TRUTH, error_percent, fitted, standard_error_percent
+from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, standard_error_percent
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table
 
 PRINTED = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),

@@ -11,7 +11,7 @@ import numpy as np
 from drivers.accelerometers.adxl345 import Adxl345Config
 from drivers.machine import Machine
 
-from accelerometer_fakes.fake import Clock, Fake
+from .fake import Clock, Fake
 
 RESET = {0x00: 0xE5, 0x2C: 0x0A, **dict.fromkeys((0x1E, 0x1F, 0x20, 0x2D, 0x2E, 0x2F, 0x31, 0x38), 0)}
 READ_ONLY = (0x00, 0x2B, 0x30, *range(0x32, 0x38), 0x39)

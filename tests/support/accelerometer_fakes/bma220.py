@@ -11,7 +11,7 @@ from drivers.accelerometers._bma220_registers import CHIP_ID
 from drivers.accelerometers.bma220 import ACCELEROMETER, Bma220Config
 from drivers.machine import Machine
 
-from accelerometer_fakes.fake import Clock, Fake
+from .fake import Clock, Fake
 
 
 class Bus:

@@ -16,7 +16,7 @@ import numpy as np
 from drivers.accelerometers.iio import IioConfig
 from drivers.machine import Machine
 
-from accelerometer_fakes.fake import Clock, Fake
+from .fake import Clock, Fake
 
 SCALE = 0.009580  # +-2 g with 12 bits
 BITS, SHIFT = 12, 4

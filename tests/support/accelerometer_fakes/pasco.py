@@ -9,7 +9,7 @@ from typing import Any
 from drivers.accelerometers.pasco import ACCELEROMETER, PascoConfig
 from drivers.machine import Machine
 
-from accelerometer_fakes.fake import Clock, Fake
+from .fake import Clock, Fake
 
 INTERVAL_US = 10_000
 

@@ -1,0 +1,347 @@
+"""A model and runs on it, checked together, and what the lab does with them.
+
+Problem: whoever asks the lab, at a terminal or in a notebook, brings a vehicle, runs and maybe effects of their own,
+which may not fit each other; a search takes minutes, and what is wrong has to be said before it. Solution:
+``bench_of`` checks all of it once, and its methods are the questions that can be asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.errors import BadInput
+from logger.units import STANDARD_GRAVITY_MPS2
+
+if TYPE_CHECKING:
+    from logger.lab.compare import Comparison
+    from logger.lab.fitting import Problem
+    from logger.lab.gained import Gained
+    from logger.lab.verdict import Verdict
+    from logger.runs import Array
+    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.store.formats.vehicle_file import Model
+    from logger.vehicle.effect import Chosen, Effect
+
+TOLERANCE = 0.04
+TOLERANCES = (0.001, 0.5)
+_BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
+_LEAST_MPS2 = 1e-4
+_ALIKE, _NEAR = 0.8, 0.3
+_UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "thousandths of g": STANDARD_GRAVITY_MPS2 / 1000, "mm/s2": 0.001}
+_SLOW = "expect ten minutes or more for each minute driven"
+_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
+_ROUNDS = 3
+
+Tell = Callable[[str], None]
+"""Told what is under way."""
+
+
+def unsaid(_words: str) -> None:
+    """Told to nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A model and runs on it, ready to be worked on.
+
+    word        by which the user knows the vehicle
+    effects     those that there are, by name
+    files       of the user's own among them
+    numbers     deviation of what the car's numbers are usually off by, as a share
+    """
+
+    word: str
+    model: Model
+    runs: SimulatedRuns
+    effects: Mapping[str, Effect]
+    files: Mapping[str, str]
+    numbers: float
+
+    def problem(self, whole: bool, firm: bool) -> Problem:
+        """To search on (a third of the runs is kept to judge), or on the whole of the runs, finely simulated; holding
+        on to the car's numbers or not.
+
+        Raises BadInput when the vehicle lacks what it needs.
+        """
+        from logger.lab.fitting import Problem
+        from logger.lab.nuisance import Tolerance
+        from logger.simulation.simulated_runs import SimulatedRuns
+
+        runs = self.runs if whole else SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ)
+        model = self.model
+        return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle,
+                       firm)
+
+    def try_out(self, one: Chosen) -> None:
+        """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
+        from logger.store.formats.effect_file import check_on
+
+        check_on(self.model.vehicle, one, self.two_tracks)
+        if one.file is not None and not slow([one.effect]):
+            _predicted(one.file, self.model, self.runs, [one])
+
+    @property
+    def files_read(self) -> list[Path]:
+        """Files of the vehicle and of the user's own effects."""
+        from logger.shipped import vehicle_path
+
+        return [vehicle_path(self.word), *map(Path, self.files.values())]
+
+    def filed(self, one: Chosen) -> Chosen:
+        """An effect that knows which file it is from, where it is the user's own."""
+        return replace(one, file=self.files.get(one.effect.name))
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road of every run is known under the right wheels too."""
+        return all(run.two_tracks for run in self.runs.runs)
+
+    def compared(self) -> Comparison:
+        """The model against the runs. BadInput when the vehicle lacks what it needs."""
+        from logger.lab.compare import compare
+        from logger.lab.nuisance import Tolerance
+
+        with self._blamed():
+            return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
+                           Tolerance(numbers=self.numbers))
+
+    def diagnosed(self, tell: Tell = unsaid, left_out: frozenset[str] = frozenset()) -> Verdict:
+        """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
+        from logger.lab.diagnosis import diagnose
+        from logger.lab.verdict import told
+
+        effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
+        with self._blamed():
+            recorded = self.problem(whole=False, firm=True)
+            found = diagnose(recorded, effects, self.model.effects, tell)
+            finely = recorded.entire()  # a search simulates less finely
+            said_error = finely.error(finely.start(self.model.effects))
+            return told(replace(found, baseline_error=said_error), effects, tell)
+
+    def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
+        """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
+        cannot be there with these values.
+
+        said    how it was asked for
+        """
+        from logger.store.formats.effect_file import effect_named
+        from logger.vehicle.effect import chosen
+
+        if name in self.effects:
+            effect, file = self.effects[name], self.files.get(name)
+        else:
+            effect, file = effect_named(name)
+        if effect.name in [one.effect.name for one in self.model.effects]:
+            raise BadInput(f"{self.word}: expected a vehicle without {effect.name}, which it has")
+        try:
+            whole = effect.checked({**effect.usual, **values})
+        except ValueError as error:
+            raise BadInput(f"{said}: {error}") from None
+        self.try_out(chosen(effect, whole, file=file))
+        return effect, file
+
+    def with_effect(self, effect: Effect, file: str | None) -> Bench:
+        """The same where this effect is known, too."""
+        return replace(self, effects={**self.effects, effect.name: effect},
+                       files={**self.files, effect.name: file} if file is not None else self.files)
+
+    def searched(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
+        """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
+        from logger.lab.candidates import best_choice, fitted, misalignment, screened, settled_further
+        from logger.lab.diagnosis import refitted
+        from logger.vehicle.effect import chosen
+
+        if set(values) >= {one.name for one in effect.parameters}:
+            return chosen(effect, values)
+        with self._blamed():
+            problem = self.problem(whole=False, firm=True)
+            tell("refitting the car's own numbers")
+            nominal = problem.start(self.model.effects)
+            seen = misalignment(problem, nominal)
+            problem, base = refitted(problem, nominal)
+            tell(f"searching for {effect.name}")
+            tries = fitted(problem, base, screened(problem, base, effect, seen))
+        choices = {one.name for one in effect.parameters if one.choices} & set(values)
+        said = [one for one in tries if all(one.state.effects[-1].values[name] == values[name] for name in choices)]
+        best = best_choice([settled_further(problem, base, one, _ROUNDS) for one in said or tries])
+        return chosen(effect, {**best.state.effects[-1].values, **values})
+
+    def added(self, start: Chosen, starts: int, tell: Tell = unsaid) -> Gained:
+        """The effect fitted with the car's numbers on all of the runs, from the best of so many ``starts``."""
+        from logger.lab.addition import add
+        from logger.lab.gained import gained
+
+        tell(f"fitting the car without and with {start.effect.name}")
+        problem = self.problem(whole=True, firm=True)
+        with self._blamed():
+            found = add(problem, self.problem(whole=True, firm=False), self.model.effects, [self.filed(start)])
+            return gained(found, [start.effect.name], starts)
+
+    def model_with(self, found: Gained) -> Model:
+        """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
+        fit ended at numbers that no car has."""
+        from logger.store.formats.effect_file import check_on
+        from logger.store.formats.vehicle_file import Model, Step
+
+        for one in found.added.effects:
+            check_on(found.added.vehicle, one, two_tracks=True)
+        history = self.model.history
+        if not history:
+            history = (Step("as it was given", found.added.error_before, found.floor),
+                       Step("numbers refitted", found.added.error_refitted, found.floor))
+        step = Step(f"added {' and '.join(found.names)}", found.added.error_after, found.floor)
+        return Model(found.added.vehicle, found.added.effects, (*history, step),
+                     self.model.given or self.model.vehicle)
+
+    @contextmanager
+    def _blamed(self) -> Iterator[None]:
+        """What is wrong with the vehicle names it."""
+        try:
+            yield
+        except ValueError as error:
+            raise BadInput(f"{self.word}: {error}") from None
+
+
+def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str], numbers: float,
+             searches: str | None = None, warn: Tell = unsaid) -> Bench:
+    """The model, runs and effects together. Raises BadInput for whatever is wrong with them.
+
+    word        by which the user knows the vehicle
+    numbers     as ``deviation_of``
+    searches    the command that will search through all effects, and so needs the compiler; None: it will not
+    warn        told where it will take long
+    """
+    effects, files = known_effects(model, effect_files)
+    if searches is not None:
+        require_compiler(searches, effects.values())
+    found = Bench(word, model, runs, effects, files, numbers)
+    check_model(word, model, runs, warn)
+    _try_own(found, effect_files)
+    return found
+
+
+def deviation_of(tolerance: float) -> float:
+    """The deviation, as a share, that a tolerance either way is taken for. BadInput for one that no car's numbers
+    have."""
+    low, high = TOLERANCES
+    if not low <= tolerance <= high:
+        raise BadInput(f"tolerance {tolerance:g}: expected {low:g} to {high:g}")
+    return tolerance / _BAND_DEVIATIONS
+
+
+def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
+    """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
+    and the files of the user's own, by name. BadInput for a name that is there twice."""
+    from logger.store.formats.effect_file import own_effect, shipped_effects
+
+    effects, own = dict(shipped_effects()), {}
+    for one in model.effects:
+        if one.file is not None:
+            effects[one.effect.name], own[one.effect.name] = one.effect, one.file
+    for file in files:
+        effect = own_effect(Path(file))
+        if effect.name in effects:
+            raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
+        effects[effect.name], own[effect.name] = effect, file
+    return effects, own
+
+
+def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Tell = unsaid) -> None:
+    """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
+    the road moves no car, or the sensor was upside down or reads in another unit.
+
+    word    by which the user knows the vehicle
+    warn    told first where it takes long
+    """
+    for run in runs.runs:
+        for one in model.effects:
+            why = one.effect.obstacle(model.vehicle, run.two_tracks)
+            if why is not None:
+                raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
+    if words := slow_words([one.effect for one in model.effects]):
+        warn(words)
+    _check_sensor(runs, _predicted(word, model, runs, model.effects))
+
+
+def _check_sensor(runs: SimulatedRuns, predictions: Sequence[Array]) -> None:
+    """Raise BadInput where no road moves the car, or what was measured is the model upside down or in another unit."""
+    import numpy as np
+
+    moves = False
+    for run, prediction in zip(runs.runs, predictions, strict=True):
+        measured, model = run.measured_mps2[run.first:], prediction[run.first:]
+        power = float(model @ model)
+        if power < _LEAST_MPS2**2 * len(model):
+            continue
+        moves = True
+        both = float(measured @ model)
+        alike = both / float(np.sqrt((measured @ measured) * power))
+        if alike < -_ALIKE:
+            raise BadInput(f"{run.name}: expected accelerations up positive, found them upside down: turned over, they "
+                           f"go with the model (correlation {-alike:.2f})")
+        if alike > _ALIKE:
+            unit = next((unit for unit, size in _UNITS_MPS2.items() if abs(both / power * size - 1) < _NEAR), None)
+            if unit is not None:
+                raise BadInput(f"{run.name}: expected accelerations in m/s2, found {both / power:.3g} times what the "
+                               f"model says: they seem to be in {unit}")
+    if not moves:
+        raise BadInput(f"{runs.runs[0].name}: expected a drive over a road that moves the car; where it was the "
+                       "profile is flat, or it stood still")
+
+
+def _predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
+    """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
+    from logger.vehicle.compose import bounded, compose
+
+    try:
+        predictions = runs.predict(compose(model.vehicle, effects))
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None
+    if not bounded(predictions):
+        names = " and ".join(one.effect.name for one in effects)
+        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+    return predictions
+
+
+def slow(effects: Iterable[Effect]) -> list[str]:
+    """Names of those that are simulated in plain Python, where there is no compiler."""
+    from logger.vehicle.effect import ForceEffect
+
+    names = [one.name for one in effects if isinstance(one, ForceEffect)]
+    if names:
+        from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
+        return [] if COMPILED else names
+    return []
+
+
+def slow_words(effects: Iterable[Effect]) -> str:
+    """That simulations with these effects take long, if they do."""
+    if names := slow(effects):
+        return (f"Without the lab extra (pip install '.[lab]') simulations with {' and '.join(names)} take some "
+                f"hundred times longer: {_SLOW}.")
+    return ""
+
+
+def require_compiler(command: str, effects: Collection[Effect]) -> None:
+    """Raise BadInput where a search over these effects would take hours: it needs the compiler of the ``lab`` extra.
+
+    A search over the rest alone could not say that nothing is missing, nor that an effect explains most.
+    """
+    if names := slow(effects):
+        raise BadInput(f"{command} needs the lab extra (pip install '.[lab]'), which is not installed: without it "
+                       f"{len(names)} of {len(effects)} effects cannot be tried, and what it says would mislead")
+
+
+def _try_own(found: Bench, files: Sequence[str]) -> None:
+    """Try the effects of these files on the car, at the values that a search begins at."""
+    from logger.vehicle.effect import chosen
+
+    for name, effect in found.effects.items():
+        if found.files.get(name) in files and effect.obstacle(found.model.vehicle, found.two_tracks) is None:
+            for values in effect.trials():
+                found.try_out(chosen(effect, values, file=found.files[name]))

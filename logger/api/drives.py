@@ -1,0 +1,297 @@
+"""Drives: recorded ones as runs, simulated ones, and the roughness of the road that a drive tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.roads import Profile, read_profile, write_profile
+from logger.api.shown import Result, Shown, table
+from logger.api.vehicles import Model, car_on, model_of
+from logger.errors import BadInput
+from logger.store.formats import drive_file
+from logger.units import WINDOW_M
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.estimation.assessment import Assessment
+    from logger.estimation.sensor_noise import Sensor
+    from logger.profiles.track import Track
+    from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(drive_file.Drive, Shown):
+    """What a recorder wrote down while it drove, arrays (n,), and the road.
+
+    path           of its folder or file; of a simulated one its name
+    rate_hz        samples a second
+    time_s         evenly spaced [s]
+    accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    speed_mps      [m/s]
+    distance_m     where the front tires stand on the profile [m]
+    lat_deg, lon_deg    None where they were not recorded
+    profile        the road that was driven; None: not known
+    """
+
+    profile: Profile | None = None
+
+    def __repr__(self) -> str:
+        return table(f"Run {self.path}", [
+            ("time", len(self.time_s) / self.rate_hz, "s"), ("samples", len(self.time_s), ""),
+            ("rate", self.rate_hz, "Hz"),
+            ("distance", f"{self.distance_m.min():.4g} to {self.distance_m.max():.4g}", "m"),
+            ("mean speed", float(self.speed_mps.mean()), "m/s"),
+            ("acceleration, r.m.s.", float(np.sqrt(np.mean(self.accel_z_mps2**2))), "m/s2"),
+            ("profile", None if self.profile is None else
+             f"{self.profile.start_m:.4g} to {self.profile.distance_m[-1]:.4g}", "m")])
+
+    def charts(self) -> Sequence[Chart]:
+        """The acceleration over time."""
+        from logger.chart_data import Curves, Line
+
+        return [Curves("Run", "time [s]", "acceleration [m/s2]", (Line("sensor", self.time_s, self.accel_z_mps2),))]
+
+    @property
+    def track(self) -> Track | None:
+        """The road as models read it."""
+        return None if self.profile is None else drive_file.track_of(self.profile)
+
+
+def read_run(path: Path | str) -> Run:
+    """Read a folder with ``drive.csv`` and, where the road is known, ``profile.csv``; or a ``drive.csv`` alone.
+
+    Raises BadInput (``file:line: expected ..., found ...``) for a file that is missing or not what it should be.
+
+    >>> read_run(folder).accel_z_mps2.shape
+    (1115,)
+    """
+    place = Path(path)
+    drive = drive_file.read_drive(place / drive_file.DRIVE if place.is_dir() else place)
+    profile = place / drive_file.PROFILE
+    known = read_profile(profile) if place.is_dir() and profile.exists() else None
+    return Run(**vars(drive) | {"path": place}, profile=known)
+
+
+def write_run(folder: Path | str, run: Run) -> None:
+    """Write a run as a folder with ``drive.csv`` (ten digits) and, where its road is known, ``profile.csv``. OSError if
+    that fails.
+
+    >>> write_run(folder / "again", read_run(folder))
+    """
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    columns = {"t_s": run.time_s, "accel_z_mps2": run.accel_z_mps2, "speed_mps": run.speed_mps,
+               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg}
+    drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items() if one is not None})
+    if run.profile is not None:
+        write_profile(place / drive_file.PROFILE, run.profile)
+
+
+def make_run(
+    accel_z_mps2: npt.ArrayLike, speed_mps: npt.ArrayLike, *, rate_hz: float, distance_m: npt.ArrayLike | None = None,
+    profile: Profile | None = None, name: str = "run",
+) -> Run:
+    """A run out of arrays (n,), the first sample at 0 s.
+
+    accel_z_mps2   of the sensor, up positive, gravity removed [m/s2]
+    speed_mps      (n,), or one for all samples [m/s]
+    distance_m     where the front tires stand on the profile [m]; None: the integral of the speed, from 0 on
+    name           other runs beside it need others
+
+    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
+
+    >>> run = make_run([0.0] * 500, 10.0, rate_hz=100.0)
+    >>> round(float(run.distance_m[-1]), 6)
+    49.9
+    """
+    accel = np.asarray(accel_z_mps2, dtype=np.float64)
+    speed = np.broadcast_to(np.asarray(speed_mps, dtype=np.float64), accel.shape)
+    driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / rate_hz])
+    distance = driven if distance_m is None else np.asarray(distance_m, dtype=np.float64)
+    if not accel.ndim == 1 < len(accel) == len(distance) or not rate_hz > 0:
+        raise BadInput(f"{name}: expected arrays of one length, two samples or more, and a rate above 0 Hz")
+    if not all(np.isfinite(one).all() for one in (accel, speed, distance)):
+        raise BadInput(f"{name}: expected finite values")
+    return Run(Path(name), rate_hz, np.arange(len(accel)) / rate_hz, accel, speed, distance, None, None, profile)
+
+
+def simulate(
+    vehicle: Model | Path | str, profile: Profile | Path | str,
+    speed_mps: float | tuple[npt.ArrayLike, npt.ArrayLike], *,
+    obstacles: Mapping[str, Mapping[str, float]] | None = None, rate_hz: float = 100.0, noise_mps2: float = 0.0,
+    step_mps2: float = 0.0, seed: int = 1, name: str = "simulated",
+) -> Run:
+    """What a vehicle's accelerometer would record on a road: a run from the front tires' start on the profile on.
+
+    vehicle       a model, or a name or file as in ``read_vehicle``; its effects are simulated with it
+    profile       the road [m]; of two tracks a full car uses both, other cars the left one
+    speed_mps     the same all the way, 0.1 to 100 [m/s], until a second after the last wheel has left the profile; or
+                  times (k,) [s], growing, and speeds (k,) [m/s] with straight lines between them
+    obstacles     on the road: ``{"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}`` (Eq 4.41 of Blum 2015),
+                  or a step, ramp, plate, pothole
+    rate_hz       samples a second, 10 to 10 000, band-limited as a recorder does it (flat to 0.38 of the rate)
+    noise_mps2    r.m.s. of the sensor's noise [m/s2], made of ``seed``; ``step_mps2`` what it rounds to [m/s2]
+    name          of the run; each of several needs its own
+
+    Raises BadInput for what no car can do, obstacles that do not lie on the road, and as ``read_vehicle`` and
+    ``read_profile``.
+
+    >>> run = simulate("rav4-2009", random_road(iso_class="B", length_m=100.0), speed_mps=10.0)
+    >>> run.accel_z_mps2.shape, round(float(run.accel_z_mps2.std()), 2)
+    ((1130,), 0.27)
+    >>> braking = simulate("rav4-2009", run.profile, ([0.0, 5.0, 10.0], [12.0, 12.0, 0.0]))
+    >>> round(float(braking.distance_m[-1]), 2)
+    90.0
+    """
+    from logger.simulation.virtual_drive import (
+        SENSOR,
+        Obstacle,
+        SensorErrors,
+        at_one_speed,
+        motion_along,
+        recorded_drive,
+        with_obstacles,
+    )
+    from logger.vehicle.structure import body_point
+
+    if not (10.0 <= rate_hz <= 10_000.0 and noise_mps2 >= 0 and step_mps2 >= 0):
+        raise BadInput(f"{name}: expected 10 to 10000 Hz, and no noise or step below 0, found {rate_hz:g} Hz, "
+                       f"{noise_mps2:g} and {step_mps2:g} m/s2")
+    model = model_of(vehicle)
+    road = profile if isinstance(profile, Profile) else read_profile(profile)
+    try:
+        track = with_obstacles(drive_file.track_of(road), [
+            Obstacle(kind, values, f"obstacle {kind}") for kind, values in (obstacles or {}).items()])
+        car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
+        place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
+        knots = (_knots(*speed_mps, name) if isinstance(speed_mps, tuple) else
+                 at_one_speed(track, float(car.structure.behind_m.max()), _in_range(speed_mps, name)))
+        motion = motion_along(*knots, track.start_m, rate_hz)
+        columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,
+                                 SensorErrors(noise_mps2, step_mps2, seed))
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    time_s, accel_z_mps2, recorded_mps, distance_m = columns.values()
+    return Run(Path(name), rate_hz, time_s, accel_z_mps2, recorded_mps, distance_m, None, None, _profile_of(track))
+
+
+def _in_range(speed_mps: float, name: str) -> float:
+    if not 0.1 <= speed_mps <= 100.0:
+        raise BadInput(f"{name}: expected a speed of 0.1 to 100 m/s, found {speed_mps:g}")
+    return speed_mps
+
+
+def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
+    times, speeds = (np.asarray(one, dtype=np.float64) for one in (time_s, speed_mps))
+    grows, possible = (np.diff(times) > 0).all(), ((speeds >= 0) & (speeds <= 100)).all()
+    if not 1 < len(times) == len(speeds) or not (grows and possible):
+        raise BadInput(f"{name}: expected two times or more that grow, and as many speeds of 0 to 100 m/s")
+    return times, speeds
+
+
+def _profile_of(track: Track) -> Profile:
+    tracks = track.elevation_m.reshape(len(track.elevation_m), -1).T
+    return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
+
+
+# --- the road that a drive tells ---
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Result):
+    """The road's roughness from a drive's acceleration, in w windows.
+
+    mean_iri_m_per_km    of the windows that are known; NaN: none is
+    edges_m              (w + 1,) ends of the windows [m]
+    speed_mps            (w,) mean speed in each [m/s]
+    iri_m_per_km         (w,) IRI; NaN where it is not known, ``flags`` say why
+    iri_std_m_per_km     (w,) its standard error
+    iri_exact_m_per_km   (w,) that of the run's profile; NaN where there is none
+    limit_std_m_per_km   (w,) standard error that an estimator would reach which knew everything but the road
+    flags                w sets of words
+    profile              the road, as far as the readings tell it, in its parts; it is smoother than the road
+    """
+
+    mean_iri_m_per_km: float
+    edges_m: Array
+    speed_mps: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    iri_exact_m_per_km: Array
+    limit_std_m_per_km: Array
+    flags: tuple[frozenset[str], ...]
+    profile: tuple[Profile, ...]
+
+    def charts(self) -> Sequence[Chart]:
+        """The IRI along the way with its standard error, and that of the profile where it is known."""
+        from logger.chart_data import Curves, Line
+
+        at_m = (self.edges_m[1:] + self.edges_m[:-1]) / 2
+        known, exact = np.isfinite(self.iri_m_per_km), np.isfinite(self.iri_exact_m_per_km)
+        lines = [Line("estimate", at_m[known], self.iri_m_per_km[known], self.iri_std_m_per_km[known])]
+        if exact.any():
+            lines.append(Line("profile", at_m[exact], self.iri_exact_m_per_km[exact]))
+        title = "Roughness from acceleration"
+        return [Curves(title, "distance [m]", "IRI [m/km]", tuple(lines))] if known.any() else []
+
+
+def estimate(
+    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float = 0.05, step_mps2: float = 0.0,
+    window_m: float = WINDOW_M,
+) -> Estimate:
+    """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
+    the run has a profile.
+
+    run           as ``read_run``; its distance may go back by up to 1 m, and is then laid anew
+    vehicle       without effects; where its sensor sits is in it
+    noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]
+    step_mps2     step that readings are rounded to; 0: none [m/s2]
+    window_m      1 to 1000 [m]; 25 ft by default
+
+    Raises BadInput for a drive that cannot be used, a vehicle with effects, and as ``read_run`` and ``read_vehicle``.
+    Source: a smoother of the road's state as ISO 8608 lets expect it (``logger.estimation``).
+
+    >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
+    >>> found.iri_m_per_km.shape == found.iri_exact_m_per_km.shape == (len(found.flags),)
+    True
+    """
+    from logger.estimation.sensor_noise import Sensor
+    from logger.report.estimate_text import as_json, lines
+
+    model = model_of(vehicle)
+    if model.effects:
+        raise BadInput(f"{model.vehicle.name}: expected a vehicle without effects")
+    if not (1e-4 <= noise_mps2 <= 100.0 and 0.0 <= step_mps2 <= 100.0 and 1.0 <= window_m <= 1000.0):
+        raise BadInput("estimate: expected 1e-4 to 100 m/s2 of noise, a step of 0 to 100 m/s2 and windows of 1 to 1000 "
+                       f"m, found {noise_mps2:g} and {step_mps2:g} m/s2, {window_m:g} m")
+    drive = run if isinstance(run, Run) else read_run(run)
+    found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
+    told, windows = as_json(str(drive.path), found), found.windows
+    parts = found.road.parts if found.road else ()
+    return Estimate("\n".join(lines(found, told)), told, told.get("iri_m_per_km", np.nan), windows.edges_m,
+                    windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
+                    found.least_error_m_per_km, windows.flags,
+                    tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts))
+
+
+def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:
+    """The road of a run, in windows. BadInput ("file:line: expected ...") for a drive that cannot be used."""
+    from logger.estimation.assessment import Unusable, assess, estimable
+
+    try:
+        ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, drive_file.MAX_SPEED_MPS)
+    except Unusable as error:
+        file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
+        raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
+    try:
+        return assess(ready, vehicle, sensor, window_m, run.track)
+    except ValueError as error:
+        raise BadInput(f"{vehicle.name}: {error}") from None

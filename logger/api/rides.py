@@ -1,0 +1,115 @@
+"""How a ride feels: acceleration records, and their ISO 2631-1 values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.drives import Run
+from logger.api.shown import Result, Shown, table
+from logger.errors import BadInput
+from logger.store.formats import record_file
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(record_file.AccelerationRecord, Shown):
+    """An acceleration record, evenly sampled: arrays (n,) [m/s2], None where an axis was not recorded.
+
+    start_s         time of the first sample [s]; ``rate_hz`` samples a second
+    accel_z_mps2    vertical; ``accel_x_mps2`` along the vehicle, ``accel_y_mps2`` across it
+    """
+
+    accel_x_mps2: Array | None = None
+    accel_y_mps2: Array | None = None
+
+    def __repr__(self) -> str:
+        return table("Record", [
+            ("time", self.duration_s, "s"), ("rate", self.rate_hz, "Hz"), ("samples", len(self.accel_z_mps2), ""),
+            *((f"{axis}, standard deviation", None if one is None else float(one.std()), "m/s2")
+              for axis, one in self.by_axis.items())])
+
+    def charts(self) -> Sequence[Chart]:
+        """The axes over time."""
+        from logger.chart_data import Curves, Line
+
+        time_s = self.start_s + np.arange(len(self.accel_z_mps2)) / self.rate_hz
+        return [Curves("Record", "time [s]", "acceleration [m/s2]", tuple(
+            Line(axis, time_s, one) for axis, one in self.by_axis.items() if one is not None))]
+
+
+def read_record(path: Path | str) -> Record:
+    """Read a CSV record with ``t_s`` and ``accel_z_mps2``, perhaps ``accel_x_mps2`` and ``accel_y_mps2``.
+
+    Raises BadInput (``file:line: expected ..., found ...``) for anything else.
+
+    >>> read_record(folder / "drive.csv").rate_hz.__round__()
+    100
+    """
+    return Record(**vars(record_file.read_record(path)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comfort(Result):
+    """Values of the vertical axis; those of the others and of health are in ``as_json``.
+
+    weighting       that it was weighted by
+    a_w_mps2        weighted r.m.s. acceleration [m/s2]
+    mtvv_mps2       largest running r.m.s. over 1 s [m/s2]
+    vdv_mps175      vibration dose [m/s1.75]
+    crest_factor    largest value over a_w
+    comfort         in a word; None for motion sickness
+    """
+
+    weighting: str
+    a_w_mps2: float
+    mtvv_mps2: float
+    vdv_mps175: float
+    crest_factor: float
+    comfort: str | None
+
+
+def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_hours: float | None = None) -> Comfort:
+    """The comfort and health values of an acceleration record (ISO 2631-1:1997), by the formula of the standard.
+
+    record         at the seat, 80 samples a second or more, 1 s or longer; or a run, or a file
+    weighting      of the vertical axis: wk, wd, wf, wc, we, wj or wb. With wk, x and y are weighted by wd and combined
+                   with it
+    daily_hours    of such riding, for the health values; None: as long as the record
+
+    Raises BadInput for what is none of this, and as ``read_record``.
+
+    >>> found = comfort(read_run(folder))
+    >>> found.comfort, round(found.a_w_mps2, 2)
+    ('a_little_uncomfortable', 0.32)
+    """
+    from logger.comfort.ride_comfort import ride_comfort
+    from logger.plugins import catalogue
+    from logger.report.comfort_text import as_json, lines
+
+    weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
+    if weighting not in weightings:
+        raise BadInput(f"comfort: expected one of {', '.join(weightings)}, found {weighting!r}")
+    if daily_hours is not None and not 0.0 < daily_hours <= 24.0:
+        raise BadInput(f"comfort: expected more than 0 and at most 24 hours a day, found {daily_hours:g}")
+    name = "record" if isinstance(record, Record) else str(record.path if isinstance(record, Run) else record)
+    if isinstance(record, Run):
+        record = Record(float(record.time_s[0]), record.rate_hz, record.accel_z_mps2)
+    ride = record if isinstance(record, Record) else read_record(record)
+    used = weightings[weighting]
+    try:
+        found = ride_comfort(ride.by_axis, ride.rate_hz, used, weightings.get(used.horizontal), daily_hours)
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    told, vertical = as_json(found), found.vertical
+    return Comfort("\n".join(lines(found, Path(name).name)), told, weighting, vertical.a_w_mps2, vertical.mtvv_mps2,
+                   vertical.vdv_mps175, vertical.crest_factor, told["comfort"])

@@ -1,0 +1,220 @@
+"""Roads: measured profiles, random ones, and their International Roughness Index."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.shown import Result, Shown, table
+from logger.errors import BadInput
+from logger.store.formats import drive_file, profile_file
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+
+Array = npt.NDArray[np.float64]
+
+_SHORTEST_M = 11.0
+_MOST_SAMPLES = 20_000_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(profile_file.Profile, Shown):
+    """The elevations of a road under one or two wheel tracks.
+
+    start_m              distance of the first sample [m]
+    spacing_m            between samples [m]
+    elevation_m          (n,) of the left track, or of the only one [m]
+    elevation_right_m    (n,) of the right one [m], or None
+    widest_step_m        for one that was resampled: the widest hole that a straight line was laid across [m]
+    """
+
+    @property
+    def distance_m(self) -> Array:
+        """(n,) where the samples lie [m]."""
+        return self.start_m + self.spacing_m * np.arange(len(self.elevation_m), dtype=np.float64)
+
+    def __repr__(self) -> str:
+        return table("Profile", [
+            ("length", self.spacing_m * (len(self.elevation_m) - 1), "m"), ("begins at", self.start_m, "m"),
+            ("spacing", self.spacing_m, "m"), ("samples", len(self.elevation_m), ""),
+            ("wheel tracks", 1 if self.elevation_right_m is None else 2, ""),
+            ("elevation, standard deviation", float(self.elevation_m.std()), "m"),
+            ("resampled across", self.widest_step_m, "m")])
+
+    def charts(self) -> Sequence[Chart]:
+        """The elevation of each track."""
+        from logger.chart_data import Curves, Line
+
+        tracks = {"left": self.elevation_m, "right": self.elevation_right_m}
+        return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
+            Line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
+
+
+def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
+    """Read a road profile.
+
+    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line)
+    resample_m    for one that is unevenly spaced: lay straight lines between its samples, and take one every so many
+                  metres [m]
+
+    Raises BadInput (``file:line: expected ...``) for anything else, and for distances that are not evenly spaced.
+
+    >>> road = read_profile(folder / "profile.csv")
+    >>> road.elevation_m.shape, road.spacing_m
+    ((2001,), 0.1)
+    """
+    return Profile(**vars(profile_file.read_profile(path, resample_m)))
+
+
+def write_profile(path: Path | str, profile: Profile) -> None:
+    """Write a profile as CSV, to a tenth of a micrometre. OSError if that fails.
+
+    >>> write_profile(folder / "smooth.csv", random_road(iso_class="A", length_m=50.0))
+    """
+    drive_file.write_profile(Path(path), drive_file.track_of(profile))
+
+
+def random_road(
+    *, iso_class: str | None = None, gd_n0_cm3: float | None = None, length_m: float = 1000.0,
+    spacing_m: float = 0.05, seed: int = 1, waviness: float = 2.0,
+) -> Profile:
+    """A random road with the displacement spectrum Gd(n) = Gd(n0) (n / n0)^-w of ISO 8608 (Eq 4.1, 4.2 of Blum 2015).
+
+    iso_class    A to H: the geometric mean of its degrees of roughness; or
+    gd_n0_cm3    a degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]
+    length_m     11 m or more; ``spacing_m`` between samples, 0.3 m or less [m]
+    seed         one seed is one road
+    waviness     w, 1.5 to 3
+
+    Raises BadInput for what is none of this.
+
+    >>> random_road(iso_class="B", length_m=20.0)
+    Profile
+      length                               20  m
+      begins at                             0  m
+      spacing                            0.05  m
+      samples                             401
+      wheel tracks                          1
+      elevation, standard deviation  0.005887  m
+    """
+    from logger.roads.iso8608 import CLASS_GD_N0_CM3, generate
+
+    if (iso_class is None) == (gd_n0_cm3 is None):
+        raise BadInput("random_road: expected iso_class or gd_n0_cm3")
+    if iso_class is not None and iso_class not in CLASS_GD_N0_CM3:
+        raise BadInput(f"random_road: expected a class out of {', '.join(CLASS_GD_N0_CM3)}, found {iso_class!r}")
+    roughness_cm3 = CLASS_GD_N0_CM3[iso_class] if iso_class is not None else gd_n0_cm3
+    assert roughness_cm3 is not None
+    if not roughness_cm3 > 0 or not 1.5 <= waviness <= 3.0:
+        raise BadInput(f"random_road: expected a roughness above 0 and a waviness from 1.5 to 3, found "
+                       f"{roughness_cm3:g} and {waviness:g}")
+    if not (0 < spacing_m <= 0.3 and length_m >= _SHORTEST_M and length_m / spacing_m <= _MOST_SAMPLES):
+        raise BadInput(f"random_road: expected {_SHORTEST_M:g} m or more, 0.3 m apart or less, found {length_m:g} m "
+                       f"and {spacing_m:g} m")
+    return Profile(0.0, spacing_m, generate(roughness_cm3, length_m, spacing_m, seed, waviness), None)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Iri(Result):
+    """The IRI of a profile [m/km], whole and in w windows.
+
+    iri_m_per_km          of the left track, or of the only one
+    iri_right_m_per_km    of the right one; ``mri_m_per_km`` the mean of both; ``hri_m_per_km`` of the half car on both;
+                          None where there is one track
+    edges_m               (w + 1,) ends of the windows [m]; the last one may be shorter
+    windows_m_per_km      (w,) IRI of each, of two tracks their mean
+    """
+
+    iri_m_per_km: float
+    iri_right_m_per_km: float | None
+    mri_m_per_km: float | None
+    hri_m_per_km: float | None
+    edges_m: Array
+    windows_m_per_km: Array
+
+    def charts(self) -> Sequence[Chart]:
+        """The IRI along the way."""
+        from logger.chart_data import Curves, Line
+
+        return [Curves("Roughness", "distance [m]", "IRI [m/km]", (
+            Line("IRI", np.repeat(self.edges_m, 2)[1:-1], np.repeat(self.windows_m_per_km, 2)),))]
+
+
+def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
+    """The International Roughness Index of a profile, exactly as defined (ASTM E1926; Sayers, TRR 1501, 1995).
+
+    profile     11 m or longer, samples 0.3 m apart or less; or its file
+    window_m    length of a window [m]
+
+    Raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
+
+    >>> found = iri(random_road(iso_class="B", length_m=400.0, seed=3))
+    >>> round(found.iri_m_per_km, 2), found.windows_m_per_km.round(2).tolist()
+    (4.44, [4.3, 4.69, 4.44, 4.32])
+    """
+    from logger.report.iri_text import as_json, lines
+    from logger.roads.profile_iri import profile_iri
+
+    name, road = _named(profile)
+    try:
+        found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
+    shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
+    whole = found.row(0)
+    return Iri("\n".join(lines(found, road, Path(name).name)), as_json(found, road), whole["iri_m_per_km"],
+               whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
+               road.start_m + np.array(ends_m), shown[1:])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RoadClass(Result):
+    """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
+
+    road_class       A to H (ISO 8608)
+    gd_n0_cm3        degree of roughness Gd(n0) [cm3], and ``gd_n0_std_cm3`` its standard error
+    waviness         w, and ``waviness_std`` its standard error
+    iri_m_per_km     exact
+    """
+
+    road_class: str
+    gd_n0_cm3: float
+    gd_n0_std_cm3: float
+    waviness: float
+    waviness_std: float
+    iri_m_per_km: float
+
+
+def classify(profile: Profile | Path | str) -> RoadClass:
+    """The class, degree of roughness and waviness of a profile of 100 m or more (ISO 8608).
+
+    Raises BadInput for one that is too short or too odd, and as ``read_profile``.
+
+    >>> found = classify(random_road(iso_class="C", length_m=500.0))
+    >>> found.road_class, abs(found.waviness - 2.0) < 3 * found.waviness_std
+    ('C', True)
+    """
+    from logger.report.road_text import as_json, lines
+    from logger.roads.track_class import track_class
+
+    name, road = _named(profile)
+    tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
+    try:
+        found = [track_class(one, road.spacing_m, road.widest_step_m) for one in tracks]
+    except ValueError as error:
+        raise BadInput(f"{name}: {error}") from None
+    left = found[0].roughness
+    return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
+                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km)
+
+
+def _named(profile: Profile | Path | str) -> tuple[str, Profile]:
+    """A profile and what to call it."""
+    return ("profile", profile) if isinstance(profile, Profile) else (str(profile), read_profile(profile))

@@ -1,0 +1,110 @@
+"""Runs for the lab: read, and checked together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.errors import BadInput
+
+if TYPE_CHECKING:
+    from logger.runs import Run
+    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.store.formats.drive_file import Drive
+    from logger.store.formats.drive_file import Run as DriveOnRoad
+
+_SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
+# What the lab looks at lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
+_RATE_HZ, _NEARLY = 100.0, 0.25
+LEAST_S = 5.0
+# The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
+# second on. A recorder's clock may be off by a per cent.
+_LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
+_MOST_MEAN_MPS2 = 2.0
+_LEAST_MPS2 = 1e-5  # no sensor is so quiet
+_BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
+_DISAGREE, _DISAGREE_M = 0.5, 5.0
+
+
+def lab_runs(folders: Sequence[Path], thin: bool = True) -> SimulatedRuns:
+    """The runs in some folders, as ``checked_runs``. BadInput for one that cannot be read, or is there twice."""
+    from logger.store.formats.drive_file import read_run
+
+    places = [folder.resolve() for folder in folders]
+    if again := next((one for number, one in enumerate(folders) if places[number] in places[:number]), None):
+        raise BadInput(f"{again}: expected each run once")
+    return checked_runs(list(map(read_run, folders)), thin)
+
+
+def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True) -> SimulatedRuns:
+    """Runs of one sample rate; of about 100 samples a second if they have many more and may be thinned (``thin``).
+
+    Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
+    """
+    from logger.runs import Run
+    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.store.formats.drive_file import DRIVE
+
+    for number, drive in enumerate(drives):
+        file = drive.path / DRIVE if drive.path.is_dir() else drive.path
+        first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
+        if last_m < drive.track.start_m or first_m > drive.track.end_m:
+            raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
+                           f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
+        check_record(drive, file, drives[:number])
+    runs = [Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
+            for one in drives]
+    return SimulatedRuns(thinned_runs(runs) if thin else runs)
+
+
+def thinned_runs(runs: Sequence[Run]) -> list[Run]:
+    """Runs of one rate, of about 100 samples a second if they had many more."""
+    from logger.dsp.thinning import thinned
+
+    factor = int(runs[0].rate_hz / _RATE_HZ + _NEARLY)
+    if factor < 2:
+        return list(runs)
+    return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=thinned(one.measured_mps2, factor),
+                    distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor]) for one in runs]
+
+
+def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
+    """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
+    others, recorded nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed."""
+    import numpy as np
+
+    from logger.runs import SKIP_S
+    from logger.store.formats.drive_file import MAX_SPEED_MPS
+
+    if drive.rate_hz < (1 - _CLOCK) * _LEAST_RATE_HZ:
+        raise BadInput(f"{file}: expected {_LEAST_RATE_HZ:g} samples a second or more, to see the wheels hop, found "
+                       f"{drive.rate_hz:.4g}")
+    lasts_s = len(drive.time_s) / drive.rate_hz
+    if lasts_s < LEAST_S:
+        raise BadInput(f"{file}: expected a drive of {LEAST_S:g} s or longer, found {lasts_s:.3g} s")
+    if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
+        raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
+                       f"{drive.rate_hz:g}")
+    counted = drive.accel_z_mps2[int(SKIP_S * drive.rate_hz):]
+    if np.ptp(counted) == 0:
+        found = f"{counted[0]:g} m/s2 all along" if counted[0] else "zeros only"
+        raise BadInput(f"{file}: expected accelerations after the first {SKIP_S:g} s, found {found}")
+    if counted.std() < _LEAST_MPS2:
+        raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
+    if abs(counted.mean()) > _MOST_MEAN_MPS2:
+        raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
+    distance_m = drive.distance_m
+    for wrong, words in (
+        (np.diff(distance_m) > MAX_SPEED_MPS / drive.rate_hz + _BACK_M, "that grow steadily"),
+        (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > _BACK_M, "that grow, as the car drives forward"),
+    ):
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            raise BadInput(f"{file}:{at + 3}: expected distances {words}, found {distance_m[at + 1]:.6g} m after "
+                           f"{distance_m[:at + 1].max():.6g} m")
+    way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
+    if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
+        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m of way "
+                       f"by the one and {way_m:.4g} m by the other")

@@ -1,0 +1,70 @@
+"""Records that show themselves: as aligned lines at a prompt, with charts beside them in a notebook."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.report.html import Html
+
+Row = tuple[str, object, str]
+"""What it is called, a number or words, its unit."""
+
+
+class Shown(ABC):
+    """A record with a ``repr`` for people."""
+
+    @abstractmethod
+    def __repr__(self) -> str: ...
+
+    def charts(self) -> Sequence[Chart]:
+        """What a notebook draws of it; the arrays are in them."""
+        return ()
+
+    def figures(self) -> list[Html]:
+        """The same as figure elements of HTML."""
+        from logger.report.charts import chart
+
+        return list(map(chart, self.charts()))
+
+    def _repr_html_(self) -> str:
+        from logger.report.notebook import cell
+
+        return cell(repr(self), self.figures())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Shown):
+    """What a command says.
+
+    text    the lines that it prints
+    """
+
+    text: str
+    _json: dict[str, Any] = field(repr=False)
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def as_json(self) -> dict[str, Any]:
+        """The object that the command prints with ``--json``; a copy."""
+        return deepcopy(self._json)
+
+
+def table(title: str, rows: Iterable[Row]) -> str:
+    """A title, and under it names, values and units in columns; rows whose value is None are left out."""
+    shown = [(name, _words(value), unit) for name, value, unit in rows if value is not None]
+    names, values = (max((len(row[column]) for row in shown), default=0) for column in (0, 1))
+    return "\n".join([title, *(f"  {name:{names}}  {value:>{values}}  {unit}".rstrip() for name, value, unit in shown)])
+
+
+def _words(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}" if isfinite(value) else "not known"
+    return str(value)

@@ -1,0 +1,76 @@
+"""What the lab found, as a person reads it at a terminal."""
+
+from __future__ import annotations
+
+from logger.lab.beside import Part, paired, short_names
+from logger.lab.compare import Comparison, conclusion, evidence, headline
+from logger.lab.gained import MOVED_HEADS, MOVED_HINT, Gained, bias, errors, judgement, moved_rows
+from logger.lab.marks import worst_places
+from logger.lab.verdict import Verdict, looks_like, summary, table, untested
+from logger.report.text_layout import columns, paragraphs
+
+_PLACES = 5
+
+
+def comparison_lines(found: Comparison) -> list[str]:
+    """What a person reads of a comparison."""
+    beside = found.plain.beside
+    seconds = sum(map(len, beside.left)) / beside.rate_hz
+    return [
+        f"{found.vehicle} on {len(beside.runs)} run{'s' * (len(beside.runs) != 1)}, {seconds:.0f} s", "",
+        paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
+        paragraphs([conclusion(found)]), "",
+        *_tables(found),
+    ]
+
+
+def _tables(found: Comparison) -> list[str]:
+    """Where what is left sits, as the model stands and refitted."""
+    lines = [f"{'Where':46}{'share of residual':>13}{'error':>12}", f"{'':44}{'file':>8}{'refit':>7}{'file':>8}"
+                                                                    f"{'refit':>8}"]
+    plain, refitted = found.plain.where, found.refitted.where
+    for title, unit, one, other in (
+        ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
+    ):
+        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))]
+    lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
+    names = short_names(found.plain.beside.runs)
+    lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]
+    return lines
+
+
+def _row(plain: Part | None, refitted: Part, unit: str) -> str:
+    name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
+    share, error = (f"{plain.share:.1%}", plain.error_told(3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_told(3):>8}"
+
+
+def _place(part: Part, run: str) -> str:
+    name = f"  {run}, {part.low:g} to {part.high:g} m"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_told(3):>8}"
+
+
+def diagnosis_lines(found: Verdict, most: int | None) -> list[str]:
+    """What a person reads of a diagnosis."""
+    shown = [paragraphs(summary(found))]
+    if described := looks_like(found):
+        shown += ["", "What it looks like:", paragraphs(described, "- ")]
+    rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
+    more = len(found.diagnosis.candidates) - len(rows) + 1
+    shown += ["", "Each tried by itself, those of the verdict first, then the least likely to be chance:",
+              *columns(rows)]
+    if more > 0:
+        shown.append(f"and {more} more (ridelog diagnose --all)")
+    if hidden := untested(found):
+        shown += ["", "What these runs cannot tell:", paragraphs(hidden, "- ")]
+    return shown
+
+
+def addition_lines(found: Gained) -> list[str]:
+    """What a person reads of an effect that was added."""
+    rows = [(f"Error {which}:" if which else "", f"{error:.4f}", what) for which, error, what in errors(found)]
+    return [
+        paragraphs(judgement(found)), "", *columns(rows), "",
+        paragraphs([bias(found.names, found.moved)]), "",
+        *columns([MOVED_HEADS, *moved_rows(found.moved)]), "", paragraphs([MOVED_HINT]),
+    ]

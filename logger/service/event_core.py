@@ -1,0 +1,175 @@
+"""Bytes in, rows in the log out: what the live service and a replay have in common.
+
+Events are taken in order of time. The pipeline is stepped on a fixed lattice of event time, before the first
+event that lies beyond the next lattice point; so the rows depend on the events alone, not on how many came at a
+time, how long the process slept or how fast a recording is played.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Protocol
+
+from drivers.accelerometers.accelerometer import Decoder
+from drivers.dump import Event
+from drivers.errors import BadReply
+from drivers.events import GPS
+from drivers.nmea import NmeaDecoder
+from drivers.readings import AccelerationBlock, Fix
+from logger.records import WindowRecord
+from logger.service.pipeline import Pipeline
+from logger.store.log.log_writer import ClockMap
+
+STEP_US = 500_000
+IDLE_US = 120_000_000
+TELLING_FIXES = 10
+STEP_BYTES = 1_000_000
+"""More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
+
+log = logging.getLogger(__name__)
+
+
+class RowSink(Protocol):
+    """Where rows go: the segment log."""
+
+    def append(self, record: WindowRecord) -> None: ...
+    def rotate(self) -> None: ...
+    def set_clock_map(self, clock_map: ClockMap) -> None: ...
+    def close(self) -> None: ...
+
+
+class EventCore:
+    """Decodes events, steps the pipeline, writes its rows.
+
+    rows, samples, fixes count what has passed; last_record and last_fix are the newest of each. bad_events were
+    passed over: of another accelerometer, no whole reading, or too much for their moment.
+    """
+
+    def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Pipeline, sink: RowSink) -> None:
+        self._accelerometer = accelerometer
+        self._gps = gps
+        self._pipeline = pipeline
+        self._sink = sink
+        self._fixes: list[Fix] = []
+        self._next_step_us: int | None = None
+        self._last_event_us = 0
+        self._step_bytes = 0
+        self._drive = pipeline.drive
+        self._offset_us: int | None = None
+        self._fixes_without_speed = 0
+        self.rows = 0
+        self.samples = 0
+        self.fixes = 0
+        self.bad_events = 0
+        self.last_block: AccelerationBlock | None = None
+        self.last_record: WindowRecord | None = None
+        self.last_fix: Fix | None = None
+
+    def feed(self, event: Event) -> None:
+        """Take the next event; never earlier than the one before."""
+        t_us, source, data = event
+        if self._next_step_us is None:
+            self._next_step_us = t_us + STEP_US
+        elif t_us >= self._next_step_us:
+            self.advance(t_us)
+        self._last_event_us = t_us
+        self._step_bytes += len(data)
+        if self._step_bytes > STEP_BYTES:
+            self.bad_events += 1
+            return
+        if source == GPS:
+            self._fixes += self._gps.feed(t_us, data)
+            return
+        if source != self._accelerometer.name:
+            self.bad_events += 1
+            return
+        try:
+            self._accelerometer.feed(t_us, data)
+        except BadReply as error:
+            self.bad_events += 1
+            log.warning("event at %.6f s passed over: %s", t_us / 1e6, error)
+
+    def advance(self, now_us: int) -> None:
+        """Make the steps that lie at or before ``now_us``; every event before that has been fed.
+
+        Once nothing is under way any more, the time without an event passes in one step: a recording may hold one
+        event each two minutes. After two minutes without any it is left out.
+        """
+        while self._next_step_us is not None and self._next_step_us <= now_us:
+            idle_us = self._last_event_us + IDLE_US
+            if self._next_step_us > idle_us:
+                self._next_step_us = self._last_step_us(now_us)
+                self._pipeline.skip_to(self._next_step_us)
+            elif self._pipeline.is_settled(self._next_step_us - STEP_US, self._last_event_us):
+                self._next_step_us = self._last_step_us(min(now_us, idle_us))
+            step_us = self._next_step_us
+            self._next_step_us += STEP_US
+            self._step_bytes = 0
+            block = self._take_block()
+            self._write(self._pipeline.step(step_us, block, self._take_fixes()))
+            if self._pipeline.drive != self._drive:
+                self._drive = self._pipeline.drive
+                self._sink.rotate()
+
+    def _last_step_us(self, until_us: int) -> int:
+        """The last point of the lattice up to then, from the next one on."""
+        assert self._next_step_us is not None
+        return self._next_step_us + (until_us - self._next_step_us) // STEP_US * STEP_US
+
+    def finish(self) -> None:
+        """End of the events: what is inside comes out, the log is closed."""
+        if self._next_step_us is not None:
+            self._fixes += self._gps.flush()
+            self._accelerometer.flush()
+            self._write(self._pipeline.step(self._next_step_us, self._take_block(), self._take_fixes()))
+            self._write(self._pipeline.finish())
+        self._sink.close()
+
+    @property
+    def utc_known(self) -> bool:
+        """True once UTC has been learnt from the GPS."""
+        return self._offset_us is not None
+
+    @property
+    def accelerometer_doubt(self) -> str:
+        """What is wrong with the samples that come; empty: nothing."""
+        return self._accelerometer.doubt
+
+    @property
+    def gps_doubt(self) -> str:
+        """What is wrong with the fixes that come; empty: nothing."""
+        fix = self.last_fix
+        if fix is None or not fix.valid:
+            return ""
+        if fix.speed_mps is None and self._fixes_without_speed >= TELLING_FIXES:
+            return ("it sends positions but no speed, so no row has a distance: have it send RMC or VTG sentences, "
+                    "not GGA alone")
+        return self._pipeline.speed_check.doubt or self._gps.doubt
+
+    def _take_block(self) -> AccelerationBlock:
+        block = self._accelerometer.take()
+        self.samples += len(block)
+        if len(block):
+            self.last_block = block
+        return block
+
+    def _take_fixes(self) -> list[Fix]:
+        fixes, self._fixes = self._fixes, []
+        if fixes:
+            self.fixes += len(fixes)
+            self.last_fix = fixes[-1]
+        for fix in fixes:
+            if fix.valid:
+                self._fixes_without_speed = self._fixes_without_speed + 1 if fix.speed_mps is None else 0
+        return fixes
+
+    def _write(self, records: list[WindowRecord]) -> None:
+        offset_us = self._pipeline.timebase.utc_offset_us()
+        if offset_us is not None and offset_us != self._offset_us:
+            self._offset_us = offset_us
+            self._sink.set_clock_map(ClockMap(offset_us))
+        for record in records:
+            self._sink.append(record)
+        if records:
+            self.rows += len(records)
+            self.last_record = records[-1]

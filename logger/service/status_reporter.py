@@ -1,0 +1,217 @@
+"""What the running service tells about itself: a snapshot for the status file, a line for systemd."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+
+from logger.service.config import Config
+from logger.service.event_core import EventCore
+from logger.service.listener import monotonic_us
+from logger.service.pipeline import Pipeline
+from logger.service.signal_chain import Axis
+from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
+from logger.service.storage import Storage
+from logger.service.supervisor import Supervisor
+from logger.shipped import version
+from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
+
+HEALTH_LINE_US = 60 * US_PER_S
+RECENT_US = 15 * US_PER_S
+GRAVITY_TOLERANCE_G = 0.4
+LOOKS_WITHOUT_GRAVITY = 5
+UNREADABLE_S = 10.0
+log = logging.getLogger(__name__)
+
+
+class StatusReporter:
+    """Looks at the parts of the service and puts together what they say."""
+
+    def __init__(
+        self,
+        config: Config,
+        core: EventCore,
+        storage: Storage,
+        pipeline: Pipeline,
+        accelerometer: Supervisor,
+        gps: Supervisor,
+        counters: Mapping[str, Callable[[], dict[str, int]]],
+        notices: tuple[str, ...] = (),
+    ) -> None:
+        self._config = config
+        self._core = core
+        self._storage = storage
+        self._pipeline = pipeline
+        self._sensors = {"accelerometer": accelerometer, "gps": gps}
+        self._counters = counters
+        self._notices = notices
+        self._began_us = monotonic_us()
+        self._told_us = self._began_us
+        self._state_since: dict[str, tuple[str, int]] = {}
+        self._version = version()
+        self._rows = 0
+        self._row_us: int | None = None
+        self._failed = False
+        self._without_gravity = 0
+        self._gravity_advice: str | None = None
+        self._progress = {"accelerometer": Progress(), "gps": Progress()}
+        self._started_anew_us = self._began_us
+
+    def write(self, now_us: int) -> None:
+        """Renew the status file; once a minute a line in the log."""
+        if self._core.rows != self._rows:
+            self._rows, self._row_us = self._core.rows, now_us
+        try:
+            write_status(self._config.status_file, self.snapshot(now_us))
+            self._failed = False
+        except OSError as error:
+            if not self._failed:
+                log.warning("status file %s: %s", self._config.status_file, error.strerror)
+            self._failed = True
+        self._look_at_gravity()
+        self._look_at_stillness(now_us)
+        if now_us - self._told_us >= HEALTH_LINE_US:
+            self._told_us = now_us
+            log.info("%s", self.line())
+
+    def remove(self) -> None:
+        """The service ends: its status goes with it."""
+        with suppress(OSError):
+            self._config.status_file.unlink(missing_ok=True)
+
+    def line(self) -> str:
+        """The state in one line."""
+        distance_km = self._pipeline.odometer.total_m / 1000.0
+        sensors = ", ".join(f"{name} {part.state()}" for name, part in self._sensors.items())
+        trouble = f", NOT WRITING: {self._storage.log.trouble}" if self._storage.log.trouble else ""
+        return f"{sensors}, {self._core.rows} rows, {distance_km:.1f} km{trouble}"
+
+    def snapshot(self, now_us: int) -> ServiceStatus:
+        """Everything that ``ridelog status`` shows."""
+        fix = self._core.last_fix
+        storage = self._storage.status()
+        place = self._config.accelerometer.kind.place(self._config.accelerometer.settings)
+        return ServiceStatus(
+            state=self._state(now_us),
+            pid=os.getpid(),
+            version=self._version,
+            uptime_s=(now_us - self._began_us) / US_PER_S,
+            updated_t_us=now_us,
+            accelerometer=self._sensor("accelerometer", now_us, place, self._core.samples),
+            gps=self._sensor("gps", now_us, self._config.gps.port, self._core.fixes),
+            fix_valid=fix.valid if fix else None,
+            satellites=fix.satellites if fix else None,
+            utc_known=self._core.utc_known,
+            log_directory=str(self._config.log.directory),
+            current_file=self._storage.log.file_name,
+            rows_written=self._core.rows - storage.rows_waiting - storage.rows_lost,
+            distance_m=self._pipeline.odometer.total_m,
+            free_bytes=_free_bytes(str(self._config.log.directory)),
+            last_window=self._core.last_record,
+            storage=storage,
+            notices=self._notices,
+            counters={
+                "missed_samples": self._sensors["accelerometer"].missed,
+                "late_samples": self._pipeline.late_samples,
+                "crowded_samples": self._pipeline.crowded_samples,
+                "bad_events": self._core.bad_events,
+                "time_jumps": self._pipeline.timebase.time_jumps,
+                "rejected_fixes": self._pipeline.odometer.rejected_fixes,
+                "fixes_without_speed": self._pipeline.odometer.fixes_without_speed,
+            },
+        )
+
+    def _look_at_gravity(self) -> None:
+        """Notice an accelerometer that does not feel the earth along the axis that is set to point up."""
+        block = self._core.last_block
+        if block is None:
+            return
+        felt_g = block.accel_mps2.mean(axis=0) / STANDARD_GRAVITY_MPS2
+        word = self._config.accelerometer.vertical_axis
+        up = Axis.from_word(word)
+        if abs(up.sign * felt_g[up.column] - 1.0) <= GRAVITY_TOLERANCE_G:
+            self._without_gravity, self._gravity_advice = 0, None
+            return
+        self._without_gravity += 1
+        if self._without_gravity == LOOKS_WITHOUT_GRAVITY:
+            axes = ", ".join(f"{name} {value:+.2f}" for name, value in zip("xyz", felt_g, strict=True))
+            self._gravity_advice = f"axis {word} does not feel 1 g ({axes} g): check vertical_axis, range and mounting"
+            log.warning("accelerometer: %s", self._gravity_advice)
+
+    def _look_at_stillness(self, now_us: int) -> None:
+        """Start an accelerometer anew that drives and says nothing new; not more than once a minute."""
+        frozen_s = self._pipeline.stillness.frozen_s
+        if frozen_s and now_us - self._started_anew_us >= HEALTH_LINE_US:
+            self._started_anew_us = now_us
+            log.warning("accelerometer: %s; starting it anew", _frozen(frozen_s))
+            self._sensors["accelerometer"].start_anew(_frozen(frozen_s))
+
+    def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
+        """What is wrong with a sensor that speaks; None: nothing."""
+        doubt = self._progress[name].look(now_us, state == "ok", readings)
+        told = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
+        if state == "ok" and told:
+            return told
+        if doubt or state != "ok" or name != "accelerometer":
+            return doubt
+        frozen_s = self._pipeline.stillness.frozen_s
+        return _frozen(frozen_s) if frozen_s else self._gravity_advice
+
+    def _state(self, now_us: int) -> ServiceState:
+        if not self._core.samples and not self._core.rows:
+            return "starting"
+        recent = self._row_us is not None and now_us - self._row_us < RECENT_US
+        return "recording" if recent else "standing"
+
+    def _sensor(self, name: str, now_us: int, place: str, readings: int) -> SensorStatus:
+        part = self._sensors[name]
+        state = part.state()
+        doubt = self._doubt(name, now_us, state, readings)
+        if doubt:
+            state = "doubtful"
+        if self._state_since.get(name, ("", 0))[0] != state:
+            self._state_since[name] = (state, now_us)
+        return SensorStatus(
+            driver=part.name,
+            place=place,
+            state=state,
+            since_s=(now_us - self._state_since[name][1]) / US_PER_S,
+            last_error=doubt or part.error or None,
+            readings=readings,
+            note=part.note,
+            counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
+                      "dropped_readings": part.dropped, **self._counters[name]()},
+        )
+
+
+class Progress:
+    """Do the bytes that arrive become readings? ``look`` gives what is wrong, or None."""
+
+    def __init__(self) -> None:
+        self._readings = 0
+        self._since_us: int | None = None
+
+    def look(self, now_us: int, speaks: bool, readings: int) -> str | None:
+        """``speaks``: bytes arrive. ``readings``: how many there have been so far."""
+        if not speaks or readings != self._readings or self._since_us is None:
+            self._since_us, self._readings = now_us, readings
+        silent_s = (now_us - self._since_us) / US_PER_S
+        if silent_s < UNREADABLE_S:
+            return None
+        return (f"bytes arrive, but none that can be read for {silent_s:.0f} s: check the baud rate in the settings, "
+                "and that no other device is on this port")
+
+
+def _frozen(seconds: float) -> str:
+    return (f"the car drives, and the readings have not changed at all for {seconds:.0f} s: the sensor has frozen; "
+            "check its wires, and its mounting if it is started anew and it stays so")
+
+
+def _free_bytes(directory: str) -> int | None:
+    try:
+        return shutil.disk_usage(directory).free
+    except OSError:
+        return None

@@ -1,0 +1,164 @@
+"""From settings to working parts: decoders, pipeline, and what a log must carry to stand alone."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+from drivers.accelerometers import accelerometers
+from drivers.accelerometers.accelerometer import Decoder
+from drivers.dump import DumpHeader
+from drivers.errors import SettingsError, shortened
+from drivers.nmea import NmeaDecoder
+from logger.dsp.fixed_point import FixedFilter
+from logger.dsp.sections import BlockFilter
+from logger.dsp.weightings.wk import WEIGHTING
+from logger.errors import BadInput
+from logger.estimation.rms_relation import rms_relation
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator
+from logger.service.config import AXES, AccelerometerConfig, Config
+from logger.service.pipeline import Pipeline, PipelineSettings
+from logger.service.signal_chain import Axis, SignalChain, recorder_gain
+from logger.shipped import vehicle_file, vehicle_names, version
+from logger.vehicle.models import structure_of
+from logger.vehicle.structure import body_point
+from logger.vehicle.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
+    description for the logs."""
+
+    decoder: Decoder
+    oversample: int
+    sensor: Sensor
+    description: dict[str, Any]
+
+
+def instrument(config: AccelerometerConfig) -> Instrument:
+    """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be."""
+    kind, settings = config.kind, config.settings
+    readings = kind.readings(settings)
+    sensor = Sensor(readings.noise_mps2, readings.step_mps2)
+    if readings.oversample > 1:  # the mean of several readings is on no step any more
+        sensor = Sensor(sqrt(sensor.variance_mps2_2 / readings.oversample), 0.0)
+    decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
+    return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)})
+
+
+def gps_decoder(config: Config) -> NmeaDecoder:
+    """Decoder of the receiver's sentences."""
+    return NmeaDecoder(week_rollovers=config.gps.week_rollovers)
+
+
+def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
+    """The pipeline as the settings want it."""
+    settings = PipelineSettings(
+        window_m=config.pipeline.window_m,
+        blind_window_s=config.pipeline.blind_window_s,
+        bridge_s=config.gps.bridge_s,
+        slow_mps=config.pipeline.slow_mps,
+        stationary_mps=config.pipeline.stationary_mps,
+        drive_end_s=config.pipeline.drive_end_s,
+        latency_s=config.gps.latency_s,
+        front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
+    )
+    axis = Axis.from_word(config.accelerometer.vertical_axis)
+    make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
+    low_pass_hz = config.pipeline.low_pass_hz
+    chain = SignalChain(axis, WEIGHTING, sensor.oversample, low_pass_hz, sensor.sensor.is_coarse, make_filter)
+    structure = structure_of(vehicle)
+    place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
+    estimator = RoadEstimator(
+        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error
+    )
+    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
+
+
+def notices(vehicle: Vehicle) -> tuple[str, ...]:
+    """What the settings allow and somebody should know all the same."""
+    if not vehicle.sensor.left_m:
+        return ()
+    side = "left" if vehicle.sensor.left_m > 0 else "right"
+    return (f"vehicle {vehicle.name}: the sensor sits {abs(vehicle.sensor.left_m):g} m {side} of the middle "
+            "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
+
+
+def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, Any]:
+    """What lies beside every log file so that it can be read alone."""
+    return {
+        "ridelog_version": version(),
+        "sensor": sensor.description,
+        "vehicle": asdict(vehicle),
+        "settings": _plain(_as_written(config)),
+        "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
+        "sees_up_to_hz": 50,
+    }
+
+
+def dump_header(config: Config) -> DumpHeader:
+    """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
+    sensor = config.accelerometer
+    accelerometer = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis,
+                     **sensor.kind.header(sensor.settings)}
+    stem = config.vehicle.stem
+    is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
+    return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, stem if is_shipped else str(config.vehicle))
+
+
+def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
+    """Settings for a replay. What is in the bytes (driver, range, oversampling) is always the recording's; the rest is
+    that of the settings ``given``, or without them the defaults with what the recording's header says.
+
+    Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
+    """
+    says = header.accelerometer
+    config = given or Config()
+    kind = accelerometers()[says["driver"]]
+    axis = config.accelerometer.vertical_axis
+    if given is None:
+        axis = says.get("vertical_axis", axis)
+    if axis not in AXES:
+        raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {shortened(str(axis))}")
+    sections = config.accelerometer.sections
+    try:
+        settings = kind.recorded(says, sections[kind.name], is_given=given is not None)
+        sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings})
+        instrument(sensor)
+    except SettingsError as error:
+        raise BadInput(f"{place}: {error}") from None
+    if given is None or vehicle is not None:
+        config = replace(config, vehicle=_vehicle_file(vehicle or header.vehicle, place))
+    return replace(config, accelerometer=sensor)
+
+
+def _vehicle_file(name: str, place: str) -> Path:
+    path = vehicle_file(name) if name in vehicle_names() else Path(name)
+    try:
+        known = path.is_file()
+    except OSError:  # a name that can be none
+        known = False
+    if not known:
+        raise BadInput(
+            f"{place}: the recording's vehicle {shortened(name)} is not known here; expected --vehicle FILE.yaml or "
+            f"one of: {', '.join(vehicle_names())}"
+        )
+    return path
+
+
+def _as_written(config: Config) -> dict[str, Any]:
+    """The settings, in the shape that they have in their file."""
+    settings = asdict(config)
+    sections = settings["accelerometer"].pop("sections")
+    return settings | {"accelerometer": settings["accelerometer"] | sections}
+
+
+def _plain(value: Any) -> Any:
+    """Settings as JSON can hold them."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,1 @@
+"""Copies of the logs on sticks that may be pulled at any instant, and what is remembered of them."""

@@ -1,0 +1,1 @@
+"""Files that people and programs exchange, read with complaints that name the line."""

@@ -1,0 +1,65 @@
+"""Records of many channels as CSV: ``t_s`` and any number of evenly sampled columns, named by the header."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+from logger.files import read_bounded
+from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
+
+Array = npt.NDArray[np.float64]
+
+MAX_VALUE = 1e12  # beyond it, squares lose their digits
+MAX_CHANNELS = 64
+LONGEST_NAME = 100
+
+
+@dataclass(frozen=True)
+class ChannelRecord:
+    """Samples (n, channels) of the named channels at start_s, start_s + 1 / rate_hz, ... [s]."""
+
+    names: tuple[str, ...]
+    start_s: float
+    rate_hz: float
+    samples: Array
+
+
+def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
+    """Read a CSV record: the named columns in that order, or all but ``t_s``.
+
+    Raises BadInput ("file:line: expected ..., found ...") for anything else.
+    """
+    file = str(path)
+    wished = ",".join(only) if only else "CHANNEL[,CHANNEL...]"
+
+    def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+        wanted = tuple(only) or tuple(name for name in names if name != TIME)
+        good = names.count(TIME) == 1 and wanted and all(_is_name(name) and names.count(name) == 1 for name in wanted)
+        return (TIME, *wanted) if good and len(wanted) <= MAX_CHANNELS else None
+
+    header = f"a header with {TIME},{wished}, each once, at most {MAX_CHANNELS}"
+    wanted, table = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
+    if len(table) < 2:
+        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+    samples = table[:, 1:].copy()
+    if (wild := np.abs(samples) > MAX_VALUE).any():
+        row, column = (int(place[0]) for place in np.nonzero(wild))
+        raise BadInput(f"{file}:{row + 2}: expected {wanted[column + 1]} within {MAX_VALUE:g}, found "
+                       f"{samples[row, column]:g}")
+    for column, name in enumerate(wanted[1:]):
+        if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
+            raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
+                           f"choose columns with --columns")
+    return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
+
+
+def _is_name(name: str) -> bool:
+    """Something that can be shown and typed, of bytes that are text."""
+    return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "\ufffd" not in name

@@ -1,0 +1,163 @@
+"""Drives as files: ``drive.csv``, and the folder (a run) that keeps it with the profile it was driven on.
+
+Problem: a drive and its road belong together, and a model is compared with the one on the other; a column that is
+missing, or a clock that skips, would end as a wrong vehicle. Solution: a run is read as one thing, checked line by line
+as records and profiles are. Columns of other names are not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+from logger.files import naming, read_bounded
+from logger.profiles.track import Track
+from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
+from logger.store.formats.profile_file import Profile, read_profile
+from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, even_rate_hz
+
+Array = npt.NDArray[np.float64]
+
+DRIVE, PROFILE = "drive.csv", "profile.csv"
+SPEED, DISTANCE = "speed_mps", "distance_m"
+COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
+PLACE = ("lat_deg", "lon_deg")
+MAX_SPEED_MPS = 150.0
+_MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
+_LINES_AT_ONCE = 50_000
+_HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}], each once"
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What a recorder wrote down while it drove, arrays (n,).
+
+    path           of the file, or of a run's folder
+    rate_hz        samples a second
+    time_s         evenly spaced [s]
+    accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
+    speed_mps      [m/s]
+    distance_m     where the front tires stand on the track [m]
+    lat_deg, lon_deg    None where they were not recorded
+    """
+
+    path: Path
+    rate_hz: float
+    time_s: Array
+    accel_z_mps2: Array
+    speed_mps: Array
+    distance_m: Array
+    lat_deg: Array | None
+    lon_deg: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Run(Drive):
+    """A drive over a known road, ``track``."""
+
+    track: Track
+
+
+def read_run(folder: Path | str) -> Run:
+    """Read a folder with ``drive.csv`` and ``profile.csv``.
+
+    Times come back on the even grid that their digits are a rounding of.
+
+    Raises BadInput ("file:line: expected ..., found ...") for a file that is missing or not what it should be.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE}")
+    drive = replace(read_drive(path / DRIVE), path=path)
+    return Run(**vars(drive), track=track_of(read_profile(path / PROFILE)))
+
+
+def read_drive(path: Path | str) -> Drive:
+    """Read a ``drive.csv``. Times and errors as in ``read_run``."""
+    file = str(path)
+    names, table = parse_columns(read_bounded(file, MAX_BYTES), file, _choose, _HEADER)
+    if len(table) < 2:
+        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+    columns = dict(zip(names, table.T.copy(), strict=True))
+    rate_hz = even_rate_hz(columns[TIME], file)
+    _check_size(columns[VERTICAL], VERTICAL, MAX_MPS2, "m/s2", file)
+    _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
+    time_s = columns[TIME][0] + np.arange(len(table)) / rate_hz
+    lat_deg, lon_deg = (columns.get(name) for name in PLACE)
+    return Drive(
+        Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg
+    )
+
+
+def read_speeds(path: Path | str) -> tuple[Array, Array]:
+    """Times [s], growing, and speeds [m/s] at them out of the columns ``t_s`` and ``speed_mps``.
+
+    Raises BadInput ("file:line: expected ..., found ...") for anything else, for a speed below 0, and for times beyond
+    1e5 s.
+    """
+    header, file = (TIME, SPEED), str(path)
+    _, table = parse_columns(
+        read_bounded(path, MAX_BYTES), file,
+        lambda names: header if all(names.count(name) == 1 for name in header) else None,
+        f"a header with {','.join(header)}, each once",
+    )
+    if len(table) < 2:
+        raise BadInput(f"{file}:3: expected at least two times, found the end of the file")
+    time_s, speed_mps = table.T.copy()
+    _check_size(time_s, TIME, _MAX_TIME_S, "s", file)
+    if (back := np.diff(time_s) <= 0).any():
+        row = int(np.argmax(back)) + 1
+        raise BadInput(f"{file}:{row + 2}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")
+    if (speed_mps < 0).any():
+        row = int(np.argmax(speed_mps < 0))
+        raise BadInput(f"{file}:{row + 2}: expected a speed of 0 or more, found {speed_mps[row]:g}")
+    _check_size(speed_mps, SPEED, MAX_SPEED_MPS, "m/s", file)
+    return time_s, speed_mps
+
+
+def track_of(profile: Profile) -> Track:
+    """The road that a profile describes, with one or two tracks."""
+    if profile.elevation_right_m is None:
+        return Track(profile.spacing_m, profile.elevation_m, profile.start_m)
+    both = np.stack([profile.elevation_m, profile.elevation_right_m], axis=1)
+    return Track(profile.spacing_m, both, profile.start_m)
+
+
+def write_drive(path: Path, columns: Mapping[str, Array]) -> None:
+    """Write columns (n,) by name in the order given: those of ``COLUMNS``, then any others. OSError as ``open``."""
+    _write(path, tuple(columns), np.stack(list(columns.values()), axis=1), "%.10g")
+
+
+def write_profile(path: Path, track: Track) -> None:
+    """Write a road as a profile, to a tenth of a micrometre. OSError as ``open``."""
+    elevations = track.elevation_m.reshape(len(track.elevation_m), -1)
+    distance = track.start_m + track.spacing_m * np.arange(len(elevations))
+    names = PROFILE_COLUMNS[: 1 + elevations.shape[1]]
+    _write(path, names, np.column_stack([distance, elevations]), "%.7f")
+
+
+def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
+    line = ",".join([form] * len(names)) + "\n"
+    with naming(path), path.open("w", encoding="ascii", newline="\n") as file:
+        file.write(",".join(names) + "\n")
+        for first in range(0, len(table), _LINES_AT_ONCE):
+            block = table[first : first + _LINES_AT_ONCE]
+            file.write(line * len(block) % tuple(block.ravel().tolist()))
+
+
+def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+    """The columns to read; None when one of them is missing or there twice."""
+    wanted = COLUMNS + (PLACE if any(name in names for name in PLACE) else ())
+    return wanted if all(names.count(name) == 1 for name in wanted) else None
+
+
+def _check_size(values: Array, name: str, largest: float, unit: str, file: str) -> None:
+    if (wild := np.abs(values) > largest).any():
+        row = int(np.argmax(wild))
+        raise BadInput(f"{file}:{row + 2}: expected {name} within {largest:g} {unit}, found {values[row]:g}")

@@ -1,0 +1,153 @@
+"""Road profiles as files: CSV of ours and ERD of the profilers, read into evenly spaced elevations.
+
+Problem: a profile is long (400,000 lines for 10 km at 25 mm), comes from many hands, and everything computed from it
+takes for granted that its samples are evenly spaced. A hole or an uneven step changes the result without a trace.
+
+Solution: distances must lie on an even grid, but for the rounding of their digits; anything else is refused with its
+line. Straight lines between the samples are laid through an uneven profile only
+when ``resample_m`` asks for it, and the profile says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+from logger.files import read_bounded
+from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
+
+Array = npt.NDArray[np.float64]
+
+COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
+MAX_BYTES = 512 * 1024 * 1024
+FARTHEST_M = 1e9
+WIDEST_BRIDGED_M = 1.0
+"""A straight line is laid across no wider hole than this: what lies in a wider one cannot be known."""
+# Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps 5 %,
+# is taken for rounding.
+_ROUNDING_M = 0.0006
+_ROUNDING_STEPS = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Elevations (n,) [m] of one or two wheel tracks at start_m, start_m + spacing_m, ... [m].
+
+    widest_step_m    for a profile that was resampled: the widest distance between its samples that a straight line
+                     was laid across [m]; None for samples as they were measured
+    """
+
+    start_m: float
+    spacing_m: float
+    elevation_m: Array
+    elevation_right_m: Array | None
+    widest_step_m: float | None = None
+
+
+def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
+    """Read a profile: CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line).
+
+    resample_m    lay a grid of this spacing [m] over the profile, linearly between its samples
+
+    Raises BadInput ("file:line: expected ...") for a file that is neither, for values that are missing or not finite,
+    and for distances that do not grow or, without ``resample_m``, are not evenly spaced.
+    """
+    data = read_bounded(path, MAX_BYTES)
+    if is_erd(data):
+        return _from_erd(parse_erd(data, path), str(path), resample_m)
+    return _from_table(parse_table(data, str(path)), str(path), resample_m)
+
+
+def parse_table(data: bytes, file: str) -> Array:
+    """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]."""
+
+    def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+        return names if names in (COLUMNS[:2], COLUMNS) else None
+
+    return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1]
+
+
+def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:
+    distance, tracks = table[:, 0], [np.ascontiguousarray(track) for track in table.T[1:]]
+
+    def place(sample: int) -> str:
+        return f"{file}:{sample + 2}"
+
+    for track in tracks:
+        if (wild := np.abs(track) > HIGHEST_M).any():
+            sample = int(np.argmax(wild))
+            raise BadInput(f"{place(sample)}: expected elevations within {HIGHEST_M:g} m, found {track[sample]:g}")
+    if (far := np.abs(distance) > FARTHEST_M).any():
+        sample = int(np.argmax(far))
+        raise BadInput(f"{place(sample)}: expected distances within {FARTHEST_M:g} m, found {distance[sample]:g}")
+    if len(distance) < 2:
+        raise BadInput(f"{place(1)}: expected at least two samples, found the end of the file")
+    steps = np.diff(distance)
+    if (steps <= 0).any():
+        sample = int(np.argmax(steps <= 0)) + 1
+        raise BadInput(f"{place(sample)}: expected a distance above {distance[sample - 1]:.10g} m, "
+                       f"found {distance[sample]:.10g}")
+    if resample_m is not None:
+        if steps.max() > WIDEST_BRIDGED_M:
+            sample = int(np.argmax(steps)) + 1
+            raise BadInput(f"{place(sample)}: expected no gap above {WIDEST_BRIDGED_M:g} m, found one of "
+                           f"{steps[sample - 1]:.6g} m: cut the profile there")
+        return _resampled(distance, tracks, resample_m, file)
+    return Profile(float(distance[0]), _even_spacing(distance, steps, place), *_pair(tracks))
+
+
+def _even_spacing(distance: Array, steps: Array, place: Callable[[int], str]) -> float:
+    """Spacing of the even grid nearest to the distances [m]; BadInput when they are off it by more than rounding."""
+    number = np.arange(len(distance), dtype=float)
+    centred = number - number.mean()
+    spacing_m = round(float(centred @ (distance - distance.mean()) / (centred @ centred)), 12)
+    off_grid = distance - distance.mean() - spacing_m * centred
+    if (np.abs(off_grid) <= _rounding_m(spacing_m)).all():
+        return spacing_m
+    usual_m = float(np.median(steps))
+    hint = f"(--resample {usual_m:.4g} would lay straight lines between the samples)"
+    if steps.max() > WIDEST_BRIDGED_M:
+        hint = "(cut the profile there)"
+    odd = np.abs(steps - usual_m) > 2 * _rounding_m(usual_m)
+    if odd.any():
+        step = int(np.argmax(odd))
+        fault = "a gap" if steps[step] > 1.5 * usual_m else "a step"
+        raise BadInput(f"{place(step + 1)}: expected even steps of {usual_m:.6g} m, found {fault} of "
+                       f"{steps[step]:.6g} m {hint}")
+    grid = distance[0] + usual_m * number
+    sample = int(np.argmax(np.abs(distance - grid) > _rounding_m(usual_m)))
+    raise BadInput(f"{place(sample)}: expected even steps of {usual_m:.6g} m to reach {grid[sample]:.10g} m, found "
+                   f"{distance[sample]:.10g} m {hint}")
+
+
+def _rounding_m(spacing_m: float) -> float:
+    return min(_ROUNDING_M, _ROUNDING_STEPS * spacing_m)
+
+
+def _pair(tracks: Sequence[Array]) -> tuple[Array, Array | None]:
+    return tracks[0], tracks[1] if len(tracks) > 1 else None
+
+
+def _resampled(distance: Array, tracks: Sequence[Array], spacing_m: float, file: str) -> Profile:
+    length_m = float(distance[-1] - distance[0])
+    count = length_m / spacing_m if spacing_m > 0 else 0
+    if not 1 <= count < MAX_BYTES / 8:
+        raise BadInput(f"{file}: expected a spacing within the {length_m:.6g} m of profile to resample to, "
+                       f"found {spacing_m:g} m")
+    grid = distance[0] + spacing_m * np.arange(int(count + 1e-9) + 1)
+    laid = [np.interp(grid, distance, track) for track in tracks]
+    return Profile(float(distance[0]), spacing_m, *_pair(laid), float(np.diff(distance).max()))
+
+
+def _from_erd(erd: ErdFile, file: str, resample_m: float | None) -> Profile:
+    tracks = erd.wheel_tracks()
+    if resample_m is not None:
+        distance = erd.spacing_m * np.arange(len(tracks[0]), dtype=float)
+        return _resampled(distance.astype(np.float64), tracks, resample_m, file)
+    return Profile(0.0, erd.spacing_m, *_pair(tracks))

@@ -1,0 +1,105 @@
+"""Acceleration records as CSV: evenly sampled columns, told by the names in the header.
+
+Problem: an hour at 1000 Hz is 3.6 million lines, and a record with a hole or an uneven clock gives figures that look
+like any others. Solution: the times must lie on an even grid, but for the rounding of their digits; a record that does
+not is refused with its line. Columns of other names are not read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+from logger.files import read_bounded
+from logger.store.formats.csv_table import parse_columns
+
+Array = npt.NDArray[np.float64]
+
+TIME = "t_s"
+VERTICAL = "accel_z_mps2"
+HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
+MAX_BYTES = 1024 * 1024 * 1024
+# Beyond this something else than an acceleration has been written, and its fourth power may not be a number.
+MAX_MPS2 = 1e6
+# Seconds since 1970, and more; and no accelerometer is read faster.
+MAX_TIME_S = 1e10
+MAX_RATE_HZ = 1e6
+# A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid between.
+_ROUNDING_S = 0.00101
+_ROUNDING_STEPS = 0.2
+
+_HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
+
+
+@dataclass(frozen=True, eq=False)
+class AccelerationRecord:
+    """Samples at start_s, start_s + 1 / rate_hz, ... [s]; acceleration per axis (n,) [m/s2], None where not measured.
+
+    z is vertical, x along the vehicle, y across it.
+    """
+
+    start_s: float
+    rate_hz: float
+    accel_z_mps2: Array
+    accel_x_mps2: Array | None
+    accel_y_mps2: Array | None
+
+    @property
+    def duration_s(self) -> float:
+        """Every sample stands for one step of time [s]."""
+        return len(self.accel_z_mps2) / self.rate_hz
+
+    @property
+    def by_axis(self) -> dict[str, Array | None]:
+        """The accelerations by axis: ``z``, ``x``, ``y``."""
+        return {"z": self.accel_z_mps2, "x": self.accel_x_mps2, "y": self.accel_y_mps2}
+
+
+def read_record(path: Path | str) -> AccelerationRecord:
+    """Read a CSV record with the columns ``t_s`` and ``accel_z_mps2``, perhaps ``accel_x_mps2`` and ``accel_y_mps2``.
+
+    Raises BadInput ("file:line: expected ..., found ...") for anything else.
+    """
+    file = str(path)
+    wanted, table = parse_columns(read_bounded(path, MAX_BYTES), file, _choose, _HEADER)
+    if len(table) < 2:
+        raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
+    t_s = table[:, 0]
+    rate_hz = even_rate_hz(t_s, file)
+    accel = dict(zip(wanted[1:], table.T[1:].copy(), strict=True))
+    for name, samples in accel.items():
+        if (wild := np.abs(samples) > MAX_MPS2).any():
+            line = int(np.argmax(wild)) + 2
+            raise BadInput(f"{file}:{line}: expected {name} within {MAX_MPS2:g} m/s2, found {samples[line - 2]:g}")
+    return AccelerationRecord(float(t_s[0]), rate_hz, accel[VERTICAL], *(accel.get(name) for name in HORIZONTAL))
+
+
+def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+    """The columns to read; None when one of them is missing or there twice."""
+    wanted = (TIME, VERTICAL, *(name for name in HORIZONTAL if name in names))
+    return wanted if all(names.count(name) == 1 for name in wanted) else None
+
+
+def even_rate_hz(t_s: Array, file: str) -> float:
+    """The rate of the times; BadInput with the line where they leave an even grid."""
+    if (far := np.abs(t_s) > MAX_TIME_S).any():
+        sample = int(np.argmax(far))
+        raise BadInput(f"{file}:{sample + 2}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
+    steps = np.diff(t_s)
+    if (early := steps < 1.0 / MAX_RATE_HZ).any():
+        sample = int(np.argmax(early)) + 1
+        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found {t_s[sample]:.10g}")
+    step_s = float(t_s[-1] - t_s[0]) / len(steps)
+    tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
+    off = np.abs(t_s - (t_s[0] + step_s * np.arange(len(t_s))))
+    if (off > tolerance_s).any():
+        usual_s = float(np.median(steps))
+        odd = np.abs(steps - usual_s) > min(_ROUNDING_S, _ROUNDING_STEPS * usual_s)
+        sample = int(np.argmax(odd)) + 1 if odd.any() else int(np.argmax(off))
+        raise BadInput(f"{file}:{sample + 2}: expected samples evenly {usual_s:.6g} s apart, found a step of "
+                       f"{steps[sample - 1]:.6g} s")
+    return 1.0 / step_s

@@ -1,0 +1,262 @@
+"""Vehicle files (YAML) to vehicles and back, with complaints that name the line.
+
+Most commands know the plain car only, and must not take a car with effects for one without: ``read_vehicle`` refuses
+it. Those that know effects read a ``Model``: the car, its effects, and how it came to them. A user's own effect is
+Python that reading it runs, which the service on board never does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+
+from logger.errors import BadInput
+from logger.files import write_text
+from logger.store.formats.yaml_nodes import Node, load_mapping
+from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
+
+if TYPE_CHECKING:
+    from logger.vehicle.effect import Chosen
+
+# What each model needs beyond the keys that all have.
+_MODEL_KEYS: Mapping[str, tuple[str, ...]] = {
+    "quarter_car": (),
+    "half_car": ("pitch_inertia_kg_m2", "rear"),
+    "full_car": ("pitch_inertia_kg_m2", "rear", "roll_inertia_kg_m2", "track_width_m"),
+}
+_COMMON_KEYS = ("name", "model", "sprung_mass_kg", "front", "contact_patch_m")
+_AXLE_KEYS = (
+    "unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m", "tire_stiffness_n_per_m",
+)
+_ANTI_ROLL_KEY = "anti_roll_stiffness_n_m_per_rad"
+_FARTHEST_M = 10.0  # no sensor is bolted farther from its car's centre of gravity
+# What a number may be. Most scale with the body, so that they are limited per kilogram of sprung mass: a car, a lorry
+# and the Golden Car, whose numbers are given for 1 kg, fit; the same numbers in g, t, mm, kN/m or kN s/m do not.
+_LIMITS: Mapping[str, tuple[float, float]] = {
+    "sprung_mass_kg": (1.0, 1e5), "track_width_m": (0.2, 5.0), "cg_distance_m": (0.0, 20.0),
+    "contact_patch_m": (0.0, 1.0),
+}
+_LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
+    "pitch_inertia_kg_m2": (0.01, 100.0), "roll_inertia_kg_m2": (0.01, 100.0), "unsprung_mass_kg": (0.001, 5.0),
+    "suspension_stiffness_n_per_m": (0.5, 5000.0), "suspension_damping_n_s_per_m": (0.01, 1000.0),
+    "tire_stiffness_n_per_m": (5.0, 50_000.0), _ANTI_ROLL_KEY: (0.01, 10_000.0),
+}
+_MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
+_SHORTEST_WHEELBASE_M = 0.1
+_ROUNDING = 1e-12
+KNOW_EFFECTS = "simulate, compare, diagnose, add-effect, identify and lab"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step in the making of a model: what was done, and the error that it left.
+
+    noise_floor_error    below which no model can come; None: not known
+    """
+
+    step: str
+    error: float
+    noise_floor_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A vehicle with its effects, and the steps that led to them, the first one first.
+
+    given    the vehicle as it was before any of its numbers was refitted; None: none was
+    """
+
+    vehicle: Vehicle
+    effects: tuple[Chosen, ...] = ()
+    history: tuple[Step, ...] = ()
+    given: Vehicle | None = None
+
+
+def read_vehicle(path: Path | str) -> Vehicle:
+    """Read the file of a plain vehicle. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown
+    or wrong, and for a vehicle that has effects.
+
+    A half car needs every key of the format; a quarter car stands on ``front`` alone, without ``cg_distance_m``, and
+    has neither ``rear`` nor ``pitch_inertia_kg_m2``. A full car adds ``roll_inertia_kg_m2``, ``track_width_m`` and, in
+    an axle that has an anti-roll bar, ``anti_roll_stiffness_n_m_per_rad``. Any car may say where its accelerometer
+    sits: ``sensor: {ahead_m: 0.3, left_m: 0.1}``, as far as its model can tell the difference. Numbers that no car has,
+    such as those in other units, are wrong too.
+    """
+    vehicle, keys = _read(path)
+    if "effects" in keys and keys["effects"].items():
+        raise keys["effects"].wrong(f"no effects: this command knows the plain car only ({KNOW_EFFECTS} know effects)")
+    return vehicle
+
+
+def read_model(path: Path | str) -> Model:
+    """Read a vehicle file with its effects, those in files of the user's own too, which are run.
+
+    Raises BadInput as ``read_vehicle``, and for an effect, a parameter or a step of the history that is not what it
+    should be, or an effect that cannot be there in this vehicle.
+    """
+    from logger.store.formats.effect_file import read_effects
+
+    vehicle, keys = _read(path)
+    return Model(
+        vehicle,
+        read_effects(keys["effects"], vehicle) if "effects" in keys else (),
+        tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
+        _read_given(keys["given"], vehicle) if "given" in keys else None,
+    )
+
+
+def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
+    """The vehicle with its numbers as they were given: ``front.unsprung_mass_kg: 40``."""
+    keys = node.mapping(optional=sized(vehicle))
+    mass_kg = vehicle.sprung_mass_kg
+    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg)
+              for name, one in keys.items()}
+    for name, value in values.items():
+        if not value > 0:
+            raise keys[name].wrong("a number above 0")
+    return changed(vehicle, values)
+
+
+def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
+    """The vehicle of a file, and the nodes of all its keys."""
+    top = load_mapping(path)
+    model_node = top.mapping().get("model")
+    if model_node is None:
+        raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
+    model = model_node.choice(*_MODEL_KEYS)
+    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects", "given", "history"))
+    mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
+    front = _read_axle(keys["front"], model, mass_kg)
+    rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
+    if rear is not None and front.cg_distance_m + rear.cg_distance_m < _SHORTEST_WHEELBASE_M:
+        distance = keys["rear"].mapping()["cg_distance_m"]
+        raise distance.wrong(f"axles at least {_SHORTEST_WHEELBASE_M:g} m apart")
+    body = {key: _number_of(keys, key, mass_kg)
+            for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
+    vehicle = Vehicle(
+        name=keys["name"].text(),
+        model=model,
+        sprung_mass_kg=mass_kg,
+        pitch_inertia_kg_m2=body.get("pitch_inertia_kg_m2"),
+        front=front,
+        rear=rear,
+        contact_patch_m=_number_of(keys, "contact_patch_m", mass_kg),
+        roll_inertia_kg_m2=body.get("roll_inertia_kg_m2"),
+        track_width_m=body.get("track_width_m"),
+        sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
+    )
+    return vehicle, keys
+
+
+def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float) -> float:
+    """The number of a key, within its limits."""
+    node = keys[key]
+    if key in _LIMITS:
+        low, high = _LIMITS[key]
+        return node.number(low=low, high=high)
+    value = node.number(low=0)
+    low, high = (limit * sprung_mass_kg for limit in _LIMITS_PER_KG[key])
+    none = key in _MAY_BE_MISSING
+    if low * (1 - _ROUNDING) <= value <= high * (1 + _ROUNDING) or (none and value == 0):
+        return value
+    raise node.wrong(f"a number from {low:g} to {high:g}{' or 0' if none else ''}, for {sprung_mass_kg:g} kg on the "
+                     "springs")
+
+
+def _read_axle(node: Node, model: str, sprung_mass_kg: float) -> Axle:
+    keys = node.mapping(
+        required=_AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS),
+        optional=(_ANTI_ROLL_KEY,) if model == "full_car" else (),
+    )
+    return Axle(**{"cg_distance_m": 0.0} | {key: _number_of(keys, key, sprung_mass_kg) for key in keys})
+
+
+def _read_sensor(node: Node, model: str) -> SensorPlace:
+    keys = node.mapping(optional=("ahead_m", "left_m"))
+    place = {key: value.number(low=-_FARTHEST_M, high=_FARTHEST_M) for key, value in keys.items()}
+    for key, motion, models in (("ahead_m", "pitch", ("half_car", "full_car")), ("left_m", "roll", ("full_car",))):
+        if place.get(key) and model not in models:
+            raise keys[key].wrong(f"0, because a {model} does not {motion}")
+    return SensorPlace(**place)
+
+
+def _read_step(node: Node) -> Step:
+    keys = node.mapping(required=("step", "error"), optional=("noise_floor_error",))
+    floor = keys.get("noise_floor_error")
+    return Step(keys["step"].text(), keys["error"].number(low=0),
+                None if floor is None or floor.is_null() else floor.number(low=0))
+
+
+def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
+    """Write a vehicle as a file that ``read_vehicle`` reads back equal, to the last bit. OSError if that fails."""
+    write_model(path, Model(vehicle))
+
+
+def write_model(path: Path | str, model: Model) -> None:
+    """Write a model as a file that ``read_model`` reads back equal, to the last bit. OSError if that fails.
+
+    The file of a user's own effect is named by its way from the new file's folder. A standard error that is not finite
+    is not known, and left out.
+    """
+    from logger.store.formats.effect_file import effect_keys
+
+    keys = _vehicle_keys(model.vehicle)
+    keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
+    if model.given is not None:
+        keys["given"] = {name: float(read(model.given, name)) for name in sized(model.given)
+                         if read(model.given, name) != read(model.vehicle, name)}
+    if model.history:
+        keys["history"] = [_OneLine(step=one.step, error=float(one.error),
+                                    noise_floor_error=_float_or_none(one.noise_floor_error)) for one in model.history]
+    text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
+    write_text(path, text)
+
+
+def _float_or_none(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+class _OneLine(dict[str, object]):
+    """A mapping that is written on one line."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes plain values, as YAML's safe dumper does."""
+
+
+_Dumper.add_representer(
+    _OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(), flow_style=True)
+)
+
+
+def _vehicle_keys(vehicle: Vehicle) -> dict[str, object]:
+    keys: dict[str, object] = {"name": vehicle.name, "model": vehicle.model}
+    for key in ("sprung_mass_kg", "pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m"):
+        value = getattr(vehicle, key)
+        if value is not None:
+            keys[key] = _number(value)
+    keys["front"] = _axle_keys(vehicle.front, vehicle.model)
+    if vehicle.rear is not None:
+        keys["rear"] = _axle_keys(vehicle.rear, vehicle.model)
+    keys["contact_patch_m"] = _number(vehicle.contact_patch_m)
+    if vehicle.sensor != AT_CENTRE_OF_GRAVITY:
+        keys["sensor"] = {"ahead_m": _number(vehicle.sensor.ahead_m), "left_m": _number(vehicle.sensor.left_m)}
+    return keys
+
+
+def _axle_keys(axle: Axle, model: str) -> dict[str, float]:
+    names = _AXLE_KEYS if model == "quarter_car" else ("cg_distance_m", *_AXLE_KEYS)
+    if axle.anti_roll_stiffness_n_m_per_rad:
+        names = (*names, _ANTI_ROLL_KEY)
+    return {name: _number(getattr(axle, name)) for name in names}
+
+
+def _number(value: float) -> float:
+    """The same number, whole where it can be: 875, not 875.0."""
+    plain = float(value)
+    return int(plain) if plain.is_integer() else plain

@@ -1,0 +1,378 @@
+"""Is what lies on the disk what was written? Checks of segment logs and recorded dumps.
+
+Problem. A card or a copy may have damaged a file anywhere, or cut it; a file may be open while it is looked at.
+Solution. Every record is read the way every other reader reads it. A row that does not fit its check value is
+corrupt, a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one
+through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
+had, so that a file cut neatly between two rows shows too. A part, of a log or of a recording, that ends in a torn row
+is simply open.
+A stick that logs were exported to is compared with the manifest that lies beside them, and has to have one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from drivers.dump import ACCELEROMETERS, LINE_BYTES, intact_bytes, open_dump
+from drivers.errors import DumpError
+from drivers.regular_file import open_regular
+from logger.errors import BadInput
+from logger.records import WindowRecord
+from logger.store.export import manifest
+from logger.store.export.directory_handle import DirectoryHandle
+from logger.store.export.manifest import is_of_export, read_manifest
+from logger.store.log.intact_rows import Hole, are_in_holes
+from logger.store.log.log_folder import inside_of
+from logger.store.log.log_name import LogName, finished_path, open_path
+from logger.store.log.row_format import Row, scan
+from logger.store.log.sidecar import SETTINGS_LOST, load_sidecar, repairs_of
+from logger.units import US_PER_S
+
+DUMP_ENDINGS = (".dump", ".dump.gz")
+OPEN_DUMP_ENDINGS = (".dump.part", ".dump.gz.part")
+SILENCE_US = US_PER_S
+"""An accelerometer that says nothing for longer has left a gap in a dump: told, and no damage of the file."""
+
+SHOWN_PROBLEMS = 20
+"""Most problems that are kept in words for one file; all are counted."""
+
+_DUMP_START = b"# ridelog-dump "
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """What was found in one file.
+
+    kind               ``log``, ``dump`` or ``manifest``
+    state              ``finished``, ``open`` (a part: the service may be writing to it), ``dump`` or ``manifest``
+    records_good       rows or events that are as they were written
+    records_torn       1 when the file ends in the middle of one
+    records_corrupt    lines that are damaged; a dump is read up to the first
+    gaps               places where records are missing or time goes back; where an accelerometer said nothing
+    problems           the first ``SHOWN_PROBLEMS`` of what is wrong, in words, each with its line
+    notes              what is not wrong and should be known, as many at most
+    ok                 nothing is wrong
+    """
+
+    path: Path
+    kind: str
+    state: str
+    records_good: int
+    records_torn: int
+    records_corrupt: int
+    gaps: int
+    problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True when nothing is wrong."""
+        return not self.problems
+
+
+@dataclass
+class _Findings:
+    """What is being found in one file, the records at its ends, the damaged lines beyond them, and the holes that a
+    repair has left."""
+
+    good: int = 0
+    torn: int = 0
+    corrupt: int = 0
+    gaps: int = 0
+    problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    first: WindowRecord | None = None
+    last: WindowRecord | None = None
+    damaged_before_first: int = 0
+    damaged_since_last: int = 0
+    holes: tuple[Hole, ...] = ()
+
+    def wrong(self, problem: str) -> None:
+        if len(self.problems) < SHOWN_PROBLEMS:
+            self.problems.append(problem)
+
+    def note(self, words: str) -> None:
+        if len(self.notes) < SHOWN_PROBLEMS:
+            self.notes.append(words)
+
+    def check(self, path: Path, kind: str, state: str) -> FileCheck:
+        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems),
+                         tuple(self.notes))
+
+
+def verify(paths: Iterable[Path]) -> list[FileCheck]:
+    """Check files, and the logs, dumps and manifests inside folders (at any depth), in order of their names.
+
+    A service may write to a folder meanwhile: what it finishes is checked as what it has become, what it removes to
+    make room is left out, and what it begins is too new. Raises ``BadInput`` for a path that is not there, a file that
+    is none of these, or a folder without any.
+    """
+    paths = list(paths)
+    found = dict.fromkeys(file for path in paths for file in _files_of(path))
+    logs: dict[Path, _Findings] = {}
+    checks: dict[Path, FileCheck] = {}
+    for path in found:
+        _check(path, logs, checks)
+    newest = max((place for path in found if (place := _place(path))), default=(0, 0))
+    now = dict.fromkeys(file for path in paths for file in _files_of(path))
+    for path in now:
+        if path not in found and (open_path(path) in found or ((place := _place(path)) and place <= newest)):
+            _check(path, logs, checks)
+    for path in logs.keys() - now.keys():
+        del logs[path]
+    _compare_neighbours(logs)
+    checks |= {path: logs[path].check(path, "log", "open" if _is_part(path) else "finished") for path in logs}
+    return [checks[path] for path in now if path in checks]
+
+
+def _check(path: Path, logs: dict[Path, _Findings], checks: dict[Path, FileCheck]) -> None:
+    """Check one file; nothing for one that is not there any more."""
+    try:
+        if path.name == manifest.NAME:
+            checks[path] = _check_manifest(path)
+        elif _is_dump(path):
+            checks[path] = _check_dump(path)
+        else:
+            logs[path] = _check_log(path)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise BadInput(f"{path}: expected a readable file, but: {error.strerror}") from error
+
+
+def _place(path: Path) -> tuple[int, int] | None:
+    """Where a log stands among those of its folder."""
+    name = LogName.of(path)
+    return (name.session, name.part) if name else None
+
+
+def _files_of(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    if (finished := finished_path(path)).is_file():
+        return [finished]
+    if not path.is_dir():
+        raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
+    inside = [path, *inside_of(path)]
+    files = {file for file in inside if file.is_file()
+             and (LogName.of(file) or file.name == manifest.NAME
+                  or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
+    # An export without its manifest cannot be checked: one that is not there is looked for all the same.
+    files |= {folder / manifest.NAME for folder in inside if folder.is_dir() and is_of_export(folder.resolve())}
+    if not files:
+        raise BadInput(f"{path}: expected logs or dumps in this folder, found none")
+    return sorted(files)
+
+
+def _is_part(path: Path) -> bool:
+    return path.suffix == ".part"
+
+
+def _is_dump(path: Path) -> bool:
+    if path.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)):
+        return True
+    with open_regular(path) as file:
+        return file.read(len(_DUMP_START)) == _DUMP_START
+
+
+def _check_log(path: Path) -> _Findings:
+    findings = _Findings()
+    lines = 0
+    sidecar = None if _is_part(path) else _load_sidecar(path, findings)
+    findings.holes = repairs_of(sidecar).holes if sidecar else ()
+    with open_regular(path) as file:
+        for row in scan(file):
+            lines += 1
+            _take_row(findings, row, _is_part(path))
+    empty = not path.stat().st_size
+    if not findings.good and not LogName.of(path) and (lines or empty):
+        raise BadInput(f"{path}:1: expected a segment log or a recorded dump, found no row of one")
+    if not _is_part(path):
+        if empty:
+            findings.wrong("line 1: torn: expected the header line of a segment log")
+        if sidecar is not None:
+            _compare_with_sidecar(sidecar, findings)
+    return findings
+
+
+def _take_row(findings: _Findings, row: Row, is_open: bool) -> None:
+    """Count one row; in an open file a torn one is as it should be."""
+    if row.record is None:
+        findings.damaged_since_last += 1
+        if row.torn:
+            findings.torn += 1
+        else:
+            findings.corrupt += 1
+        if not (row.torn and is_open):
+            findings.wrong(f"line {row.number}: {'torn' if row.torn else 'corrupt'}: {row.problem}")
+        return
+    if row.torn and not is_open:
+        findings.wrong(f"line {row.number}: torn: expected a newline at the end of a finished log")
+    findings.good += 1
+    if findings.last is None:
+        findings.first = row.record
+        findings.damaged_before_first = findings.damaged_since_last
+    else:
+        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}",
+                 findings.holes)
+    findings.last = row.record
+    findings.damaged_since_last = 0
+
+
+def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, damaged: int, place: str,
+             holes: Sequence[Hole]) -> None:
+    """Note a gap between two records that should follow each other, but for as many damaged lines between them and for
+    the holes that repairs have left."""
+    follows = 1 <= after.segment - before.segment <= damaged + 1
+    missing = before.segment + 1, after.segment - 1
+    is_hole = not follows and missing[0] <= missing[1] and are_in_holes(*missing, holes)
+    if is_hole:
+        findings.note(f"{place}: segments {missing[0]} to {missing[1]} were damaged: a repair has left them out")
+    if not (follows or is_hole):
+        findings.gaps += 1
+        findings.wrong(f"{place}: gap: expected segment {before.segment + 1}, found {after.segment}")
+    elif after.t_us < before.t_us:
+        findings.gaps += 1
+        findings.wrong(f"{place}: gap: expected a time not before {before.t_us / US_PER_S:.6f} s, "
+                       f"found {after.t_us / US_PER_S:.6f} s")
+
+
+def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
+    try:
+        sidecar = load_sidecar(path)
+    except ValueError as error:
+        findings.wrong(f"sidecar: {error}")
+        return None
+    except OSError as error:
+        findings.wrong(f"sidecar: expected a readable file ({error.strerror})")
+        return None
+    if sidecar is None:
+        if LogName.of(path):
+            findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
+        return None
+    if sidecar.content.get(SETTINGS_LOST) is True:
+        findings.note("sidecar: settings and clock were lost before a repair")
+    elif not sidecar.is_checked:
+        findings.note("sidecar: not checked: it was written without a checksum")
+    return sidecar.content
+
+
+def _compare_with_sidecar(sidecar: dict[str, Any], findings: _Findings) -> None:
+    said = sidecar.get("log")
+    rows = said.get("rows") if isinstance(said, dict) else None
+    if not isinstance(rows, int):
+        findings.wrong("sidecar: expected the number of rows of a finished log")
+    elif not findings.good <= rows <= findings.good + findings.corrupt + findings.torn:
+        findings.gaps += 1
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of, found {findings.good}")
+
+
+def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
+    """Note rows and files that are missing between the parts of a session; a part without a row may hold a hole."""
+    named = sorted((path.parent, name.session, name.part, not name.finished, path)
+                   for path in logs if (name := LogName.of(path)))
+    for _, session in groupby(named, key=lambda entry: entry[:2]):
+        before: tuple[int, Path] | None = None
+        holes: list[Hole] = []
+        for *_, part, _, path in session:
+            findings = logs[path]
+            holes += findings.holes
+            if findings.last is None or findings.first is None:
+                continue
+            if before is not None and before[0] != part:
+                earlier = logs[before[1]]
+                damaged = earlier.damaged_since_last + findings.damaged_before_first
+                assert earlier.last is not None
+                _compare(findings, earlier.last, findings.first, damaged, f"after {before[1].name}", holes)
+            before, holes = (part, path), list(findings.holes)
+
+
+def _check_dump(path: Path) -> FileCheck:
+    findings = _Findings()
+    if not _is_part(path):
+        _take_events(findings, path)
+        return findings.check(path, "dump", "dump")
+    if _has_begun(path):
+        _take_events(findings, path)
+    else:
+        findings.torn = 1 if path.stat().st_size else 0  # its first block is not whole yet
+    return findings.check(path, "dump", "open")
+
+
+def _has_begun(path: Path) -> bool:
+    """Tell whether the first block of an open recording, or the first line of one that is not packed, is whole."""
+    if path.name.endswith(".gz.part"):
+        return intact_bytes(path) > 0
+    with open_regular(path) as file:
+        return file.readline(LINE_BYTES + 1).endswith(b"\n")
+
+
+def _take_events(findings: _Findings, path: Path) -> None:
+    """Count the events of a dump; in an open one a torn end is as it should be."""
+    heard_us: int | None = None
+    try:
+        with open_dump(path) as reader:
+            for event in reader:
+                findings.good += 1
+                if event.source not in ACCELEROMETERS:
+                    continue
+                if heard_us is not None and event.t_us - heard_us > SILENCE_US:
+                    findings.gaps += 1
+                    findings.note(f"gap: nothing from the accelerometer between {heard_us / US_PER_S:.6f} s "
+                                  f"and {event.t_us / US_PER_S:.6f} s")
+                heard_us = event.t_us
+            if reader.torn_tail:
+                findings.torn = 1
+            if reader.torn_tail and not _is_part(path):
+                findings.wrong("torn: the recording ends in the middle of a line or of its compressed data")
+    except DumpError as error:
+        findings.corrupt = 1
+        findings.wrong(f"corrupt: {str(error).removeprefix(f'{path}:')}")
+
+
+def _check_manifest(path: Path) -> FileCheck:
+    """Compare the files beside a manifest with it: as listed, changed (corrupt), missing or not listed (gaps)."""
+    findings = _Findings()
+    with DirectoryHandle.at(path.parent) as folder:
+        try:
+            with folder.open(manifest.NAME) as file:
+                listed = read_manifest(file.blocks()).files
+        except OSError as error:
+            findings.gaps = 1
+            findings.wrong(f"expected a list of what was exported ({error.strerror}); export again")
+            return findings.check(path, "manifest", "manifest")
+        except ValueError as error:
+            findings.corrupt = 1
+            findings.wrong(f"corrupt: {error}")
+            return findings.check(path, "manifest", "manifest")
+        present = {name for name in folder.each_name() if name in listed or _is_of_ours(name)}
+        for name, digest in listed.items():
+            _compare_with_manifest(findings, folder, name, digest, name in present)
+    for name in sorted(present - set(listed)):
+        findings.gaps += 1
+        findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
+    return findings.check(path, "manifest", "manifest")
+
+
+def _is_of_ours(name: str) -> bool:
+    return LogName.of(Path(name)) is not None or name.endswith(DUMP_ENDINGS)
+
+
+def _compare_with_manifest(findings: _Findings, folder: DirectoryHandle, name: str, digest: str, present: bool) -> None:
+    if not present:
+        findings.gaps += 1
+        findings.wrong(f"{name}: missing")
+        return
+    try:
+        found = folder.sha256(name)
+    except OSError as error:
+        found = str(error.strerror)
+    if found == digest:
+        findings.good += 1
+    else:
+        findings.corrupt += 1
+        findings.wrong(f"{name}: corrupt: expected SHA-256 {digest}, found {found}")

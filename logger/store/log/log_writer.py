@@ -1,0 +1,229 @@
+"""The files of a log: opened, filled, finished, and put right after a power cut.
+
+Problem. The power of a car goes at any instant. Whoever looks into the folder afterwards must find every row that
+had reached the disk, once, and no file that looks finished and is not. The rows written before the first GPS fix
+have no UTC, and a Pi has no clock from which files could take their names.
+
+Solution. Names come from a session number that is never used again: ``<session>-<part>.csv.part`` while open,
+``.csv`` when finished, with a sidecar ``.json`` beside it. A part is only ever appended to. It is finished by a
+rename: of itself, when all of it was synced and nothing in it needs to change, else of a rewritten copy (UTC filled in,
+damaged lines left out) which is on the disk before it takes the name, and only then the part is removed. So at every
+instant there is either the part or the finished file, and ``repair`` at the next start makes the step that was missing.
+Every change to the disk goes through ``FileSystem``, so that tests can cut between any two of them.
+
+What is promised, whatever is cut and wherever (``tests/benchmarks/faults.py`` tries it):
+
+1. A row that ``sync`` returned for is in the folder, once, in every later instant. The service syncs each row within
+   a second of handing it over; a process that is killed loses no row at all that it had handed over.
+2. No damaged row is ever taken for good: a row counts only with its CRC-32.
+3. After the next start every file is finished and beside its sidecar, its rows follow one another without a gap but
+   where the disk itself lost them, and no session number is given twice.
+4. Where the disk refuses (full, failing, read-only), what was on it stays, and rows go on in a part of their own as
+   soon as it takes them: what a failed write or sync left behind is never counted as written.
+
+The disk has to keep its side: what fsync returned for stays, and a rename happens or does not. ext4 as on a Raspberry
+Pi does; FAT does not promise the second, nor that a cut leaves no old content of the disk in a new file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from drivers.disk import FileSystem
+from logger.records import WindowRecord
+from logger.store.log.intact_rows import Tally
+from logger.store.log.log_name import LogName, finished_path
+from logger.store.log.recovery import (
+    Repaired,
+    fill_finished,
+    finish_part,
+    first_segments_later,
+    logs_of_session,
+    remove_part,
+    repair,
+    repair_part,
+    tally_of,
+)
+from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.session_counter import COUNTER_NAME, next_session
+from logger.store.log.sidecar import SIDECAR_BYTES, ClockMap, read_sidecar, store_sidecar
+
+__all__ = [
+    "COUNTER_NAME", "SIDECAR_BYTES", "ClockMap", "FileSystem", "LogName", "Repaired", "SegmentLog", "Tally",
+    "next_session", "read_sidecar", "repair",
+]
+
+CLOCK_STEP_US = 100_000
+"""A clock map that has moved by less than this need not reach the disk before the file is finished."""
+
+
+class SegmentLog:
+    """The log of one session: rows in, files out.
+
+    directory    an existing folder that one service at a time writes to
+    session      a number from ``next_session``
+    sidecar      what a reader needs beside the rows (configuration, versions, scales); plain JSON values
+    max_bytes    a part is finished before a row would make its rows longer than this
+
+    ``path`` is the open part; ``rows_on_disk`` counts the rows that were synced, in all parts. Raises ``OSError`` for
+    what the disk refuses, ``FileExistsError`` also when files of this session are there already. After an ``OSError``
+    the open part is not to be trusted beyond its synced rows: ``go_on`` begins another, in which the rows that were
+    not synced have to be written again, and ``finish_left`` finishes the one that was left.
+    """
+
+    path: Path
+    _tally: Tally
+    _bytes: int
+
+    def __init__(self, directory: Path, session: int, sidecar: dict[str, Any], max_bytes: int,
+                 files: FileSystem | None = None) -> None:
+        self._directory = directory
+        self.session = session
+        self._given = sidecar
+        self._max_bytes = max_bytes
+        self._files = files or FileSystem()
+        self._clock: ClockMap | None = None
+        self._stored_clock: ClockMap | None = None
+        self._without_utc: list[tuple[Path, Tally]] = []
+        self._left: list[Path] = []
+        self._is_retry = False  # the part was opened by ``go_on``, and nothing in it has been synced yet
+        self._part = 0
+        self._descriptor: int | None = None
+        self._dirty = False
+        self._rows_synced = 0
+        self.rows_on_disk = 0
+        self._open_next()
+
+    def append(self, record: WindowRecord) -> None:
+        """Write one row. It is handed to the system at once and is safe from a power cut after ``sync``."""
+        row = f"{format_row(record)}\n".encode()
+        if self._bytes and self._bytes + len(row) > self._max_bytes:
+            self.rotate()
+        self._dirty = True
+        self._do(self._files.write, row)
+        self._bytes += len(row)
+        self._tally = replace(self._tally, rows=self._tally.rows + 1,
+                              unset=self._tally.unset + (record.utc_us is None))
+
+    def sync(self) -> None:
+        """Wait until all rows are on the disk."""
+        if self._dirty:
+            self._do(self._files.sync)
+            self._dirty = self._is_retry = False
+            self.rows_on_disk += self._tally.rows - self._rows_synced
+            self._rows_synced = self._tally.rows
+
+    def rotate(self) -> None:
+        """Finish the part and open the next; a part without rows stays open."""
+        if self._tally.rows:
+            self._finish()
+            self._open_next()
+
+    def set_clock_map(self, clock: ClockMap) -> None:
+        """Tell the session's UTC, or a better one. Rows written without it get it when their file is finished;
+        in files that are finished already they get it now."""
+        self._clock = clock
+        if self._stored_clock is None or abs(clock.offset_us - self._stored_clock.offset_us) >= CLOCK_STEP_US:
+            self._write_sidecar("open")
+        self._fill_earlier()
+
+    def go_on(self, unsynced: Iterable[WindowRecord]) -> None:
+        """After an ``OSError``: leave the part as it stands, open the next, and put the rows there that were not
+        synced. A part that was opened here and has taken no row is begun anew: a disk that refuses for a day leaves
+        no more files than one that refuses once. Raises ``OSError``: not yet."""
+        self._let_go()
+        if self._is_retry:
+            self._part -= 1
+        self._is_retry = True
+        self._open_next()
+        for record in unsynced:
+            self.append(record)
+        self.sync()
+
+    @property
+    def is_behind(self) -> bool:
+        """True while there is something for ``finish_left`` to do."""
+        return bool(self._left or (self._without_utc and self._clock is not None))
+
+    def finish_left(self) -> None:
+        """Finish one of the parts that were left. Raises ``OSError``: not yet; else ``repair`` does it one day."""
+        if self._left:
+            part = self._left[0]
+            finished: Path | None = finished_path(part)
+            if part.exists():
+                limit = first_segments_later(self._files, logs_of_session(part))[part]
+                finished = repair_part(self._files, part, limit, self._clock).finished
+            if finished is not None and finished.exists():
+                self._without_utc.append((finished, tally_of(self._files, finished)))
+            self._left.pop(0)
+        self._fill_earlier()
+
+    def close(self) -> None:
+        """Finish the last part, or remove it when it has no rows, and what was left as far as the disk lets us.
+        Closing twice does nothing."""
+        if self._descriptor is None:
+            return
+        with suppress(OSError):
+            while self.is_behind:
+                self.finish_left()
+        if self._tally.rows:
+            self._finish()
+        else:
+            self._close_file()
+            remove_part(self._files, self.path)
+
+    def _open_next(self) -> None:
+        self._part += 1
+        self.path = self._directory / f"{self.session:05d}-{self._part:03d}.csv.part"
+        for taken in (self.path, finished_path(self.path)):
+            if taken.exists() and not self._is_retry:
+                raise FileExistsError(f"{taken}: this session has been logged before")
+        self._tally = Tally()
+        self._bytes = 0
+        self._rows_synced = 0
+        self._descriptor = self._files.create(self.path)
+        self._files.write(self._descriptor, f"{HEADER}\n".encode())
+        self._dirty = True
+        self._write_sidecar("open")
+
+    def _finish(self) -> None:
+        self.sync()
+        self._close_file()
+        finished = finish_part(self._files, self.path, self._given, self._tally, self._clock)
+        if self._clock is None and self._tally.unset:
+            self._without_utc.append((finished, self._tally))
+
+    def _fill_earlier(self) -> None:
+        while self._clock is not None and self._without_utc:
+            fill_finished(self._files, *self._without_utc[0], self._clock)
+            self._without_utc.pop(0)
+
+    def _let_go(self) -> None:
+        if not self._is_retry and self.path not in self._left:
+            self._left.append(self.path)
+        with suppress(OSError):
+            self._close_file()
+
+    def _close_file(self) -> None:
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            self._files.close(descriptor)
+
+    def _do(self, act: Callable[..., None], *what: bytes) -> None:
+        """Write to or sync the part. One that failed at it is never tried again: the system may by then have thrown
+        away what it could not write, and tell of success."""
+        if self._descriptor is None:
+            raise ValueError("expected an open log: go_on() after an error, and nothing after close()")
+        try:
+            act(self._descriptor, *what)
+        except OSError:
+            self._let_go()
+            raise
+
+    def _write_sidecar(self, state: str) -> None:
+        store_sidecar(self._files, self.path, self._given, state, self._tally, self._clock)
+        self._stored_clock = self._clock

@@ -1,0 +1,324 @@
+"""A folder of logs put right after a cut of the power: each open part is finished, and no row is lost or repeated."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from drivers.disk import FileSystem
+from logger.records import WindowRecord
+from logger.store.log.atomic_file import name_of_temporary, replace_file, write_temporary
+from logger.store.log.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
+from logger.store.log.log_name import LogName, OwnFile, finished_path, open_path, sidecar_path
+from logger.store.log.quarantine import (
+    Warn,
+    disk_words,
+    file_words,
+    is_file,
+    is_taken,
+    set_aside,
+    set_aside_if_possible,
+    warn_in_journal,
+)
+from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.session_counter import COUNTER
+from logger.store.log.sidecar import (
+    SETTINGS_LOST,
+    UNCHECKED,
+    ClockMap,
+    clock_of,
+    load_sidecar,
+    read_sidecar,
+    repairs_of,
+    sidecar_or_nothing,
+    store_sidecar,
+)
+
+_BLOCK_ROWS = 256
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What became of a part that was found open: the finished file, or None when it held no row.
+
+    problem    why the disk did not let it be finished; it is left as it is until the next repair
+    """
+
+    part: Path
+    finished: Path | None
+    tally: Tally
+    problem: str = ""
+
+    @property
+    def words(self) -> str:
+        """What was done, in a sentence."""
+        if self.problem:
+            return f"{self.part.name} could not be repaired: {self.problem}"
+        damaged = _counted(self.tally.damaged_lines, "damaged line") + " and a torn one" * self.tally.torn_tail
+        if self.finished is None:
+            return f"removed {self.part.name}: no intact row, {damaged}"
+        return f"finished {self.finished.name}: {_counted(self.tally.rows, 'row')}; left out {damaged}"
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> list[Repaired]:
+    """Put the folder right after a service that was killed: finish its parts, in order of their names.
+
+    Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
+    session had learnt it. Repairing twice does nothing more. Must not run while a service writes to the folder.
+    A part on which the disk fails does not keep the others from being finished. Raises ``OSError`` for the folder.
+    """
+    files = files or FileSystem()
+    for path in list(directory.iterdir()):
+        _clear(files, path, warn)
+    sessions: dict[int, list[Path]] = defaultdict(list)
+    for path in directory.iterdir():
+        if (name := LogName.of(path)) and is_file(path):
+            sessions[name.session].append(path)
+    done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
+    for sidecar in list(directory.glob("*.json")):
+        log = sidecar.with_suffix(".csv")
+        if LogName.of(log) and not is_taken(log) and not is_taken(open_path(log)):
+            _remove_lone(files, sidecar, warn)
+    return done
+
+
+def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
+    """Remove a temporary file that a cut has left. What has the name of a log, a sidecar or such a file and is none is
+    put aside."""
+    whole_name = name_of_temporary(path) or path.name
+    is_temporary = whole_name != path.name
+    own = OwnFile.of(whole_name)
+    if not ((own is not None and own.kind in (".csv", ".json")) or (is_temporary and COUNTER.fullmatch(whole_name))):
+        return
+    why = "" if is_file(path) else "not a file"
+    if is_temporary:
+        try:
+            files.remove(path)
+        except OSError as error:
+            why = disk_words(error)
+        else:
+            return
+    if why:
+        set_aside_if_possible(files, path, why, warn)
+
+
+def _remove_lone(files: FileSystem, sidecar: Path, warn: Warn) -> None:
+    """Remove the sidecar of a part that had not yet got its name. That of a finished log which somebody took away
+    stays."""
+    try:
+        said = (read_sidecar(sidecar, files) or {}).get("log")
+        if isinstance(said, dict) and said.get("state") == "open":
+            files.remove(sidecar)
+    except (ValueError, OSError) as error:
+        set_aside_if_possible(files, sidecar, disk_words(error) if isinstance(error, OSError) else str(error), warn)
+
+
+def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list[Repaired]:
+    """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
+    which knows one; finished files get it first, for it is lost with the last part."""
+    parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
+    clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part, files))) is not None]
+    clock = clocks[-1] if clocks else None
+    try:
+        for finished in sorted(set(logs).difference(parts)):
+            if clock is not None and _may_lack_utc(files, finished):
+                _fill_if_readable(files, finished, clock, warn)
+    except OSError as error:
+        return [Repaired(part, None, Tally(), file_words(error)) for part in parts]
+    later = first_segments_later(files, logs) if parts else {}
+    done = []
+    for part in parts:
+        try:
+            done.append(repair_part(files, part, later[part], clock, warn))
+        except OSError as error:
+            done.append(Repaired(part, None, Tally(), file_words(error)))
+    return done
+
+
+def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: Warn) -> None:
+    """Give a finished file its UTC; one that cannot be read does not get it, and keeps no other from being finished."""
+    try:
+        tally = tally_of(files, finished)
+    except OSError as error:
+        warn(f"{finished.name}: {disk_words(error)}; its rows get no UTC")
+    else:
+        fill_finished(files, finished, tally, clock, warn)
+
+
+def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
+                warn: Warn = warn_in_journal) -> Repaired:
+    """Finish one part, but for its rows of segments from ``limit`` on. A finished file of the same name is merged."""
+    finished = finished_path(part)
+    logs = (finished, part) if is_taken(finished) else (part,)
+    found = IntactRows(files, logs, limit)
+    tally = take_tally(found)
+    if len(logs) > 1 and not (found.only_in_last or tally.contradictions or _is_damaged(files, finished)):
+        # The cut came between the rename and the removal. After a mere kill the rename may not be on the disk yet, and
+        # the removal must not come there before it.
+        files.sync_directory(part.parent)
+        files.remove(part)
+        files.sync_directory(part.parent)
+    elif tally.rows or len(logs) > 1 or _explains_a_gap(files, part, tally, limit):
+        _finish_copy(files, part, logs, _facts_of(files, part, warn), tally, clock, limit)
+        if tally.contradictions:
+            set_aside(files, part, f"{tally.contradictions} of its rows are others than those in {finished.name}", warn)
+        else:
+            files.remove(part)
+            files.sync_directory(part.parent)
+    else:
+        remove_part(files, part)
+        return Repaired(part, None, tally)
+    return Repaired(part, finished, tally)
+
+
+def _is_damaged(files: FileSystem, finished: Path) -> bool:
+    found = IntactRows(files, (finished,))
+    tally = take_tally(found)
+    return bool(tally.damaged_lines or tally.torn_tail)
+
+
+def _explains_a_gap(files: FileSystem, part: Path, tally: Tally, limit: int | None) -> bool:
+    """True for a part without an intact row where rows are missing between the parts around it, so that a file has to
+    stay that says why."""
+    if limit is None or not tally.damaged_rows:
+        return False
+    earlier = sorted((log for log in logs_of_session(part) if _place(log) < _place(part)), key=_place, reverse=True)
+    for log in earlier:
+        last = None
+        for row in IntactRows(files, (log,)):
+            last = row.record.segment
+        if last is not None:
+            return last + 1 < limit
+    return False
+
+
+def logs_of_session(log: Path) -> list[Path]:
+    """All files of the session that a log belongs to, open or finished, in no order."""
+    name = LogName.of(log)
+    return [path for path in log.parent.iterdir()
+            if (other := LogName.of(path)) and name and other.session == name.session]
+
+
+def first_segments_later(files: FileSystem, logs: Iterable[Path]) -> dict[Path, int | None]:
+    """For each file of a session the first segment that later parts hold. Rows from there on were written again: the
+    disk had failed, and what it kept of them in this part is not to be trusted. Each file is opened once."""
+    found: dict[Path, int | None] = {}
+    part = limit = upcoming = None
+    for log in sorted(logs, key=_place, reverse=True):
+        if _place(log)[0] != part:
+            part, limit = _place(log)[0], upcoming
+        found[log] = limit
+        with suppress(OSError):  # what nobody can read is not there twice either
+            upcoming = next((row.record.segment for row in IntactRows(files, (log,))), upcoming)
+    return found
+
+
+def _place(log: Path) -> tuple[int, Path]:
+    """Number of the part, then a finished file before an open one; by this the files of a session are in order."""
+    name = LogName.of(log)
+    return (name.part if name else 0), log
+
+
+def _may_lack_utc(files: FileSystem, finished: Path) -> bool:
+    """False where the sidecar says that no row does."""
+    said = sidecar_or_nothing(finished, files).get("log")
+    return not isinstance(said, dict) or said.get("rows_without_utc") != 0
+
+
+def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None) -> Path:
+    """Turn a part that was written whole and synced into the finished file."""
+    if clock is not None and tally.unset:
+        finished = _finish_copy(files, part, (part,), given, tally, clock, None)
+        files.remove(part)
+    else:
+        finished = finished_path(part)
+        store_sidecar(files, part, given, "finished", tally, clock)
+        files.rename(part, finished)
+    files.sync_directory(part.parent)
+    return finished
+
+
+def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
+    """What a new sidecar of a log takes over from its old one. One that is damaged or cannot be read is put aside."""
+    try:
+        sidecar = load_sidecar(log, files)
+    except ValueError as error:
+        why = f"damaged: {error}"
+    except OSError as error:
+        why = disk_words(error)
+    else:
+        if sidecar is None:
+            return {SETTINGS_LOST: True}
+        return sidecar.content if sidecar.is_checked else sidecar.content | {UNCHECKED: True}
+    set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock", warn)
+    return {SETTINGS_LOST: True}
+
+
+def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: Tally,
+                 clock: ClockMap | None, limit: int | None) -> Path:
+    """Put the intact rows of a part, or of the part and the finished file that is there, into a finished file; the part
+    is still there. They are written anew: of a part that was found open nobody knows whether the disk holds what the
+    system shows."""
+    finished = finished_path(part)
+    filled = tally if clock is None else replace(tally, unset=0)
+    if limit is not None and not tally.rows:
+        filled = replace(filled, holes=(Hole(limit - tally.damaged_rows, limit - 1),))
+    temporary = write_temporary(files, finished, _lines(IntactRows(files, logs, limit), clock))
+    store_sidecar(files, part, given, "finished", filled, clock)
+    files.rename(temporary, finished)
+    files.sync_directory(part.parent)
+    return finished
+
+
+def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None,
+                  warn: Warn = warn_in_journal) -> None:
+    """Give UTC to the rows of a finished file that have none. What earlier repairs left out of it is still known."""
+    if clock is None or not tally.unset:
+        return
+    given = _facts_of(files, finished, warn)
+    before = repairs_of(given)
+    replace_file(files, finished, _lines(IntactRows(files, (finished,)), clock))
+    store_sidecar(files, finished, given, "finished", replace(
+        tally, unset=0, damaged_lines=tally.damaged_lines + before.damaged_lines,
+        torn_tail=tally.torn_tail or before.torn_tail, holes=before.holes + tally.holes), clock)
+
+
+def tally_of(files: FileSystem, log: Path) -> Tally:
+    """Count what one file holds. Raises ``OSError``."""
+    return take_tally(IntactRows(files, (log,)))
+
+
+def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]:
+    """The text of a log with these rows, UTC filled in, in blocks."""
+    lines = [HEADER]
+    for row in rows:
+        lines.append(row.text if clock is None or row.record.utc_us is not None
+                     else format_row(_with_utc(row.record, clock)))
+        if len(lines) >= _BLOCK_ROWS:
+            yield _joined(lines)
+            lines.clear()
+    yield _joined(lines)
+
+
+def _joined(lines: list[str]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def _with_utc(record: WindowRecord, clock: ClockMap) -> WindowRecord:
+    return replace(without_utc(record), utc_us=record.t_us + clock.offset_us)
+
+
+def remove_part(files: FileSystem, part: Path) -> None:
+    """Remove a part that has no rows. Its sidecar goes first, so that none is ever left alone."""
+    files.remove(sidecar_path(part))
+    files.sync_directory(part.parent)
+    files.remove(part)
+    files.sync_directory(part.parent)

@@ -1,0 +1,68 @@
+"""ridelog in Python: read, simulate, compare, diagnose, identify, estimate.
+
+    import ridelog
+
+    road = ridelog.random_road(iso_class="C", length_m=300.0)
+    car = ridelog.read_vehicle("rav4-2009")
+    run = ridelog.simulate(car, road, speed_mps=12.0, noise_mps2=0.05)
+    print(ridelog.estimate(run, car))
+
+Quantities are in SI units, which their names end in. What is wrong with an input is raised as ``BadInput``.
+``docs/notebook.md`` goes through the lab.
+"""
+
+from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
+from logger.api.identification import Identification, identify
+from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Number, add_effect, compare, diagnose
+from logger.api.logs import Dump, Log, Samples, read_dump, read_log
+from logger.api.rides import Comfort, Record, comfort, read_record
+from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
+from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
+from logger.errors import BadInput
+from logger.identification.identifiability import NotIdentifiable
+
+__all__ = [
+    "AddedEffect",
+    "BadInput",
+    "Candidate",
+    "Comfort",
+    "Comparison",
+    "Diagnosis",
+    "Dump",
+    "EffectInfo",
+    "Effects",
+    "Estimate",
+    "Identification",
+    "Iri",
+    "Log",
+    "Model",
+    "NotIdentifiable",
+    "Number",
+    "Profile",
+    "Record",
+    "RoadClass",
+    "Run",
+    "Samples",
+    "add_effect",
+    "classify",
+    "comfort",
+    "compare",
+    "diagnose",
+    "effects",
+    "estimate",
+    "identify",
+    "iri",
+    "make_run",
+    "random_road",
+    "read_dump",
+    "read_log",
+    "read_profile",
+    "read_record",
+    "read_run",
+    "read_vehicle",
+    "simulate",
+    "vehicles",
+    "write_profile",
+    "write_run",
+    "write_vehicle",
+]

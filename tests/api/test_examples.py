@@ -1,0 +1,128 @@
+"""The examples of the public interface, run as they stand."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import json
+import pkgutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import logger.api
+import ridelog
+
+MODULES = [importlib.import_module(f"logger.api.{one.name}") for one in pkgutil.iter_modules(logger.api.__path__)]
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[str, Any]:
+    """What the examples take for given: a run's folder, with a log in it; a recorded dump; a car, and runs of it with a
+    sensor that reads 15 % too much."""
+    from logger.commands.main import main
+
+    folder = tmp_path_factory.mktemp("run")
+    road = ridelog.random_road(iso_class="B", length_m=200.0, spacing_m=0.1, seed=4)
+    run = ridelog.simulate("rav4-2009", road, speed_mps=20.0, noise_mps2=0.05)
+    ridelog.write_run(folder, run)
+    assert main(["replay", str(short_dump), "--out", str(folder / "logs"), "--json"]) == 0
+    car, bumpy = ridelog.read_vehicle("rav4-2009"), ridelog.random_road(iso_class="C", length_m=180.0, seed=2)
+    wrong = car.with_effect("sensor_gain", gain=1.15)
+    runs = [ridelog.simulate(wrong, bumpy, speed_mps, noise_mps2=0.03, name=f"at {speed_mps:g} mps")
+            for speed_mps in (9.0, 15.0)]
+    return {"folder": folder, "recording": short_dump, "car": car, "runs": runs, "np": np, **vars(ridelog)}
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
+def test_examples(module: ModuleType, names: dict[str, Any]) -> None:
+    found = doctest.testmod(module, extraglobs=names, optionflags=doctest.ELLIPSIS)
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("name", [name for name in ridelog.__all__ if callable(getattr(ridelog, name))])
+def test_each_name_is_documented(name: str) -> None:
+    one = getattr(ridelog, name)
+    assert one.__doc__
+    assert isinstance(one, type) or ">>>" in one.__doc__
+
+
+def test_importing_it_loads_nothing_that_takes_long_and_prints_nothing() -> None:
+    code = "import ridelog, sys; raise SystemExit(len({'scipy', 'numba'} & set(sys.modules)))"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (told.returncode, told.stdout, told.stderr) == (0, "", "")
+    assert set(ridelog.__all__) <= set(dir(ridelog))
+
+
+def test_what_is_wrong_is_one_line_and_nothing_is_printed(
+    names: dict[str, Any], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    car, run = names["car"], names["runs"][0]
+    bare = ridelog.make_run(run.accel_z_mps2, run.speed_mps, rate_hz=100.0, name="bare")
+    (tmp_path / "wrong.csv").write_text("nothing\n", "ascii")
+    asked: list[Callable[[], object]] = [
+        lambda: ridelog.read_vehicle("nobody"), lambda: ridelog.read_run(tmp_path), lambda: ridelog.read_log(tmp_path),
+        lambda: ridelog.read_dump(tmp_path / "wrong.csv"), lambda: ridelog.read_profile(tmp_path / "wrong.csv"),
+        lambda: ridelog.comfort(run, "wz"), lambda: ridelog.iri(run.profile, window_m=0.0),
+        lambda: ridelog.random_road(iso_class="Z"), lambda: ridelog.simulate(car, run.profile, 1000.0),
+        lambda: ridelog.estimate(run, car.with_effect("wheel_lift")),
+        lambda: car.with_effect("dry_friction", friction_force_n=-1.0),
+        lambda: ridelog.compare(car, [run, run]), lambda: ridelog.compare(car, bare),
+        lambda: ridelog.compare(car, []), lambda: car.with_numbers({"mass": 1.0}),
+        lambda: ridelog.compare(car, run, tolerance=2.0),
+        lambda: ridelog.diagnose(car, run, candidates=["magic"]),
+        lambda: ridelog.add_effect("payload", car.with_effect("payload"), run),
+    ]
+    for ask in asked:
+        with pytest.raises(ridelog.BadInput) as refused:
+            ask()
+        assert "\n" not in str(refused.value) and "expected" in str(refused.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_was_written_is_read_back(names: dict[str, Any], tmp_path: Path) -> None:
+    run = names["runs"][0]
+    ridelog.write_run(tmp_path, run)
+    again = ridelog.read_run(tmp_path)
+    np.testing.assert_allclose(again.accel_z_mps2, run.accel_z_mps2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(again.profile.elevation_m, run.profile.elevation_m, atol=1e-7)
+    car = names["car"].with_effect("dry_friction", friction_force_n=33.0)
+    ridelog.write_vehicle(tmp_path / "car.yaml", car)
+    assert repr(ridelog.read_vehicle(tmp_path / "car.yaml")) == repr(car)
+
+
+def test_each_record_shows_itself(names: dict[str, Any]) -> None:
+    run, folder = names["runs"][0], names["folder"]
+    shown = [run, run.profile, names["car"], ridelog.iri(run.profile), ridelog.estimate(run, "rav4-2009"),
+             ridelog.comfort(run), ridelog.read_log(folder), ridelog.read_dump(names["recording"]),
+             ridelog.effects(), ridelog.effects()["roll"], ridelog.compare(names["car"], names["runs"])]
+    for one in shown:
+        assert 2 <= len(repr(one).splitlines()) <= 60
+        html = one._repr_html_()
+        assert html.startswith('<div class="ridelog"') and html.count("<svg") == len(one.charts())
+    assert sum(len(one.charts()) for one in shown) >= 6
+
+
+@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare"])
+def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    from logger.commands.main import main
+
+    folder = names["folder"]
+    file = {"iri": folder / "profile.csv", "comfort": folder / "drive.csv"}.get(command, folder)
+    more = {"iri": [], "comfort": [], "identify": ["--vehicle", "rav4-2009", "--free", "sprung_mass_kg"]}.get(
+        command, ["--vehicle", "rav4-2009"])
+    assert main([command, str(file), *more, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = {"iri": lambda: ridelog.iri(file), "comfort": lambda: ridelog.comfort(file),
+             "estimate": lambda: ridelog.estimate(file, "rav4-2009"),
+             "identify": lambda: ridelog.identify("rav4-2009", file, ["sprung_mass_kg"]),
+             "compare": lambda: ridelog.compare("rav4-2009", file)}[command]()
+    assert json.loads(json.dumps(found.as_json())) == printed
+    assert main([command, str(file), *more]) == 0
+    assert capsys.readouterr().out.rstrip() == repr(found).rstrip()

@@ -1,0 +1,1 @@
+"""What ridelog promises in figures, each measured by a program: ``python -m tests.benchmarks.NAME``."""

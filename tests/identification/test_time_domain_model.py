@@ -1,0 +1,177 @@
+"""Cars with effects: against the exact model where the car is linear, and against Newton's laws where it rubs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.identifiability import TOGETHER, NotIdentifiable
+from logger.identification.noise_models import White
+from logger.identification.obstacle_paths import Bump
+from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.time_domain_model import SimulatedModel
+from logger.identification.unknown_inputs import RoadInput, free_input, is_input
+from logger.profiles.track import Track
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect_parameters import free_number, move_named
+from logger.vehicle.named_parameters import free
+
+from ..support.drives.bumps import bump_record, road_record
+from ..support.drives.rubbing import CAR, FRICTION_N, GROWN_AT_MPS, rubbing_run
+
+Array = npt.NDArray[np.float64]
+
+EFFECTS = shipped_effects()
+MASS, FRICTION = "sprung_mass_kg", "dry_friction.friction_force_n"
+FLAT = Track(1.0, np.zeros(2))
+
+
+def effect(name: str, **values: float) -> Chosen:
+    return chosen(EFFECTS[name], values)
+
+
+def rubbing(friction_n: float, grown_at_mps: float = 0.0) -> Chosen:
+    return effect("dry_friction", friction_force_n=friction_n, transition_velocity_m_per_s=grown_at_mps)
+
+
+def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], road: RoadInput | None = None
+          ) -> SimulatedModel:
+    road = road or RoadInput()
+    numbers = []
+    for name, start in starts.items():
+        move = move_named(effects, name)
+        if is_input(name):
+            numbers.append(free_input(road, name, start))
+        else:
+            numbers.append(free(CAR, name, start) if move is None else free_number(effects, move, start))
+    return SimulatedModel(CAR, numbers, records, road, effects)
+
+
+def found(*asked: object) -> Fit:
+    made = model(*asked)  # type: ignore[arg-type]
+    return fit(made, made.measured, Options(noise=[White()], starts=made.trials()))
+
+
+def off(result: Fit, truth: dict[str, float]) -> Array:
+    """Errors in standard errors."""
+    return np.array([(result.parameters[name] - value) / result.standard_errors[name]
+                     for name, value in truth.items()])
+
+
+def recorded(run: Run, effects: list[Chosen], noise_mps2: float = 0.05, seed: int = 0) -> Run:
+    """The run as this car with effects would have recorded it."""
+    clean = SimulatedRuns([run]).predict(compose(CAR, effects))[0]
+    return replace(run, measured_mps2=clean + noise_mps2 * np.random.default_rng(seed).standard_normal(run.count))
+
+
+def test_a_linear_car_does_as_the_exact_model_says() -> None:
+    record = road_record(CAR, 12.0, 14.0, 3)
+    starts = {name: free(CAR, name).start for name in
+              (MASS, "front.suspension_damping_n_s_per_m", "rear.tire_stiffness_n_per_m", "contact_patch_m")}
+    simulated = model([record], [effect("payload", mass_kg=0.0)], starts)
+    exact = VehicleModel(CAR, simulated.parameters, [record])
+    values = np.array(list(starts.values()))
+    (here, slopes), (expected, expected_slopes) = simulated.linearised(values), exact.linearised(values)
+    assert np.std(here[0] - expected[0]) < 1e-5 * np.std(expected[0])
+    assert (np.std(slopes[0] - expected_slopes[0], axis=0) < 0.01 * np.std(expected_slopes[0], axis=0)).all()
+
+
+@pytest.fixture(scope="module")
+def errors() -> Array:
+    """Of mass and friction, in standard errors, over draws of the sensor's noise on one drive by Newton's laws."""
+    truth = {MASS: CAR.sprung_mass_kg, FRICTION: FRICTION_N}
+    there, starts = [rubbing(60.0, GROWN_AT_MPS)], {MASS: 800.0, FRICTION: 60.0}
+    return np.array([off(found([rubbing_run(seed)], there, starts), truth) for seed in range(10)])
+
+
+def test_mass_and_friction_are_found_on_a_drive_by_newtons_laws(errors: Array) -> None:
+    print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
+    assert np.abs(errors).max() < 3.0
+
+
+def test_their_standard_errors_are_honest(errors: Array) -> None:
+    assert 0.7 < np.sqrt((errors**2).mean()) < 1.4
+
+
+def test_friction_from_none_at_all() -> None:
+    run = recorded(road_record(CAR, 15.0, 12.0, 1, gd_n0_cm3=16.0), [rubbing(80.0)])
+    assert np.abs(off(found([run], [rubbing(0.0)], {FRICTION: 0.0}), {FRICTION: 80.0})).max() < 3.0
+
+
+def test_a_bump_of_which_only_the_kind_is_known_beside_friction() -> None:
+    truth = {MASS: 875.0, FRICTION: 100.0, "bump.height_m": 0.08, "bump.start_m": 12.0}
+    run = recorded(bump_record(CAR, 8.0, height_m=0.08, start_m=12.0), [rubbing(100.0)])
+    run = replace(run, track=FLAT, skip_s=2.0)
+    road = RoadInput(bump=Bump(12.3, 0.07, 2.6))
+    starts = {MASS: 800.0, FRICTION: 60.0, "bump.height_m": 0.07, "bump.start_m": 12.3}
+    assert np.abs(off(found([run], [rubbing(60.0)], starts, road), truth)).max() < 3.0
+
+
+def test_a_speed_that_is_recorded_too_large() -> None:
+    run = recorded(road_record(CAR, 12.0, 14.0, 5), [effect("sensor_gain", gain=1.1)])
+    run = replace(run, distance_m=1.004 * run.distance_m, speed_mps=1.004 * run.speed_mps)
+    starts = {"sensor_gain.gain": 1.0, "speed_scale": 1.0}
+    result = found([run], [effect("sensor_gain", gain=1.0)], starts)
+    assert np.abs(off(result, {"sensor_gain.gain": 1.1, "speed_scale": 1.004})).max() < 3.5
+
+
+def test_several_effects_at_once() -> None:
+    there = [effect("sensor_bandwidth", cutoff_hz=20.0), effect("time_offset", delay_s=0.012), rubbing(70.0)]
+    run = recorded(road_record(CAR, 15.0, 12.0, 2, gd_n0_cm3=16.0), there)
+    starts = {"sensor_bandwidth.cutoff_hz": 30.0, "time_offset.delay_s": 0.0, FRICTION: 60.0}
+    truth = {"sensor_bandwidth.cutoff_hz": 20.0, "time_offset.delay_s": 0.012, FRICTION: 70.0}
+    assert np.abs(off(found([run], there, starts), truth)).max() < 3.0
+
+
+def test_a_load_and_the_mass_can_be_told_only_together() -> None:
+    load = effect("payload", mass_kg=50.0)
+    run = recorded(road_record(CAR, 12.0, 14.0, 3), [load])
+    with pytest.raises(NotIdentifiable) as refused:
+        found([run], [load], {MASS: 875.0, "payload.mass_kg": 50.0})
+    (finding,) = refused.value.findings
+    assert finding.kind == TOGETHER
+    assert {MASS, "payload.mass_kg"} == set(finding.direction)
+
+
+def test_friction_that_the_noise_hides_is_refused() -> None:
+    run = recorded(road_record(CAR, 12.0, 14.0, 3, gd_n0_cm3=256.0), [rubbing(20.0)], noise_mps2=2.0)
+    with pytest.raises(NotIdentifiable, match=FRICTION):
+        found([run], [rubbing(20.0)], {FRICTION: 20.0})
+
+
+def test_noise_that_roads_make_is_that_of_the_car_with_its_effects() -> None:
+    run, f_hz = road_record(CAR, 12.0, 14.0, 3), np.linspace(0.5, 30.0, 60)
+    models = [model([run], [effect("sensor_gain", gain=gain)], {MASS: 875.0}) for gain in (1.0, 0.5)]
+    plain, half = (one.road_spectra(np.array([875.0]), f_hz)[0] for one in models)
+    assert half == pytest.approx(0.25 * plain)
+
+
+@pytest.mark.parametrize(("name", "message"), [
+    ("dry_friction.force", "expected dry_friction.friction_force_n, dry_friction.transition_velocity_m_per_s"),
+    ("sensor_bandwidth.order", "expected sensor_bandwidth.cutoff_hz"),
+    ("wheel_lift.height_m", "expected none of it"),
+])
+def test_numbers_that_effects_do_not_have(name: str, message: str) -> None:
+    there = [rubbing(60.0), effect("sensor_bandwidth", cutoff_hz=30.0), effect("wheel_lift")]
+    with pytest.raises(ValueError, match=message):
+        move_named(there, name)
+
+
+def test_a_number_stays_within_what_it_may_be() -> None:
+    there = [rubbing(60.0)]
+    move = move_named(there, FRICTION)
+    assert move is not None
+    number = free_number(there, move)
+    assert (number.start, number.low, number.high, number.by_factors) == (60.0, 0.0, 2000.0, False)
+    with pytest.raises(ValueError, match="expected bounds within 0 to 2000"):
+        free_number(there, move, 60.0, (-10.0, 100.0))
+    with pytest.raises(ValueError, match="expected a start between its bounds"):
+        free_number(there, move, 2500.0)

@@ -1,0 +1,1 @@
+"""Drives, simulated or made up, and what is needed to replay them."""

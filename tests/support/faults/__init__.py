@@ -1,0 +1,1 @@
+"""Faults that a logger meets in a car, and their trials."""

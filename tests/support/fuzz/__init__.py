@@ -1,0 +1,1 @@
+"""Damaged and huge input for every reader."""

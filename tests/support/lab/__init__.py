@@ -1,0 +1,1 @@
+"""Runs for the tests of the lab and of its commands."""

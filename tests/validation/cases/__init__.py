@@ -1,0 +1,1 @@
+"""Random cases, each made from its kind and seed alone, and their files."""

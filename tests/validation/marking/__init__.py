@@ -1,0 +1,1 @@
+"""A case put before the lab, and what it says, marked."""

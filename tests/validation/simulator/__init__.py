@@ -1,0 +1,1 @@
+"""Cars, roads, effects and the recorder, from Newton's laws alone."""

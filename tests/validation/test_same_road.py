@@ -1,0 +1,51 @@
+"""The lab without a profile on cases of the examination: what is missing is found, and what is not is not."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from logger.commands.diagnose_same_road import run_same_road
+from logger.errors import BadInput
+
+from .cases.case_files import write_case
+from .cases.same_road import same_road_case
+
+
+def told_of(seed: int, effect: str | None, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    write_case(same_road_case(seed, effect, length_m=110.0, speeds_mps=(9.0, 15.0)), folder)
+    for profile in folder.glob("run*/profile.csv"):
+        profile.unlink()
+    assert run_same_road(asked(folder, json=True)) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def asked(folder: Path, **more: object) -> Namespace:
+    given = {"vehicle": str(folder / "vehicle.yaml"), "runs": sorted(folder.glob("run*")), "tolerance": 0.04,
+             "effect_file": [], "json": False, "all": False, "out": None}
+    return Namespace(**given | more)
+
+
+def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = told_of(1, "sensor_mount_resonance", tmp_path, capsys)
+    first = next(one for one in told["candidates"] if one["effect"] == told["verdict"][0])
+    assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
+    assert told["steps"][-1]["error"] < told["steps"][1]["error"] < told["baseline_error"]
+    assert {"sensor_gain", "tire_enveloping"} <= told["taken_by_road"].keys()
+    assert {"dry_friction", "speed_scale", "roll"} <= told["not_tried"].keys()
+    assert any("share one scale" in one or "only together" in one for one in told["sentences"])
+
+
+def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = told_of(2, None, tmp_path, capsys)
+    assert told["verdict"] == []
+    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= told["candidates"][0].keys()
+
+
+def test_one_drive_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="two runs"):
+        run_same_road(asked(tmp_path, runs=[tmp_path]))
