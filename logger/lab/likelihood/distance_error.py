@@ -9,6 +9,7 @@ Computation 4, 1992), under a prior around what a good recorder does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
 from math import comb
@@ -27,6 +28,7 @@ _KNOT_S, _MOST_KNOTS = 0.25, 480
 _SMOOTH_S = 1.0
 """No car's speed changes by more than a cubic curve within so short a time."""
 _RECORDER = 2
+_UNUSUAL = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,19 @@ class RecordError:
         rise = rate_of_change(prediction, self.run.rate_hz)
         by_place = rise / np.maximum(self.run.speed_mps, _SLOWEST_MPS)
         return np.vstack([self.basis.T * by_place, _by_recorder(prediction, rise, self.run)])
+
+
+def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:
+    """By how much a distance is off at most (numbers (k,) per run), if that is more than a good recorder's is; else 0
+    [m]."""
+    found = 0.0
+    for one, k in zip(errors, record, strict=True):
+        run = one.run
+        usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * run.count / run.rate_hz
+                          + (USUAL.scale * np.ptp(run.distance_m)) ** 2)
+        off_m = float(np.abs(one.moved_m(k)).max())
+        found = max(found, off_m if off_m > _UNUSUAL * usual_m else 0.0)
+    return found
 
 
 def _roughness(run: Run) -> Array:

@@ -68,7 +68,7 @@ class LinearModel:
     """
 
     def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
-        self.posterior, self.numbers = posterior, numbers
+        self.posterior, self.prior, self.numbers = posterior, posterior.prior, numbers
         residuals = posterior.residuals(state)
         self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
         self._records = []
@@ -88,7 +88,7 @@ class LinearModel:
 
     def holding(self, names: Sequence[str]) -> LinearModel:
         """The same with some of the car's numbers held where they are."""
-        away = [self.posterior.prior.names.index(name) for name in names if name in self.posterior.prior.names]
+        away = [self.prior.names.index(name) for name in names if name in self.prior.names]
         if not away or self.numbers is None:
             return self
         found = copy(self)
@@ -97,6 +97,12 @@ class LinearModel:
         found._taken = [one.copy() for one in self._taken]
         for number, white, taken in zip(found.numbers, found.white, found._taken, strict=True):
             number[away], white[away], taken[:, away] = 0.0, 0.0, 0.0
+        return found
+
+    def without_wall(self) -> LinearModel:
+        """The same with a normal prior of the car's numbers, as far as they may go."""
+        found = copy(self)
+        found.prior = self.prior.without_wall()
         return found
 
     def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
@@ -160,13 +166,13 @@ class LinearModel:
 
     def objective(self, predictions: Sequence[Array], logs: Array) -> float:
         """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""
-        return self.eliminated(predictions).squares + self.posterior.prior.cost(logs)
+        return self.eliminated(predictions).squares + self.prior.cost(logs)
 
     def information(self, logs: Array, own: Sequence[Array] | None = None) -> Array:
         """On the car's numbers and those of whitened columns (m, kept) per run: (p + m, p + m)."""
         p = self.count
         found = sum(white @ white.T - taken.T @ taken for white, taken in zip(self.white, self._taken, strict=True))
-        found = np.asarray(found) + (np.diag(self.posterior.prior.curvature(logs)) if p else 0.0)
+        found = np.asarray(found) + (np.diag(self.prior.curvature(logs)) if p else 0.0)
         if own is None:
             return found
         taken_by_own = self.taken(own)
@@ -179,7 +185,7 @@ class LinearModel:
     def gradient(self, residuals: Sequence[Array], logs: Array, own: Sequence[Array] | None = None) -> Array:
         """Which way the same numbers fit better (p + m,), by whitened residuals (kept,) per run."""
         found = sum((white @ one for white, one in zip(self.white, residuals, strict=True)), np.zeros(self.count))
-        found = found - (self.posterior.prior.gradient(logs) if self.count else 0.0)
+        found = found - (self.prior.gradient(logs) if self.count else 0.0)
         if own is None:
             return found
         pulled = sum((columns @ one for columns, one in zip(own, residuals, strict=True)), np.zeros(len(own[0])))

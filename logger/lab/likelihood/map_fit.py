@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.lag import followed_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
@@ -27,12 +26,13 @@ Array = npt.NDArray[np.float64]
 CONVERGED = 2.0
 """A round of a fit that gains less than this in minus twice a log-likelihood is its last."""
 _ROUNDS, _STEPS, _ALIGNING_ROUNDS = 6, 5, 40
+_WORTH_ALIGNING = 0.02
 _SMALL_GAIN = 0.3
 _KEPT_PROMISE = 0.7
 _DAMPING, _MORE_DAMPING, _LARGEST_DAMPING, _RIDGE = 1e-4, 30.0, 100.0, 1e-12
 # Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
 _STEP_IN_DEVIATIONS = 5.0
-NEAR_M = 0.02
+_NEAR_M = 0.02
 """A model that lies no farther off than this, a quarter of the shortest wave at walking pace, is aligned to the same
 places."""
 
@@ -73,8 +73,7 @@ def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, 
     enough = max(CONVERGED, worth)
     for done in range(1, rounds + 1):
         trial = minimised(now, now.state, moves, _STEPS)
-        trial = posterior.at(trial.effects, trial.logs, trial.record, trial.size)
-        now = LinearModel(posterior, trial, numbers)
+        now = laid_out(posterior, trial, numbers, least)
         gained = least - now.score
         if gained > 0:
             best, least = now, now.score
@@ -86,13 +85,23 @@ def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, 
     return MapFit(best, numbers)
 
 
+def laid_out(posterior: Posterior, state: State, numbers: list[Array] | None, least: float) -> LinearModel:
+    """A state that was fitted to first order, laid out where its distances are; aligned anew where that is not as good
+    as the least score so far, because they are far from where they were."""
+    found = LinearModel(posterior, posterior.at(state.effects, state.logs, state.record, state.size), numbers)
+    if found.score < least:
+        return found
+    there, _ = _aligned_from(posterior, found.state, _WORTH_ALIGNING)
+    return LinearModel(posterior, there, numbers)
+
+
 def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> State:
     """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
     road from there, whichever is likelier."""
     best, least = _aligned_from(posterior, state, worth)
     for _ in range(2):
         farther_m = [followed_m(run, one) for run, one in zip(posterior.runs.runs, best.predictions, strict=True)]
-        if max(float(np.abs(one).max()) for one in farther_m) < NEAR_M:
+        if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
             break
         record = [error.through(error.moved_m(k) + more) for error, k, more in zip(
             posterior.record_errors, best.record, farther_m, strict=True)]
@@ -180,8 +189,3 @@ def _fine_steps(linear: LinearModel) -> Array:
     """Of the logarithms of the car's numbers (p,), by how well they are known."""
     sizes = np.sqrt(np.diag(linear.information(linear.state.logs)))
     return np.minimum(linear.posterior.prior.steps, _STEP_IN_DEVIATIONS / sizes)
-
-
-def recorded(posterior: Posterior, effects: Sequence[Chosen], logs: Array, size: ErrorSize = USUAL) -> State:
-    """A model on the distances as they were recorded."""
-    return posterior.at(effects, logs, None, size)

@@ -85,6 +85,10 @@ class VehiclePrior:
         """Whether the wall holds on to one of these numbers (p,), which would else be farther off."""
         return self.wall and bool(self._beyond(logs).any())
 
+    def within_wall(self, logs: Array) -> Array:
+        """The nearest numbers (p,) that the wall does not hold."""
+        return np.clip(logs, -_WALL_FROM * self.deviations, _WALL_FROM * self.deviations) if self.wall else logs
+
     def vehicle(self, vehicle: Vehicle, logs: Array) -> Vehicle:
         """The vehicle with its numbers moved by these logarithms (p,)."""
         return changed(vehicle, {name: read(vehicle, name) * float(np.exp(log))

@@ -27,10 +27,10 @@ def standard_errors(found: MapFit) -> tuple[tuple[Chosen, ...], Array]:
 
     Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
-    linear, state = found.linear, found.state
+    linear, state = found.linear.without_wall(), found.state
     moves = moves_of(state.effects)
     own = linear.whitened(effect_slopes(linear, state.effects, state.logs, moves, state.predictions)) if moves else None
-    information = linear.information(np.zeros_like(state.logs), own)  # the prior's width, not its wall's
+    information = linear.information(state.logs, own)
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
     scale = np.where(seen, size, 1.0)

@@ -36,46 +36,44 @@ _WORTH_ALIGNING = 0.004
 class Baseline:
     """A fitted model that effects are tried on.
 
-    found             the fit
-    score             minus twice the log of its evidence
-    rough             predictions of a rough simulation, for comparing with others
-    residuals         whitened (kept,) per run
-    objective         their squares, and the cost of what is off
-    covariance        (p, p) of the car's numbers
-    newton_step       (p,) what is left of the way to where these fit best
-    explanation       what a full explanation of the residuals would gain
+    found          the fit
+    score          minus twice the log of its evidence
+    explanation    what a full explanation of the residuals would gain
+    linear         the model beside its state, without the wall of the prior: a car that is bent to the wall hides what
+                   effects do
+    rough          predictions of a rough simulation, for comparing with others
+    residuals      whitened (kept,) per run
+    covariance     (p, p) of the car's numbers
+    newton_step    (p,) the way to where these fit best
+    objective      squares of the residuals there, and the cost of what is off
     """
 
     found: MapFit
     score: float
+    explanation: float
+    linear: LinearModel
     rough: list[Array]
     residuals: list[Array]
-    objective: float
     covariance: Array
     newton_step: Array
-    explanation: float
+    objective: float
 
     @staticmethod
     def of(found: MapFit) -> Baseline:
         """From a fit."""
-        linear, state = found.linear, found.state
+        linear, state = found.linear.without_wall(), found.state
         here = linear.eliminated(state.predictions)
-        # The wall's force is in the gradient; its curvature is left out, or no trial could bring a number back from it.
-        covariance = np.linalg.inv(linear.information(np.zeros_like(state.logs)))
-        return Baseline(found, linear.score, _roughly(linear, state.effects, state.logs), here.residuals,
-                        here.squares + found.posterior.prior.cost(state.logs), covariance,
-                        covariance @ linear.gradient(here.residuals, state.logs),
-                        gain_of_an_explanation(found.posterior, state))
+        covariance = np.linalg.inv(linear.information(state.logs))
+        gradient = linear.gradient(here.residuals, state.logs)
+        newton_step = covariance @ gradient
+        return Baseline(found, found.linear.score, gain_of_an_explanation(found.posterior, state), linear,
+                        _roughly(linear, state.effects, state.logs), here.residuals, covariance, newton_step,
+                        here.squares + linear.prior.cost(state.logs) - float(gradient @ newton_step))
 
     @property
     def posterior(self) -> Posterior:
         """That which was fitted."""
         return self.found.posterior
-
-    @property
-    def linear(self) -> LinearModel:
-        """The model beside its state."""
-        return self.found.linear
 
     @property
     def state(self) -> State:
@@ -182,15 +180,14 @@ def _as_predicted(base: Baseline, trial: Trial) -> Trial:
 def _beside(base: Baseline, one: Chosen, logs: Array) -> Trial:
     """A trial as it is, in a car with these numbers (p,), which then take one step of Newton's; those that the effect
     sets are held at their nominal values."""
-    prior = base.posterior.prior
     linear = base.linear.holding(one.effect.replaces)
-    logs = np.where(np.isin(prior.names, one.effect.replaces), 0.0, logs)
+    logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
     there = _roughly(linear, (*base.state.effects, one), logs)
     found = linear.eliminated(there)
     pull = linear.gradient(found.residuals, logs)
-    step = np.linalg.solve(linear.information(np.zeros_like(logs)), pull)
+    step = np.linalg.solve(linear.information(logs), pull)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
-    gain = base.objective - found.squares - prior.cost(logs) + float(pull @ step)
+    gain = base.objective - found.squares - linear.prior.cost(logs) + float(pull @ step)
     return Trial(one, gain, logs + step, change)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
@@ -71,12 +71,16 @@ class Search:
 
     def run(self, before: Baseline) -> Selection:
         """From a model without effects that it lacks."""
-        now, first = before, None
+        now = before
         steps: list[tuple[str, Baseline]] = []
+        first = Round((), ())
         while len(now.state.effects) - self.present < MOST_EFFECTS:
+            left = [one for one in self.effects if one.name not in now.state.names]
+            if not left:
+                break
             self.progress(f"round {len(steps) + 1}")
-            tried = self.round(now, [one for one in self.effects if one.name not in now.state.names])
-            first = first or tried
+            tried = self.round(now, left)
+            first = first if steps else tried
             best = next((one for one in tried.fits if self.accepted(now, one)), None)
             if best is None:
                 break
@@ -88,9 +92,13 @@ class Search:
             for name in earlier:
                 now, _ = self._reconsidered(now, name)
         now, gains = self._needed(before, now)
-        assert first is not None
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         return Selection(before, now, gains, rivals, first, tuple(steps))
+
+    def left_out(self, found: Selection, name: str) -> Selection:
+        """The same without one of the effects that were chosen."""
+        now, gains = self._needed(found.before, self.without(found.now, name))
+        return replace(found, now=now, gains=gains)
 
     def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
         """Every effect tried on a model."""
