@@ -24,7 +24,7 @@ from logger.report.text_layout import paragraphs
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
-    from logger.lab.verdict import Verdict
+    from logger.lab.diagnosis import Diagnosis
 
 _SHOWN = 8
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose``."""
-    from logger.lab.verdict import as_json
+    from logger.report.diagnosis_text import as_json
     from logger.report.lab_text import diagnosis_lines
 
     if args.same_road:
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
+def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Diagnosis:
     """The diagnosis of a model, without some effects, with its progress on the screen."""
     with progress() as tell:
         return given.diagnosed(tell, left_out)
@@ -80,17 +80,17 @@ def _compared(given: Bench) -> str:
             f"{len(given.effects)} effects are known.")
 
 
-def _next(args: argparse.Namespace, given: Bench, found: Verdict) -> str:
+def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
     """What to do now; a command in one piece, so that it can be copied."""
     if found.missing:
         one = found.missing[0]
         name = given.files.get(one.effect.name, one.effect.name)
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
-    if found.diagnosis.strained and not found.diagnosis.left_over:
-        names = ", ".join(found.diagnosis.strained)
+    if found.conflicts and not found.left_over:
+        names = ", ".join(found.conflicts)
         return paragraphs([f"Next: see whether {names} of the vehicle's file can be right."])
-    if found.diagnosis.unexplained:
+    if found.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where what is left sits."])
     return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."

@@ -19,13 +19,13 @@ from logger.lab.likelihood.map_fit import MapFit, aligned, effect_slopes, fit
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
 from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Search, Selection
-from logger.lab.unexplained import Shape, shape_of
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
@@ -68,6 +68,7 @@ class Diagnosis:
     """What was found.
 
     runs                 their names
+    catalogue            all effects that were asked for, by name
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
     candidates           those that are missing first, with the values that they end with; then the others of the first
@@ -83,6 +84,7 @@ class Diagnosis:
     """
 
     runs: tuple[str, ...]
+    catalogue: Mapping[str, Effect]
     baseline_error: float
     final_error: float
     noise: Noise
@@ -147,7 +149,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     above = excess(fine, state, noise, FALSE_ALARM)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
-        runs=tuple(run.name for run in fine.runs.runs),
+        runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
         baseline_error=fine.error(fine.start(present)), final_error=fine.error(state), noise=noise,
         noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles, verdict=tuple(selection.gains), excess=above, conflicts=_conflicts(fine, state),

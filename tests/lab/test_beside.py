@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.beside import Part, located, paired, short_names
+from logger.lab.residuals.breakdown import Part, breakdown, paired, short_names
 from logger.runs import Run
 
 from ..support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
@@ -21,8 +21,8 @@ def sine_and_noise(run: Run, prediction: Array, rng: np.random.Generator) -> Arr
 
 
 def test_shares_add_up_and_the_sine_is_where_it_is() -> None:
-    beside = beside_with(sine_and_noise)
-    where = located(beside)
+    residuals = beside_with(sine_and_noise)
+    where = breakdown(residuals)
     for parts in (where.frequency, where.speed, where.amplitude, where.place):
         assert sum(part.share for part in parts) == pytest.approx(1.0)
     shares = {part.name: part for part in where.frequency}
@@ -47,8 +47,8 @@ def test_bands_surround_the_vibrations_of_the_car() -> None:
 
 
 def test_errors_of_parts_are_ratios_of_rms() -> None:
-    beside = beside_with(lambda run, prediction, rng: -0.2 * prediction)
-    for part in (*located(beside).speed, *located(beside).place):
+    residuals = beside_with(lambda run, prediction, rng: -0.2 * prediction)
+    for part in (*breakdown(residuals).speed, *breakdown(residuals).place):
         assert part.error == pytest.approx(0.25)  # 0.2 of the model is 0.25 of what is left to be measured
 
 
@@ -59,7 +59,7 @@ def test_where_nothing_was_measured_there_is_no_error() -> None:
         return np.where((np.arange(len(prediction)) >= dead.start) & (np.arange(len(prediction)) < dead.stop),
                         -prediction, 0.05)
 
-    where = located(beside_with(silent))
+    where = breakdown(beside_with(silent))
     unknown = [part for part in where.place if not np.isfinite(part.error)]
     assert unknown and all(part.left_mps2 > 0 and part.error_told(3) == "-" for part in unknown)
     assert all(part.error > 0 for part in where.place if part not in unknown)

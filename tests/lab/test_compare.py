@@ -42,7 +42,7 @@ def lacking() -> Comparison:
 
 def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     """Everything that is left after the refit is the noise, and nothing is said to be missing."""
-    measured = np.concatenate(mistaken.plain.beside.measured)
+    measured = np.concatenate(mistaken.plain.residuals.measured)
     floor = NOISE_MPS2 / float(np.sqrt(np.mean(measured**2)))
     assert mistaken.plain.error > 1.2 * floor
     assert mistaken.refitted.error == pytest.approx(floor, rel=0.03)
@@ -62,18 +62,18 @@ def test_missing_friction_is_physics(lacking: Comparison) -> None:
 
 
 def test_the_effect_in_the_model_leaves_noise() -> None:
-    beside = beside_with(recorded_by([FRICTION], NOISE_MPS2), 5, lasts_s=12.0)
+    residuals = beside_with(recorded_by([FRICTION], NOISE_MPS2), 5, lasts_s=12.0)
     name, values = FRICTION
-    found = compare(runs_of(beside), CAR, [chosen(shipped_effects()[name], values)])
+    found = compare(runs_of(residuals), CAR, [chosen(shipped_effects()[name], values)])
     assert not found.missing
     assert found.moves["dry_friction.friction_force_n"] == pytest.approx(0.0, abs=0.1)
 
 
 def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Comparison) -> None:
-    beside = lacking.plain.beside
+    residuals = lacking.plain.beside
     left = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
-                           zip(beside.runs, beside.predictions, strict=True)])
-    measured = np.concatenate([run.measured_mps2[200:] for run in beside.runs])
+                           zip(residuals.runs, residuals.predictions, strict=True)])
+    measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])
     told = as_json(lacking)
     assert told["error"] == pytest.approx(np.sqrt(np.mean(left**2) / np.mean(measured**2)))
     assert sum(run["samples"] for run in told["runs"]) == len(left)

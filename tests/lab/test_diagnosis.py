@@ -7,7 +7,7 @@ import pytest
 
 from logger.lab import diagnosis, wandering
 from logger.lab.fitting import Problem
-from logger.lab.noise import UNEXPLAINED, Noise
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.nuisance import Tolerance
 from logger.lab.stretches import Cells
 from logger.profiles.track import Track

@@ -116,7 +116,7 @@ def test_where_the_car_was_is_found_from_all_stretches_also_those_that_judge() -
     vehicle, runs, _ = examined("none", 3)
     problem = Problem(runs, vehicle, Tolerance())
     state, slopes = settled(problem, problem.start())
-    assert problem.deviance(located(problem, state, slopes), fitted=False) < problem.deviance(state, fitted=False) + 1
+    assert problem.deviance(breakdown(problem, state, slopes), fitted=False) < problem.deviance(state, fitted=False) + 1
 
 
 def test_the_prior_of_the_wander_has_the_spread_it_was_given() -> None:

@@ -1,4 +1,4 @@
-"""Marks of residuals that are made to bear them: each with a number that is known beforehand, none on noise."""
+"""ResidualTests of residuals that are made to bear them: each with a number that is known beforehand, none on noise."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.alignment import aligned, drift
-from logger.lab.beside import Beside, located
-from logger.lab.coherence import with_road
-from logger.lab.force_map import force_map
-from logger.lab.marks import Mark, Marks, read_marks, worst_places
+from logger.lab.likelihood.lag import aligned, drift
+from logger.lab.residuals.breakdown import ModelResiduals, breakdown
+from logger.lab.residuals.road_coherence import with_road
+from logger.lab.residuals.force_state_map import force_map
+from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
@@ -26,11 +26,11 @@ def white(run: Run, prediction: Array, rng: np.random.Generator) -> Array:
     return rng.normal(0, NOISE_MPS2, len(prediction))
 
 
-def marks(beside: Beside) -> Marks:
-    return read_marks(beside, located(beside), beside)
+def marks(residuals: ModelResiduals) -> ResidualTests:
+    return run_residual_tests(residuals, breakdown(residuals), residuals)
 
 
-def mark(found: Marks, name: str) -> Mark:
+def mark(found: ResidualTests, name: str) -> ResidualTest:
     return next(one for one in found.marks if one.name == name)
 
 
@@ -73,8 +73,8 @@ def test_what_follows_the_road_is_told_from_noise() -> None:
         # As strong as the noise, at every frequency that there is noise at up to 38 Hz.
         return filtered / filtered.std() * NOISE_MPS2 + white(run, prediction, rng)
 
-    beside = beside_with(half)
-    share, p_value = with_road(beside).explained(0.0, 50.0)
+    residuals = beside_with(half)
+    share, p_value = with_road(residuals).explained(0.0, 50.0)
     assert share == pytest.approx(0.5, abs=0.05)
     assert p_value < 1e-12
 
@@ -98,12 +98,12 @@ def test_a_late_clock_is_told_from_a_wrong_place() -> None:
 
 def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     """The model is driven over 1 % more road than the car was."""
-    beside = beside_with(white)
+    residuals = beside_with(white)
     truth = [Run(run.name, run.rate_hz, run.measured_mps2, 0.99 * run.distance_m, run.speed_mps, run.track)
-             for run in beside.runs]
-    driven = SimulatedRuns(truth).predict(beside.car)
-    wrong = Beside([measuring(run, one) for run, one in zip(beside.runs, driven, strict=True)], beside.car,
-                   beside.predictions, beside.responses)
+             for run in residuals.runs]
+    driven = SimulatedRuns(truth).predict(residuals.car)
+    wrong = ModelResiduals([measuring(run, one) for run, one in zip(residuals.runs, driven, strict=True)], residuals.car,
+                   residuals.predictions, residuals.responses)
     assert drift(aligned(wrong)).value == pytest.approx(0.01, rel=0.03)
     found = marks(wrong)
     assert "runs ahead by 1 m in each 100 m" in mark(found, "drift").sentence
@@ -114,11 +114,11 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
 @pytest.mark.parametrize(("ratio", "words"), [(1.5, "rebound more than bump"), (0.7, "bump more than rebound")])
 def test_the_direction_of_asymmetric_dampers(ratio: float, words: str) -> None:
     """Rebound 2 r c / (1 + r), bump 2 c / (1 + r): their half difference is c (r - 1) / (r + 1)."""
-    beside = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": ratio})], NOISE_MPS2))
-    forces = force_map(beside)
+    residuals = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": ratio})], NOISE_MPS2))
+    forces = force_map(residuals)
     truth = CAR.front.suspension_damping_n_s_per_m * (ratio - 1) / (ratio + 1)
     assert forces.asymmetry.value == pytest.approx(truth, rel=0.1)
-    found = mark(marks(beside), "direction")
+    found = mark(marks(residuals), "direction")
     assert found.found
     assert words in found.sentence
 
@@ -135,8 +135,8 @@ def test_the_curve_of_a_cubic_spring() -> None:
 
 
 def test_dampers_that_yield_and_friction_bend_the_curve_by_rate() -> None:
-    beside = beside_with(recorded_by([("dry_friction", {"friction_force_n": 60.0})], NOISE_MPS2))
-    found = mark(marks(beside), "force by rate")
+    residuals = beside_with(recorded_by([("dry_friction", {"friction_force_n": 60.0})], NOISE_MPS2))
+    found = mark(marks(residuals), "force by rate")
     assert found.found
     assert "yields at speed" in found.sentence
 
@@ -148,7 +148,7 @@ def test_an_answer_out_of_proportion() -> None:
     model = [one * np.where(of, 2.0, 0.5) for one, of in zip(plain.predictions, strong, strict=True)]
     measured = [measuring(run, one * np.where(of, 1.2, 0.9) + run.measured_mps2 - before)
                 for run, one, of, before in zip(plain.runs, model, strong, plain.predictions, strict=True)]
-    found = mark(marks(Beside(measured, plain.car, model, plain.responses)), "proportion")
+    found = mark(marks(ModelResiduals(measured, plain.car, model, plain.responses)), "proportion")
     assert found.found
     assert found.value == pytest.approx(0.3, abs=0.08)
 
@@ -174,10 +174,10 @@ def test_the_worst_place_is_named() -> None:
         hit = (run.distance_m >= 200.0) & (run.distance_m < 205.0) & run.name.endswith("run2")
         return np.where(hit, 0.8, 0.0)
 
-    beside = beside_with(plus_noise(pothole))
-    worst = worst_places(located(beside), 1)[0]
+    residuals = beside_with(plus_noise(pothole))
+    worst = worst_places(breakdown(residuals), 1)[0]
     assert (worst.name, worst.low) == ("runs/run2", 200.0)
-    found = mark(marks(beside), "place")
+    found = mark(marks(residuals), "place")
     assert found.found
     assert "run2, 200 to " in found.sentence and "runs/run2" not in found.sentence
 
@@ -206,7 +206,7 @@ def test_a_run_of_five_seconds_can_be_read() -> None:
     nothing = beside_with(white)
     prediction = runs.predict(nothing.car)
     rng = np.random.default_rng(1)
-    short = Beside([measuring(run, prediction[0] + white(run, prediction[0], rng))], nothing.car, prediction,
+    short = ModelResiduals([measuring(run, prediction[0] + white(run, prediction[0], rng))], nothing.car, prediction,
                    runs.respond(nothing.car))
     found = marks(short)
     assert not found.found
@@ -216,12 +216,12 @@ def test_a_run_of_five_seconds_can_be_read() -> None:
 
 def test_a_model_that_leaves_nothing() -> None:
     """No division by nothing where measurements are the model's to the last bit."""
-    beside = beside_with(lambda run, prediction, rng: np.zeros(len(prediction)), lasts_s=14.0)
-    assert not marks(beside).found
+    residuals = beside_with(lambda run, prediction, rng: np.zeros(len(prediction)), lasts_s=14.0)
+    assert not marks(residuals).found
 
 
 def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
     for seed in range(6):
-        beside = beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)
-        tone = mark(marks(beside), "tone")
+        residuals = beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)
+        tone = mark(marks(residuals), "tone")
         assert tone.value > 0 and tone.p_value <= 1

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import firwin
 
 from logger.lab.fitting import Problem, State
-from logger.lab.noise import floor_error, noise_of
+from logger.lab.likelihood.noise_floor import floor_error, noise_of
 from logger.lab.nuisance import Tolerance
 from logger.lab.stretches import Stretches
 from logger.simulation.simulated_runs import SimulatedRuns

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from logger.lab.tones import loudest, periodogram
+from logger.lab.residuals.spectral_lines import loudest, periodogram
 
 
 def test_a_sine_is_heard_where_it_is() -> None:

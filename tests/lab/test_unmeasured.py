@@ -10,12 +10,12 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.lab.linear_response import Tabulated, response_of
+from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.lab.nuisance import Tolerance
-from logger.lab.one_road import apart, in_doubt, likenesses
-from logger.lab.unmeasured import NotOneRoad, SameRoad, State, trials
-from logger.lab.unmeasured import fitted as fit
-from logger.lab.unmeasured_diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
+from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
+from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State, trials
+from logger.lab.unknown_road.likelihood import fitted as fit
+from logger.lab.unknown_road.diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
 from logger.profiles.track import Track
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.runs import Run

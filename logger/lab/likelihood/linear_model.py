@@ -37,7 +37,7 @@ class _Record:
 
     def root(self, size: ErrorSize) -> Array:
         """Cholesky's factor of the information (k, k), lower."""
-        return np.linalg.cholesky(self.gram + self.error.precision(size))
+        return np.asarray(np.linalg.cholesky(self.gram + self.error.precision(size)), float)
 
     def lack(self, size: ErrorSize) -> float:
         """Minus twice the log of the evidence for a size, without its constant."""

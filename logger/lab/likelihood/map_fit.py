@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.fitting.levenberg_marquardt import minimise
 from logger.lab.likelihood.lag import followed_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
@@ -27,9 +28,7 @@ CONVERGED = 2.0
 """A round of a fit that gains less than this in minus twice a log-likelihood is its last."""
 _ROUNDS, _STEPS, _ALIGNING_ROUNDS = 6, 5, 40
 _WORTH_ALIGNING = 0.02
-_SMALL_GAIN = 0.3
-_KEPT_PROMISE = 0.7
-_DAMPING, _MORE_DAMPING, _LARGEST_DAMPING, _RIDGE = 1e-4, 30.0, 100.0, 1e-12
+_SMALL_GAIN = 0.15
 # Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
 _STEP_IN_DEVIATIONS = 5.0
 _NEAR_M = 0.02
@@ -127,44 +126,38 @@ def _aligned_from(posterior: Posterior, state: State, worth: float) -> tuple[Sta
     return best, least
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """A model beside a linear one: its predictions, and half of what is minimised."""
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    predictions: list[Array]
+    cost: float
+
+
 def minimised(linear: LinearModel, state: State, moves: Sequence[Move], most: int) -> State:
-    """Levenberg and Marquardt's steps on the effects' numbers that move and the car's, with the most likely distance
-    errors to first order at each; at most so many."""
-    predictions = _predicted(linear, state.effects, state.logs)
-    effects, logs = state.effects, state.logs
-    now = linear.objective(predictions, logs)
-    damping, own = _DAMPING, None
-    for _ in range(most):
-        kept = own is not None
-        if moves and own is None:
-            own = linear.whitened(effect_slopes(linear, effects, logs, moves, predictions))
-        information = linear.information(logs, own)
-        information = information + _RIDGE * np.diag(np.maximum(np.diag(information), 1.0))
-        gradient = linear.gradient(linear.eliminated(predictions).residuals, logs, own)
-        gained = promised = 0.0
-        while damping < _LARGEST_DAMPING:
-            step = np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
-            promised = float(2 * gradient @ step - step @ information @ step)
-            if promised < _SMALL_GAIN:
-                break
-            trial_logs = logs + step[: linear.count] if linear.count else logs
-            trial = moved(effects, moves, coordinates_of(effects, moves) + step[linear.count:])
-            there = _predicted(linear, trial, trial_logs)
-            after = linear.objective(there, trial_logs)
-            if after < now:
-                gained, now = now - after, after
-                effects, logs, predictions = trial, trial_logs, there
-                damping = damping / _MORE_DAMPING
-                break
-            damping = max(damping * _MORE_DAMPING, _DAMPING)
-        # Slopes that keep what they promise serve for the next step too; those that do not are taken anew.
-        if gained < _KEPT_PROMISE * promised or gained < _SMALL_GAIN:
-            own = None
-        if gained < _SMALL_GAIN:
-            if not kept:
-                break
-            damping = _DAMPING
-    return State(effects, logs, linear.eliminated(predictions).record, linear.size, predictions)
+    """Levenberg and Marquardt's steps on the car's numbers and those of the effects that move, with the most likely
+    distance errors to first order at each; at most so many."""
+    own: list[Array] | None = None
+    p = linear.count
+
+    def evaluate(x: Array) -> _Point:
+        effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs
+        predictions = _predicted(linear, effects, logs)
+        return _Point(effects, logs, predictions, 0.5 * linear.objective(predictions, logs))
+
+    def normal_equations(_x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
+        nonlocal own
+        if moves and fresh:
+            own = linear.whitened(effect_slopes(linear, at.effects, at.logs, moves, at.predictions))
+        residuals = linear.eliminated(at.predictions).residuals
+        return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
+
+    start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
+    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: _SMALL_GAIN, most_rounds=most).at
+    record = linear.eliminated(best.predictions).record
+    return State(best.effects, best.logs, record, linear.size, best.predictions)
 
 
 def _predicted(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:

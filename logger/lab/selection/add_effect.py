@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy.typing as npt
 import numpy as np
+import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
@@ -29,7 +29,7 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_BIASED = 2.0
+BIASED = 2.0
 """A number that an effect moves by more standard errors than this had been biased by its absence."""
 
 
@@ -58,7 +58,7 @@ class Number:
     @property
     def biased(self) -> bool:
         """Whether the missing effects had biased it."""
-        return abs(self.shift) > _BIASED
+        return abs(self.shift) > BIASED
 
 
 @dataclass(frozen=True, eq=False)

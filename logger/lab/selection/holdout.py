@@ -63,8 +63,8 @@ def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
             held = which == fold
             kept[run.first:][held] = (residual - step @ part)[run.first:][held]
-    kept = [one[run.first:] for run, one in zip(posterior.runs.runs, unseen, strict=True)]
-    return HoldOut(normalised_rms(kept, [run.kept_mps2 for run in posterior.runs.runs]),
+    counted = [one[run.first:] for run, one in zip(posterior.runs.runs, unseen, strict=True)]
+    return HoldOut(normalised_rms(counted, [run.kept_mps2 for run in posterior.runs.runs]),
                    deviance(posterior.bands, unseen))
 
 

@@ -63,7 +63,7 @@ class Baseline:
         """From a fit."""
         linear, state = found.linear.without_wall(), found.state
         here = linear.eliminated(state.predictions)
-        covariance = np.linalg.inv(linear.information(state.logs))
+        covariance = np.asarray(np.linalg.inv(linear.information(state.logs)), float)
         gradient = linear.gradient(here.residuals, state.logs)
         newton_step = covariance @ gradient
         return Baseline(found, found.linear.score, gain_of_an_explanation(found.posterior, state), linear,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
@@ -169,7 +170,7 @@ class Search:
         while names:
             self.progress(f"are all of {', '.join(names)} needed?")
             with ThreadPoolExecutor(self.workers) as pool:
-                others = dict(zip(names, pool.map(lambda name: self.without(now, name), names), strict=True))
+                others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in others.items()}
             least = min(gains, key=lambda name: gains[name])
             if len(names) == 1 or gains[least] > least_gain(len(self.effects)):

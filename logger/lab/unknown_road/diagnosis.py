@@ -11,21 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.identification.identifiability import NOT_ONE_ROAD, structural
-from logger.lab.blind import SEEN
-from logger.lab.candidates import alike_within
-from logger.lab.diagnosis import CHANCE, WORTH, p_value
-from logger.lab.noise import UNEXPLAINED, Noise
-from logger.lab.one_road import apart, in_doubt, likenesses
-from logger.lab.quantities import chance, finite, numbers_of
-from logger.lab.spread import with_errors
-from logger.lab.unmeasured import Fitted, NotOneRoad, SameRoad, State, Trial, fitted, inverse, trials
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
+from logger.lab.likelihood.standard_errors import with_errors
+from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
+from logger.lab.unknown_road.fisher_scoring import Fitted, fitted, inverse
+from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State
+from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
+from logger.lab.unknown_road.screening import Trial, trials
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
+from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -46,7 +46,7 @@ class Candidate:
 
     error          of all drives, each with the road that the others tell
     p_value        how often noise alone would gain as much, times the number of candidates
-    gain           of minus twice the log-likelihood; where it was not fitted, what its slopes promise
+    gain           of minus twice the log of the evidence; where it was not fitted, what its slopes promise
     confused_with  effects that explain about as much
     fitted         with the car's numbers and the road; else it was added at the strength that its slopes promise
     """
@@ -118,11 +118,11 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     for number in range(1, MOST_EFFECTS + 1):
         progress(f"round {number}: trying {len(left)} effects")
         tried = trials(base.problem, base, _trials(left))
-        bar = Bar(len(left), problem.samples, steps[-1][1])
+        here = _Round(len(left), problem.samples, steps[-1][1])
         models = _fits(base, tried, progress)
-        candidates = _judged(base, models, bar)
+        candidates = _judged(base, models, here)
         first, fits = first or tried, fits or candidates
-        best = next((one for one in candidates if bar.passed(one)), None)
+        best = next((one for one in candidates if here.accepted(one)), None)
         if best is None:
             break
         taken.append(best)
@@ -131,7 +131,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         steps.append((f"with {best.one.effect.name}", base.problem.error(base.state)))
         del left[best.one.effect.name]
     listed = [*taken, *(one for one in fits if one.one.effect.name not in [own.one.effect.name for own in taken])]
-    listed += _promises(before, first, {one.one.effect.name for one in listed}, len(effects) - len(untried))
+    listed += _promises(before, first, {one.one.effect.name for one in listed},
+                        _Round(len(effects) - len(untried), problem.samples, steps[1][1]))
     usual = trials(base.problem, base, [chosen(one, one.usual) for one in left.values()])
     road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
     noise = base.problem.noise(base.state)
@@ -140,7 +141,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         tuple(zip(base.problem.errors(before.state), base.problem.errors(base.state), strict=True)),
         noise.deviation_mps2 / problem.size_mps2, untried, road,
         {one.one.effect.name: one.deviations for one in usual
-         if one.deviations < SEEN and one.one.effect.name not in road},
+         if one.deviations < DETECTABLE_SIGMA and one.one.effect.name not in road},
         _together(base), base.state.noise_mps2, _excess(base, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in in_doubt(alike)),
     )
@@ -214,49 +215,52 @@ def _beside(base: Fitted, one: Chosen) -> State:
 
 
 @dataclass(frozen=True)
-class Bar:
-    """What an effect has to pass: among ``count`` candidates, over so many samples, on a model of this error."""
+class _Round:
+    """A model that so many candidates are tried on, over so many samples, and its error."""
 
-    count: int
+    candidates: int
     samples: int
     error: float
 
-    def passed(self, one: Candidate) -> bool:
-        """Whether it is there: not by chance, worth naming, and of help in telling each drive by the others."""
-        return (one.p_value < CHANCE and one.gain > WORTH * _FREEDOM * self.samples and one.fitted
-                and one.error <= self.error)
+    def evidence_gain(self, one: Chosen, gain: float) -> float:
+        """What an effect gains in minus twice the log of the evidence, by its gain in likelihood (G. Schwarz 1978)."""
+        return gain - len(moves_of([one])) * float(np.log(self.samples))
+
+    def accepted(self, one: Candidate) -> bool:
+        """Whether an effect is there: not by chance, and of help in predicting each drive by the others."""
+        return one.fitted and one.p_value < FALSE_ALARM and one.error <= self.error
 
 
-def _judged(base: Fitted, models: Mapping[str, Fitted], bar: Bar) -> list[Candidate]:
+def _judged(base: Fitted, models: Mapping[str, Fitted], here: _Round) -> list[Candidate]:
     """Fitted effects as candidates, best first."""
     found = []
     for model in models.values():
         one = model.state.effects[-1]
-        gain = model.problem.gain(base.state, model.state)
-        found.append(Candidate(one, model.problem.error(model.state), p_value(gain, _numbers(one), bar.count), gain))
-    found.sort(key=lambda one: _numbers(one.one) * float(np.log(bar.samples)) - one.gain)  # G. Schwarz 1978
-    return [replace(one, confused_with=_rivals(one, found, bar)) for one in found]
+        gain = here.evidence_gain(one, model.problem.gain(base.state, model.state))
+        found.append(Candidate(one, model.problem.error(model.state), probability_by_chance(gain, here.candidates),
+                               gain))
+    found.sort(key=lambda one: -one.gain)
+    return [replace(one, confused_with=_rivals(one, found, here)) for one in found]
 
 
-def _numbers(one: Chosen) -> int:
-    return sum(parameter.moves for parameter in one.effect.parameters)
+def _rivals(one: Candidate, found: Sequence[Candidate], here: _Round) -> tuple[str, ...]:
+    return tuple(other.one.effect.name for other in found
+                 if other is not one and here.accepted(one) and here.accepted(other)
+                 and abs(other.gain - one.gain) < CONFUSED)
 
 
-def _rivals(one: Candidate, found: Sequence[Candidate], bar: Bar) -> tuple[str, ...]:
-    worthy = [other for other in found if bar.passed(other)]
-    near = alike_within(one.gain)
-    return tuple(other.one.effect.name for other in worthy
-                 if one in worthy and other is not one and abs(other.gain - one.gain) < near)
-
-
-def _promises(base: Fitted, tried: Sequence[Trial], told: set[str], count: int) -> list[Candidate]:
+def _promises(base: Fitted, tried: Sequence[Trial], named: set[str], here: _Round) -> list[Candidate]:
     """What was tried beside a model by its slopes only, best first."""
     best: dict[str, Trial] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
         best.setdefault(one.one.effect.name, one)
-    return [Candidate(one.at, base.problem.error(_beside(base, one.at)), p_value(one.gain, _numbers(one.at), count),
-                      one.gain, fitted=False)
-            for name, one in best.items() if name not in told]
+    found = []
+    for name, one in best.items():
+        if name not in named:
+            gain = here.evidence_gain(one.at, one.gain)
+            found.append(Candidate(one.at, base.problem.error(_beside(base, one.at)),
+                                   probability_by_chance(gain, here.candidates), gain, fitted=False))
+    return found
 
 
 def _with_spread(model: Fitted, present: int) -> tuple[Chosen, ...]:
@@ -268,7 +272,7 @@ def _with_spread(model: Fitted, present: int) -> tuple[Chosen, ...]:
 
 def _together(model: Fitted) -> tuple[str, ...]:
     """What these drives cannot tell of masses, springs and dampers beside the road, whatever is granted."""
-    names = model.problem.nuisance.names
+    names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.moves), len(model.data))
     mixed = model.data[np.ix_(own, road)]
@@ -276,65 +280,3 @@ def _together(model: Fitted) -> tuple[str, ...]:
     powers, directions = np.linalg.eigh(left)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
     return tuple(one.words for one in structural([names[index] for index in own], derivatives, 1.0, _NOTHING))
-
-
-# --- as it is told ---
-
-
-def summary(found: Found) -> list[str]:
-    """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    lines = []
-    for one in found.missing:
-        candidate = next(other for other in found.candidates if other.one.effect.name == one.effect.name)
-        numbers = f": {numbers_of(one)}" if one.values else ""
-        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
-                     f"looks like this, all candidates together: {chance(candidate.p_value)}.")
-        if candidate.confused_with:
-            lines.append(f"These drives cannot tell {one.effect.name} from {' or '.join(candidate.confused_with)}.")
-    if not lines:
-        lines.append("None of the effects that can be tried without a profile is missing.")
-    by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
-               for index, (words, error) in enumerate(found.steps)]
-    lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
-                 f"noise alone makes {found.floor_error:.3f}.")
-    if found.unexplained:
-        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
-                     "missing, maybe one of the effects that only a measured road can show.")
-    return lines
-
-
-def cannot_tell(found: Found) -> list[str]:
-    """What these drives cannot tell, in sentences."""
-    lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
-             "noise." for one, other in found.doubtful]
-    if found.taken_by_road:
-        lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
-                     "measured would do the same.")
-    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
-              for why in dict.fromkeys(found.untried.values())]
-    lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
-              "deviations."
-              for name, deviations in found.hidden.items()]
-    return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
-
-
-def as_json(found: Found) -> dict[str, Any]:
-    """The diagnosis as one JSON object."""
-    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
-    values = {one.effect.name: dict(one.values) for one in found.missing}
-    return {
-        "baseline_error": found.steps[0][1], "noise_floor_error": found.floor_error,
-        "candidates": [
-            {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
-             "error": one.error, "p_value": one.p_value,
-             "confused_with": list(one.confused_with), "fitted": one.fitted,
-             "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
-            for one in found.candidates],
-        "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
-        "left_over_noise": 1 + found.excess,
-        "steps": [{"step": words, "error": error} for words, error in found.steps],
-        "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
-        "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
-        "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),
-        "sentences": [*summary(found), *cannot_tell(found)],
-    }

@@ -1,9 +1,9 @@
-"""A model beside its measurements: what is left, and where it sits.
+"""The residuals of a model, and where their power sits.
 
-Problem: one number says that a model fails, not where. Solution: ``Beside`` holds runs, what a car would have recorded
-in them, and how it moved; ``located`` shares the power of what is left out over the bands of the car's own vibrations,
-over speed, over how strongly the road moves the car, and over the places of each road. Shares are of the power of
-measured - model over all samples that count, so that each list of shares adds up to 1.
+Problem: one number says that a model fails, not where. Solution: ``ModelResiduals`` holds runs, what a car would have
+recorded in them, and how it moved; ``breakdown`` shares the power of the residuals out over the bands of the car's own
+vibrations, over speed, over how strongly the road moves the car, and over the places of each road. Shares are of the
+power of measured - model over all samples that count, so that each list of shares adds up to 1.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Located:
+class Breakdown:
     """Where what is left sits: by frequency [Hz], speed [m/s], rms of the model's acceleration [m/s2], place [m]."""
 
     frequency: tuple[Part, ...]
@@ -82,7 +82,7 @@ class Located:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class ModelResiduals:
     """Runs and what a car would have recorded in them.
 
     predictions    (n,) per run, whole
@@ -134,9 +134,9 @@ class Beside:
                      if high > low)
 
 
-def located(beside: Beside) -> Located:
+def breakdown(residuals: ModelResiduals) -> Breakdown:
     """Where what is left sits."""
-    return Located(_by_frequency(beside), _by_speed(beside), _by_amplitude(beside), _by_place(beside))
+    return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
 
 
 def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
@@ -146,15 +146,15 @@ def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | N
     return [(known.get(one.name or (one.low, one.high)), one) for one in after]
 
 
-# --- tools that the marks share ---
+# --- tools that the residual tests share ---
 
 
-def segments(beside: Beside, signals: Sequence[Array]) -> npt.NDArray[np.complex128]:
+def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray[np.complex128]:
     """Spectra of all segments of some signals [(n,), ...]: (segments, frequencies), scaled to mean powers.
 
     Segments are tapered (Hann). They are as long as the longest run at most; a run shorter than one gives none.
     """
-    size = segment_size(beside)
+    size = segment_size(residuals)
     taper = np.hanning(size + 1)[:-1]
     taper = taper / np.sqrt((taper**2).sum() * size)
     blocks = [np.lib.stride_tricks.sliding_window_view(one, size)[:: max(1, size // 2)]
@@ -164,20 +164,20 @@ def segments(beside: Beside, signals: Sequence[Array]) -> npt.NDArray[np.complex
     return np.asarray(spectra)
 
 
-def segment_size(beside: Beside) -> int:
+def segment_size(residuals: ModelResiduals) -> int:
     """Samples in a segment, an even number."""
-    longest = max(map(len, beside.left))
-    return min(round(SEGMENT_S * beside.rate_hz), longest) // 2 * 2
+    longest = max(map(len, residuals.left))
+    return min(round(SEGMENT_S * residuals.rate_hz), longest) // 2 * 2
 
 
-def frequencies(beside: Beside) -> Array:
+def frequencies(residuals: ModelResiduals) -> Array:
     """Of the spectra of ``segments`` [Hz]."""
-    return np.asarray(np.fft.rfftfreq(segment_size(beside), 1 / beside.rate_hz))
+    return np.asarray(np.fft.rfftfreq(segment_size(residuals), 1 / residuals.rate_hz))
 
 
-def block_means(beside: Beside, signals: Sequence[Array], seconds: float = BLOCK_S) -> Array:
+def block_means(residuals: ModelResiduals, signals: Sequence[Array], seconds: float = BLOCK_S) -> Array:
     """Means over blocks of so many seconds, all runs one after the other (b,); what is over at an end is left out."""
-    size = max(2, round(seconds * beside.rate_hz))
+    size = max(2, round(seconds * residuals.rate_hz))
     return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
 
 
@@ -203,49 +203,50 @@ def place_length_m(runs: Sequence[Run]) -> float:
 # --- the four lists ---
 
 
-def _by_frequency(beside: Beside) -> tuple[Part, ...]:
-    left, measured = (np.mean(np.abs(segments(beside, one)) ** 2, axis=0) for one in (beside.left, beside.measured))
-    f_hz, whole = frequencies(beside), float(left.sum())
+def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
+    left, measured = (np.mean(np.abs(segments(residuals, one)) ** 2, axis=0)
+                      for one in (residuals.left, residuals.measured))
+    f_hz, whole = frequencies(residuals), float(left.sum())
     found = []
-    for band in beside.bands:
-        inside = (f_hz >= band.from_hz) & ((f_hz < band.to_hz) | (band is beside.bands[-1]))
+    for band in residuals.bands:
+        inside = (f_hz >= band.from_hz) & ((f_hz < band.to_hz) | (band is residuals.bands[-1]))
         part, of = float(left[inside].sum()), float(measured[inside].sum())
         found.append(Part(band.from_hz, band.to_hz, _ratio(part, of), part / whole if whole > 0 else 0.0,
-                          float(np.sqrt(part)), sum(map(len, beside.left)), band.name))
+                          float(np.sqrt(part)), sum(map(len, residuals.left)), band.name))
     return tuple(found)
 
 
-def _by_speed(beside: Beside) -> tuple[Part, ...]:
-    speed = np.concatenate(beside.kept(lambda run: run.speed_mps))
+def _by_speed(residuals: ModelResiduals) -> tuple[Part, ...]:
+    speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
     low, high = float(speed.min()), float(speed.max())
     step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= _SPEED_BINS), 50.0)
     edges = np.arange(np.floor(low / step), np.floor(high / step) + 2) * step
-    return _binned(beside, speed, edges)
+    return _binned(residuals, speed, edges)
 
 
-def _by_amplitude(beside: Beside) -> tuple[Part, ...]:
-    size = round(BLOCK_S * beside.rate_hz)
-    level = np.concatenate([running_rms(one, size) for one in beside.model])
+def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
+    size = round(BLOCK_S * residuals.rate_hz)
+    level = np.concatenate([running_rms(one, size) for one in residuals.model])
     edges = np.unique(np.quantile(level, np.linspace(0, 1, _LEVELS + 1)))
     if len(edges) == 1:  # a model that does not move
         edges = np.array([edges[0], edges[0] + 1e-9])
     edges[-1] = np.nextafter(edges[-1], np.inf)
-    return _binned(beside, level, edges)
+    return _binned(residuals, level, edges)
 
 
-def _by_place(beside: Beside) -> tuple[Part, ...]:
-    length = place_length_m(beside.runs)
-    whole = sum(float(one @ one) for one in beside.left)
+def _by_place(residuals: ModelResiduals) -> tuple[Part, ...]:
+    length = place_length_m(residuals.runs)
+    whole = sum(float(one @ one) for one in residuals.left)
     found: list[Part] = []
-    for run, left, measured in zip(beside.runs, beside.left, beside.measured, strict=True):
+    for run, left, measured in zip(residuals.runs, residuals.left, residuals.measured, strict=True):
         at = run.distance_m[run.first:]
         edges = np.arange(np.floor(at.min() / length), np.floor(at.max() / length) + 2) * length
         found += _parts(at, edges, left, measured, whole, run.name)
     return tuple(found)
 
 
-def _binned(beside: Beside, values: Array, edges: Array) -> tuple[Part, ...]:
-    left, measured = np.concatenate(beside.left), np.concatenate(beside.measured)
+def _binned(residuals: ModelResiduals, values: Array, edges: Array) -> tuple[Part, ...]:
+    left, measured = np.concatenate(residuals.left), np.concatenate(residuals.measured)
     return tuple(_parts(values, edges, left, measured, float(left @ left)))
 
 

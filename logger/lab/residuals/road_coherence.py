@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.beside import Beside, frequencies, segments
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
@@ -61,24 +61,24 @@ class Coherence:
         return max(share, 0.0), float(gamma.sf(statistic, mean**2 / variance, scale=variance / mean))
 
 
-def with_road(beside: Beside) -> Coherence:
+def with_road(residuals: ModelResiduals) -> Coherence:
     """Of the residual and the road under the wheels that the car has."""
-    inputs = [_slopes(beside, behind_m) for behind_m in np.unique(beside.car.structure.behind_m)]
-    return _coherence(beside, inputs)
+    inputs = [_slopes(residuals, behind_m) for behind_m in np.unique(residuals.car.structure.behind_m)]
+    return _coherence(residuals, inputs)
 
 
-def _slopes(beside: Beside, behind_m: float) -> list[Array]:
+def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
     """How fast the road rises under a wheel, tracks averaged, the samples that count, per run [m/s]."""
     def of(run: Run) -> Array:
-        height = run.track.averaged(run.distance_m - behind_m, beside.car.structure.contact_patch_m)
+        height = run.track.averaged(run.distance_m - behind_m, residuals.car.structure.contact_patch_m)
         return np.gradient(height.reshape(run.count, -1).mean(axis=1), 1 / run.rate_hz)
 
-    return beside.kept(of)
+    return residuals.kept(of)
 
 
-def _coherence(beside: Beside, inputs: Sequence[Sequence[Array]]) -> Coherence:
-    left = segments(beside, beside.left)
-    roads = np.stack([segments(beside, one) for one in inputs], axis=2)
+def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> Coherence:
+    left = segments(residuals, residuals.left)
+    roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
     count = len(left)
     power = np.mean(np.abs(left) ** 2, axis=0)
     own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
@@ -89,4 +89,4 @@ def _coherence(beside: Beside, inputs: Sequence[Sequence[Array]]) -> Coherence:
     q, n = len(inputs), _WORTH * count
     chance = q / n
     share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
-    return Coherence(frequencies(beside), share, raw, q, n, power)
+    return Coherence(frequencies(residuals), share, raw, q, n, power)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.residual_whiteness import autocorrelation
-from logger.lab.beside import Beside
+from logger.lab.residuals.breakdown import ModelResiduals
 from logger.vehicle.passage import smooth_length
 from logger.vehicle.stepping import force_input
 
@@ -76,18 +76,18 @@ class ForceMap:
     hardening: Term
 
 
-def force_map(beside: Beside) -> ForceMap:
+def force_map(residuals: ModelResiduals) -> ForceMap:
     """The force that is missing in the suspensions, the same law in each."""
     rate_rms, travel_rms = (float(np.sqrt(np.mean(np.concatenate([getattr(one, name).ravel() for one in
-                            beside.responses]) ** 2))) or 1.0 for name in ("rate_mps", "travel_m"))
+                            residuals.responses]) ** 2))) or 1.0 for name in ("rate_mps", "travel_m"))
     rate_knots, travel_knots = _KNOTS * rate_rms, _KNOTS * travel_rms
-    regression = _Regression(beside)
+    regression = _Regression(residuals)
     return ForceMap(
-        _curve(regression, beside, rate_knots, [_hat(rate_knots, index, of_rate=True) for index in _USED]),
-        _curve(regression, beside, travel_knots, [_hat(travel_knots, index, of_rate=False) for index in _USED]),
-        regression.term(_through(beside, [lambda _, rate: np.abs(rate)])),
-        regression.term(_through(beside, [lambda _, rate: rate * np.abs(rate)])),
-        regression.term(_through(beside, [lambda travel, _: travel**3])))
+        _curve(regression, residuals, rate_knots, [_hat(rate_knots, index, of_rate=True) for index in _USED]),
+        _curve(regression, residuals, travel_knots, [_hat(travel_knots, index, of_rate=False) for index in _USED]),
+        regression.term(_through(residuals, [lambda _, rate: np.abs(rate)])),
+        regression.term(_through(residuals, [lambda _, rate: rate * np.abs(rate)])),
+        regression.term(_through(residuals, [lambda travel, _: travel**3])))
 
 
 def whitening(left: Sequence[Array]) -> Array:
@@ -105,15 +105,15 @@ def whitening(left: Sequence[Array]) -> Array:
 class _Regression:
     """The residual, and what is never physics, whitened."""
 
-    def __init__(self, beside: Beside) -> None:
-        self._filter = whitening(beside.left)
-        wheels = range(beside.responses[0].rate_mps.shape[1])
-        linear = [_through(beside, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
-        rates = [np.gradient(one, 1 / beside.rate_hz) for one in beside.model]
+    def __init__(self, residuals: ModelResiduals) -> None:
+        self._filter = whitening(residuals.left)
+        wheels = range(residuals.responses[0].rate_mps.shape[1])
+        linear = [_through(residuals, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
+        rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
         nuisance = [np.column_stack([*(one[index] for one in linear), model, rate])
-                    for index, (model, rate) in enumerate(zip(beside.model, rates, strict=True))]
+                    for index, (model, rate) in enumerate(zip(residuals.model, rates, strict=True))]
         self._plain, self._white = (_Without(np.concatenate(left), np.concatenate(columns)) for left, columns in (
-            (beside.left, nuisance), (self._whitened(beside.left), self._whitened(nuisance))))
+            (residuals.left, nuisance), (self._whitened(residuals.left), self._whitened(nuisance))))
 
     def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
         """Coefficients (k,), their covariance (k, k), the p-value of all together, and the share that they explain."""
@@ -168,9 +168,9 @@ class _Without:
         return coefficients / size, inverse / np.outer(size, size), int(kept.sum()), before, after
 
 
-def _curve(regression: _Regression, beside: Beside, knots: Array, shapes: Sequence[Shape]) -> Curve:
+def _curve(regression: _Regression, residuals: ModelResiduals, knots: Array, shapes: Sequence[Shape]) -> Curve:
     used = list(_USED)
-    coefficients, covariance, p_value, share = regression.fitted(_through(beside, shapes))
+    coefficients, covariance, p_value, share = regression.fitted(_through(residuals, shapes))
     # What a straight line through 0 would do is not told apart from a spring or damper a little off: it is taken out,
     # the middle counting as it is driven.
     weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
@@ -182,21 +182,21 @@ def _curve(regression: _Regression, beside: Beside, knots: Array, shapes: Sequen
     return Curve(knots, force, errors, p_value, share)
 
 
-def _through(beside: Beside, shapes: Sequence[Shape]) -> list[Array]:
+def _through(residuals: ModelResiduals, shapes: Sequence[Shape]) -> list[Array]:
     """What forces of these shapes in the suspensions leave at the sensor: (n, k) per run, the samples that count."""
-    structure = beside.car.structure
+    structure = residuals.car.structure
     n, w = len(structure.mass), len(structure.wheels)
     a, _ = structure.state_space()
     push = force_input(structure)[:, :w]
     found = []
-    for run, response in zip(beside.runs, beside.responses, strict=True):
+    for run, response in zip(residuals.runs, residuals.responses, strict=True):
         length = smooth_length(run.count + round(4 * run.rate_hz))
         f_hz = np.fft.rfftfreq(length, 1 / run.rate_hz)
         kept = np.flatnonzero(f_hz < _HIGHEST_OF_RATE * run.rate_hz)
         s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
         states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
-        transfer = (np.einsum("n,fnw->fw", beside.car.row @ a[n:], states) + beside.car.row @ push[n:])
-        transfer *= beside.car.factor(s)[:, None]
+        transfer = (np.einsum("n,fnw->fw", residuals.car.row @ a[n:], states) + residuals.car.row @ push[n:])
+        transfer *= residuals.car.factor(s)[:, None]
         columns = []
         for shape in shapes:
             force = np.fft.rfft(shape(response.travel_m, response.rate_mps), length, axis=0)

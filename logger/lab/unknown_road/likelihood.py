@@ -27,16 +27,13 @@ import numpy.typing as npt
 from logger.identification.unknown_road.drive_operator import Drive
 from logger.identification.unknown_road.marginal_likelihood import UnknownRoad
 from logger.identification.unknown_road.road_state import Options, RoadState
-from logger.lab.candidates import scaled_by
-from logger.lab.fitting import LEAST_SHARE
-from logger.lab.linear_response import Tabulated, response_of
-from logger.lab.noise import Noise, sensor_noise
-from logger.lab.nuisance import Nuisance, Tolerance, nuisance_of
-from logger.lab.stretches import Stretches
+from logger.lab.likelihood.noise_floor import Noise, sensor_noise
+from logger.lab.likelihood.priors import Tolerance, VehiclePrior
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.runs import Run
 from logger.vehicle.compose import Car, compose
-from logger.vehicle.effect import Chosen, Scale
-from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
+from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -44,12 +41,10 @@ Complex = npt.NDArray[np.complex128]
 
 _STRETCH_S, _LEAST_S = 10.0, 3.0
 _PLACE_OFF_M = 3.0
-_PROBES = 8
+PROBES = 8
 # What is granted to a stretch: deviations of its waviness, and of its places from those of the whole way.
 _WAVINESS, _WAVINESS_OFF = 2.0, 0.3
 _OFFSET_OFF_M = 0.05
-_LOG_STEP, _SHARE_STEP = 1e-3, 1e-3
-_MOST_STEPS, _LONGEST_LOG, _SETTLED, _MANY_ROUNDS = 10, 0.5, 0.1, 12
 _LEVEL, _TILT = 0, 1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
@@ -102,11 +97,11 @@ class SameRoad:
         stands = stands or vehicle
         self.runs, self.rate_hz = list(runs), runs[0].rate_hz
         self.vehicle = replace(vehicle, contact_patch_m=stands.contact_patch_m)  # that is not free
-        known = nuisance_of(vehicle, tolerance)
+        known = VehiclePrior.of(vehicle, tolerance)
         kept = [not name.endswith("contact_patch_m") for name in known.names]
-        self.nuisance = Nuisance(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
-                                 known.steps[kept])
-        self.stands = self.nuisance.logs(self.vehicle, stands)
+        self.prior = VehiclePrior(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
+                                  known.steps[kept], wall=False)
+        self.stands = self.prior.logs(self.vehicle, stands)
         structure = compose(stands).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
@@ -115,7 +110,7 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=_PROBES)
+        options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=PROBES)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
@@ -127,7 +122,7 @@ class SameRoad:
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
-        return compose(self.nuisance.vehicle(self.vehicle, logs), effects)
+        return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
         """Its response (x, f). ValueError if it does not answer in proportion to the road."""
@@ -177,7 +172,7 @@ class SameRoad:
     def cost(self, state: State) -> float:
         """What the state's numbers cost: squares of their deviations."""
         off, precision = self.granted(state.roads)
-        return float(((state.logs / self.nuisance.deviations) ** 2).sum() + precision @ off**2)
+        return float(((state.logs / self.prior.deviations) ** 2).sum() + precision @ off**2)
 
     def gain(self, before: State, after: State) -> float:
         """By how much minus twice the log-likelihood falls from one state to another, what is granted counted in."""
@@ -187,7 +182,7 @@ class SameRoad:
             table = self.table(before.gains + node * change, change[None])
             look = self.look(table, before.roads + node * road_change, information=False)
             total += weight * float(look.slopes[0] + look.slopes[1:] @ road_change)
-        return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / _PROBES)
+        return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
     def told(self, state: State) -> list[tuple[int, Array, Array]]:
         """Of every drive over every stretch: its run, what was read, and what the other drives make one expect."""
@@ -231,7 +226,7 @@ class SameRoad:
     @property
     def least_mps2(self) -> float:
         """What is left is no less than two right simulations differ by."""
-        return LEAST_SHARE * self.size_mps2
+        return DISCREPANCY * self.size_mps2
 
     @property
     def samples(self) -> int:
@@ -245,7 +240,7 @@ class SameRoad:
         for run, read, expected in self.told(state):
             left.setdefault(run, []).append(read - expected)
         runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
-        return sensor_noise([Stretches(one, whole=True) for one in runs], [one.measured_mps2 for one in runs],
+        return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
     def _at(self, own: Array, count: int) -> RoadState:
@@ -315,166 +310,3 @@ def _joined(run: Run, parts: Sequence[Array]) -> Run:
     left = np.concatenate([np.zeros(run.first), *parts])
     own = slice(len(left))
     return replace(run, measured_mps2=left, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])
-
-
-# --- fits ---
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A state that was fitted, with the information on its numbers.
-
-    moves          numbers of its effects
-    data           (m, m) information of the drives on the logs, the moves (on their scales) and the roads' numbers
-    information    the same with what is granted
-    problem        quick for states like this one
-    """
-
-    state: State
-    moves: tuple[Move, ...]
-    data: Array
-    information: Array
-    problem: SameRoad
-
-
-def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
-    """The most probable state, by Fisher's steps from this one."""
-    moves = moves_of(state.effects)
-    p, q = len(state.logs), len(moves)
-    here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
-    low, high = _bounds(state.effects, moves, len(here), p)
-    low[-1] = np.log(problem.least_mps2)
-    longest = _longest(state.effects, moves, len(here), p)
-    for count in range(steps):
-        logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
-        gains, slopes = _sloped(problem, effects, moves, logs)
-        if problem.rounds > _MANY_ROUNDS:
-            problem = problem.prepared(State(effects, logs, roads, gains))
-        look = problem.look(problem.table(gains, slopes), roads, information=True)
-        pull, grant = _granted(problem, logs, q, roads)
-        score = look.slopes - pull
-        step = _step(score, look.information + np.diag(grant), here, low, high)
-        if count and float(score @ step) < _SETTLED:
-            break
-        here = np.clip(here + np.clip(step, -longest, longest), low, high)
-    logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
-    found = State(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), look.information, look.information + np.diag(grant), problem)
-
-
-def _granted(problem: SameRoad, logs: Array, moves: int, roads: Array) -> tuple[Array, Array]:
-    """How strongly what is granted pulls at each number (m,), and its precision (m,)."""
-    off, precision = problem.granted(roads)
-    own = problem.nuisance.deviations**-2
-    grant = np.concatenate([own, np.zeros(moves), precision])
-    return grant * np.concatenate([logs, np.zeros(moves), off]), grant
-
-
-def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
-    """Fisher's step within bounds."""
-    free = ~(((here <= low) & (score < 0)) | ((here >= high) & (score > 0)))
-    step = np.zeros_like(here)
-    step[free] = inverse(information[np.ix_(free, free)]) @ score[free]
-    return step
-
-
-def inverse(information: Array, ridge: float = 1e-6) -> Array:
-    """Of a matrix whose rows may differ by powers of ten, held off singularity."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
-    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
-
-
-def _sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move],
-            logs: Array) -> tuple[Complex, Complex]:
-    """A response and its slopes by the logs and the moves."""
-    gains = problem.response(effects, logs)
-    slopes = []
-    for index in range(len(logs)):
-        beside = logs.copy()
-        beside[index] += _LOG_STEP
-        slopes.append((problem.response(effects, beside) - gains) / _LOG_STEP)
-    here = coordinates_of(effects, moves)
-    for index, step in enumerate(steps_of(effects, moves, _LOG_STEP, _SHARE_STEP)):
-        beside = here.copy()
-        beside[index] += step
-        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / step)
-    return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
-
-
-def _bounds(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> tuple[Array, Array]:
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
-    for index, move in enumerate(moves, first):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
-        ends = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
-        low[index], high[index] = ends
-    return low, high
-
-
-def _longest(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> Array:
-    """How far each number may go in one step."""
-    longest = np.full(count, _LONGEST_LOG)
-    for index, move in enumerate(moves, first):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
-        if parameter.scale is not Scale.LOG:
-            longest[index] = max(parameter.usual_way(),
-                                 0.5 * abs(coordinates_of(effects, [move])[0]))
-    return longest
-
-
-# --- trials ---
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """An effect at some values beside a model.
-
-    gain           what it promises, in minus twice the log-likelihood
-    at             the values at which it does
-    deviations     how many standard errors it stands out by at its values beside all that is free
-    beside_road    the same share of its information (0 to 1) that roads and places do not take
-    """
-
-    one: Chosen
-    gain: float
-    at: Chosen
-    deviations: float
-    beside_road: float
-
-
-def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
-    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response."""
-    state = base.state
-    gains, own = _sloped(problem, state.effects, base.moves, state.logs)
-    changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
-    k, p = len(ones), len(own)
-    look = problem.look(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
-    rest = np.r_[0:p, p + k : p + k + problem.count]
-    road = np.arange(p + k, p + k + problem.count)
-    pull, grant = _granted(problem, state.logs, len(base.moves), state.roads)
-    known = inverse(look.information[np.ix_(rest, rest)] + np.diag(grant))
-    by_road = inverse(look.information[np.ix_(road, road)] + np.diag(grant[p:]))
-    score = look.slopes[rest] - pull
-    found = []
-    for index, one in enumerate(ones, p):
-        alone, mixed = look.information[index, index], look.information[index, rest]
-        left = max(float(alone - mixed @ known @ mixed), 0.0)
-        taken = look.information[index, road]
-        share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
-        slope = float(look.slopes[index] - mixed @ known @ score)
-        found.append(_trial(one, slope, left, alone, share))
-    return found
-
-
-_STRONGEST, _WEAKEST, _NOTHING = 3.0, 0.03, 1e-4
-
-
-def _trial(one: Chosen, slope: float, left: float, alone: float, share: float) -> Trial:
-    if not left > _NOTHING * alone:
-        return Trial(one, 0.0, one, 0.0, max(share, 0.0))
-    strength = float(np.clip(slope / left, _WEAKEST, _STRONGEST))
-    scaled = scaled_by(one, strength)
-    if scaled is None:
-        strength, scaled = 1.0, one
-    gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / _PROBES)
-    return Trial(one, gain, scaled, float(np.sqrt(left)), max(share, 0.0))

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.unmeasured import SameRoad, State
+from logger.lab.unknown_road.likelihood import SameRoad, State
 from logger.vehicle.effect import Chosen
 
 Array = npt.NDArray[np.float64]

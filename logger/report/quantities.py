@@ -67,3 +67,11 @@ def chance(p_value: float) -> str:
 def finite(errors: Mapping[str, float]) -> dict[str, float]:
     """Those standard errors that are known."""
     return {name: error for name, error in errors.items() if isfinite(error)}
+
+
+def distance_error(off_m: float) -> list[str]:
+    """A sentence on distances that are off by so much at most [m], if that is more than usual; nothing for 0."""
+    if off_m == 0:
+        return []
+    return [f"The distances of these runs are off by more than usual: up to {off_m:.2g} m. The fits take that into "
+            "account."]

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.beside import Beside, Located, located, short_names
-from logger.lab.fitting import Problem, State
-from logger.lab.marks import DOUBT, Marks, read_marks
-from logger.lab.tones import NEIGHBOURS, loudest, periodogram
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown, short_names
+from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
+from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _CYCLE, _LINE, _OTHER_SPEED = 1.0, 2.0, 0.05
 
 
 @dataclass(frozen=True)
-class Turns:
+class SpatialLine:
     """What repeats along the way in the run where that is clearest: how often [1/m], and the speed that it mostly had;
     how probable by chance, which is certain where runs at other speeds do not have it; and the powers (n,) at all wave
     numbers (n,) [1/m] over their mean.
@@ -69,37 +69,37 @@ class Turns:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a model leaves: where it sits, its marks, and what repeats along the way (None: no run tells)."""
+    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run tells)."""
 
-    beside: Beside
-    where: Located
-    marks: Marks
-    turns: Turns | None
+    residuals: ModelResiduals
+    where: Breakdown
+    tests: ResidualTests
+    line: SpatialLine | None
 
 
-def shape_of(problem: Problem, state: State) -> Shape:
-    """The shape of what a fitted model leaves."""
-    car = problem.car(state.effects, state.logs)
-    responses = problem.runs.respond(car, problem.moved_m(state.wander))
-    beside = Beside(problem.runs.runs, car, state.predictions, responses)
-    unmoved = Beside(problem.runs.runs, car, problem.runs.predict(car), responses)
-    where = located(beside)
-    return Shape(beside, where, read_marks(beside, where, unmoved), turns_of(beside))
+def shape_of(posterior: Posterior, state: State) -> Shape:
+    """The shape of the residuals of a fitted model."""
+    runs, car = posterior.runs, posterior.car(state.effects, state.logs)
+    responses = runs.respond(car, posterior.moved_m(state.record))
+    residuals = ModelResiduals(runs.runs, car, state.predictions, responses)
+    as_recorded = ModelResiduals(runs.runs, car, runs.predict(car), responses)
+    where = breakdown(residuals)
+    return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 
 
 def sentences(shape: Shape) -> list[str]:
     """What it looks like."""
-    turns = [shape.turns.sentence] if shape.turns is not None and shape.turns.found else []
-    found = turns + [mark.sentence for mark in shape.marks.found]
-    return found or ["No mark of it stands out: it is spread over all frequencies, speeds and places."]
+    turns = [shape.line.sentence] if shape.line is not None and shape.line.found else []
+    found = turns + [test.sentence for test in shape.tests.found]
+    return found or ["No test says more: it is spread over all frequencies, speeds and places."]
 
 
-def turns_of(beside: Beside) -> Turns | None:
+def spatial_line_of(residuals: ModelResiduals) -> SpatialLine | None:
     """What repeats along the way: as for a tone in time, which it is told from where the speed changes or where another
     run, at another speed, has it too."""
     found = []
-    names = short_names(beside.runs)
-    for run, left in zip(beside.runs, beside.left, strict=True):
+    names = short_names(residuals.runs)
+    for run, left in zip(residuals.runs, residuals.left, strict=True):
         speed = run.speed_mps[run.first:]
         if speed.min() < _SLOWEST_MPS or run.distance_m[-1] <= run.distance_m[run.first]:
             continue
@@ -115,7 +115,7 @@ def turns_of(beside: Beside) -> Turns | None:
         at_per_m = float(per_m[stands_out[0]])
         usual_mps = float(np.median(speed))
         steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < _CYCLE
-        found.append(Turns(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
+        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
                            power[asked] / float(power[asked].mean()), steady))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
