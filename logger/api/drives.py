@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from logger.api.ranges import ADDED, NOISE, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
-from logger.api.shown import Result, Shown, table
+from logger.api.shown import Result, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
@@ -56,9 +56,9 @@ class Run(drive_file.Drive, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The acceleration over time."""
-        from logger.chart_data import Curves, Line
+        from logger.chart_data import Curves
 
-        return [Curves("Run", "time [s]", "acceleration [m/s2]", (Line("sensor", self.time_s, self.accel_z_mps2),))]
+        return [Curves("Run", "time [s]", "acceleration [m/s2]", (line("sensor", self.time_s, self.accel_z_mps2),))]
 
     @property
     def track(self) -> Track | None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
-from logger.api.shown import Result, Shown, table
+from logger.api.shown import Result, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import drive_file, profile_file
 
@@ -47,11 +47,11 @@ class Profile(profile_file.Profile, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The elevation of each track."""
-        from logger.chart_data import Curves, Line
+        from logger.chart_data import Curves
 
         tracks = {"left": self.elevation_m, "right": self.elevation_right_m}
         return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
-            Line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
+            line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
 
 
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
