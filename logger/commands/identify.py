@@ -49,7 +49,7 @@ from logger.files import write_text
 if TYPE_CHECKING:
     from logger.identification.drive_model import DriveModel
     from logger.identification.identifiability import NotIdentifiable
-    from logger.identification.prediction_error_fit import Fit, Options
+    from logger.identification.prediction_error_fit import Fit, FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.runs import Run
@@ -304,12 +304,12 @@ def _free_number(given: Model, road: RoadInput, name: str, start: float | None,
 
 def _road(args: argparse.Namespace) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.obstacle_paths import Bump, Step
+    from logger.identification.obstacle_paths import Bump, RoadStep
     from logger.identification.unknown_inputs import RoadInput
 
     found: dict[str, Any] = {}
     unplaced = []
-    for name, kind, needed in (("bump", Bump, ("height_m", "width_m")), ("step", Step, ("height_m",))):
+    for name, kind, needed in (("bump", Bump, ("height_m", "width_m")), ("step", RoadStep, ("height_m",))):
         text = getattr(args, name)
         if text is None:
             continue
@@ -359,8 +359,7 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     from logger.identification.session import LEAST_SAMPLES
     from logger.profiles.track import Track
     from logger.runs import Run
-    from logger.store.formats.drive_file import DRIVE, PROFILE, read_drive, read_run
-    from logger.store.formats.drive_file import Run as DriveOnRoad
+    from logger.store.formats.drive_file import DRIVE, PROFILE, DriveOnRoad, read_drive, read_run
 
     folder = path.is_dir()
     if flat_will_do and not (folder and (path / PROFILE).exists()):
@@ -374,7 +373,7 @@ def _record(path: Path, skip_s: float, flat_will_do: bool) -> Run:
     return Run(str(path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps, track, skip_s)
 
 
-def _options(args: argparse.Namespace, model: DriveModel) -> Options:
+def _options(args: argparse.Namespace, model: DriveModel) -> FitOptions:
     from logger.identification.session import fit_options
 
     rate_hz = model.records[0].rate_hz
