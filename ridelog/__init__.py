@@ -12,12 +12,14 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 """
 
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
+from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Number, add_effect, compare, diagnose
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
 from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
 from logger.errors import BadInput
+from logger.identification.identifiability import NotIdentifiable
 
 __all__ = [
     "AddedEffect",
@@ -30,9 +32,11 @@ __all__ = [
     "EffectInfo",
     "Effects",
     "Estimate",
+    "Identification",
     "Iri",
     "Log",
     "Model",
+    "NotIdentifiable",
     "Number",
     "Profile",
     "Record",
@@ -46,6 +50,7 @@ __all__ = [
     "diagnose",
     "effects",
     "estimate",
+    "identify",
     "iri",
     "make_run",
     "random_road",

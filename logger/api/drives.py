@@ -124,16 +124,17 @@ def make_run(
 
 
 def simulate(
-    vehicle: Model | Path | str, profile: Profile | Path | str, speed_mps: float, *,
+    vehicle: Model | Path | str, profile: Profile | Path | str,
+    speed_mps: float | tuple[npt.ArrayLike, npt.ArrayLike], *,
     obstacles: Mapping[str, Mapping[str, float]] | None = None, rate_hz: float = 100.0, noise_mps2: float = 0.0,
     step_mps2: float = 0.0, seed: int = 1, name: str = "simulated",
 ) -> Run:
-    """What a vehicle's accelerometer would record on a road: a run, from the front tires' start on the profile until a
-    second after the last wheel has left it.
+    """What a vehicle's accelerometer would record on a road: a run from the front tires' start on the profile on.
 
     vehicle       a model, or a name or file as in ``read_vehicle``; its effects are simulated with it
     profile       the road [m]; of two tracks a full car uses both, other cars the left one
-    speed_mps     the same all the way, 0.1 to 100 [m/s]
+    speed_mps     the same all the way, 0.1 to 100 [m/s], until a second after the last wheel has left the profile; or
+                  times (k,) [s], growing, and speeds (k,) [m/s] with straight lines between them
     obstacles     on the road: ``{"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}`` (Eq 4.41 of Blum 2015),
                   or a step, ramp, plate, pothole
     rate_hz       samples a second, 10 to 10 000, band-limited as a recorder does it (flat to 0.38 of the rate)
@@ -146,6 +147,9 @@ def simulate(
     >>> run = simulate("rav4-2009", random_road(iso_class="B", length_m=100.0), speed_mps=10.0)
     >>> run.accel_z_mps2.shape, round(float(run.accel_z_mps2.std()), 2)
     ((1130,), 0.27)
+    >>> braking = simulate("rav4-2009", run.profile, ([0.0, 5.0, 10.0], [12.0, 12.0, 0.0]))
+    >>> round(float(braking.distance_m[-1]), 2)
+    90.0
     """
     from logger.simulation.virtual_drive import (
         SENSOR,
@@ -158,9 +162,9 @@ def simulate(
     )
     from logger.vehicle.structure import body_point
 
-    if not (0.1 <= speed_mps <= 100.0 and 10.0 <= rate_hz <= 10_000.0 and noise_mps2 >= 0 and step_mps2 >= 0):
-        raise BadInput(f"simulate: expected 0.1 to 100 m/s, 10 to 10000 Hz, and no noise or step below 0, found "
-                       f"{speed_mps:g} m/s, {rate_hz:g} Hz, {noise_mps2:g} and {step_mps2:g} m/s2")
+    if not (10.0 <= rate_hz <= 10_000.0 and noise_mps2 >= 0 and step_mps2 >= 0):
+        raise BadInput(f"{name}: expected 10 to 10000 Hz, and no noise or step below 0, found {rate_hz:g} Hz, "
+                       f"{noise_mps2:g} and {step_mps2:g} m/s2")
     model = model_of(vehicle)
     road = profile if isinstance(profile, Profile) else read_profile(profile)
     try:
@@ -168,14 +172,29 @@ def simulate(
             Obstacle(kind, values, f"obstacle {kind}") for kind, values in (obstacles or {}).items()])
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
         place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
-        motion = motion_along(*at_one_speed(track, float(car.structure.behind_m.max()), speed_mps), track.start_m,
-                              rate_hz)
+        knots = (_knots(*speed_mps, name) if isinstance(speed_mps, tuple) else
+                 at_one_speed(track, float(car.structure.behind_m.max()), _in_range(speed_mps, name)))
+        motion = motion_along(*knots, track.start_m, rate_hz)
         columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,
                                  SensorErrors(noise_mps2, step_mps2, seed))
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
     time_s, accel_z_mps2, recorded_mps, distance_m = columns.values()
     return Run(Path(name), rate_hz, time_s, accel_z_mps2, recorded_mps, distance_m, None, None, _profile_of(track))
+
+
+def _in_range(speed_mps: float, name: str) -> float:
+    if not 0.1 <= speed_mps <= 100.0:
+        raise BadInput(f"{name}: expected a speed of 0.1 to 100 m/s, found {speed_mps:g}")
+    return speed_mps
+
+
+def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
+    times, speeds = (np.asarray(one, dtype=np.float64) for one in (time_s, speed_mps))
+    grows, possible = (np.diff(times) > 0).all(), ((speeds >= 0) & (speeds <= 100)).all()
+    if not 1 < len(times) == len(speeds) or not (grows and possible):
+        raise BadInput(f"{name}: expected two times or more that grow, and as many speeds of 0 to 100 m/s")
+    return times, speeds
 
 
 def _profile_of(track: Track) -> Profile:

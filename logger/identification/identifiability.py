@@ -55,11 +55,12 @@ class Finding:
 
 
 class NotIdentifiable(CheckFailed):
-    """The data do not tell what was asked. ``findings`` say what, and its text says it in words."""
+    """The data do not tell what was asked. ``findings`` say what, and its text says it in words; ``error_before`` that
+    of the model where every free number starts, None: not known."""
 
-    def __init__(self, findings: Sequence[Finding]) -> None:
+    def __init__(self, findings: Sequence[Finding], error_before: float | None = None) -> None:
         super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))
-        self.findings = list(findings)
+        self.findings, self.error_before = list(findings), error_before
 
 
 def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:

@@ -109,16 +109,20 @@ def test_each_record_shows_itself(names: dict[str, Any]) -> None:
     assert sum(len(one.charts()) for one in shown) >= 6
 
 
-@pytest.mark.parametrize("command", ["iri", "comfort", "estimate"])
+@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare"])
 def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     from logger.commands.main import main
 
     folder = names["folder"]
-    file = {"iri": folder / "profile.csv", "comfort": folder / "drive.csv", "estimate": folder}[command]
-    more = ["--vehicle", "rav4-2009"] if command == "estimate" else []
+    file = {"iri": folder / "profile.csv", "comfort": folder / "drive.csv"}.get(command, folder)
+    more = {"iri": [], "comfort": [], "identify": ["--vehicle", "rav4-2009", "--free", "sprung_mass_kg"]}.get(
+        command, ["--vehicle", "rav4-2009"])
     assert main([command, str(file), *more, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    found = ridelog.estimate(file, "rav4-2009") if more else getattr(ridelog, command)(file)
+    found = {"iri": lambda: ridelog.iri(file), "comfort": lambda: ridelog.comfort(file),
+             "estimate": lambda: ridelog.estimate(file, "rav4-2009"),
+             "identify": lambda: ridelog.identify("rav4-2009", file, ["sprung_mass_kg"]),
+             "compare": lambda: ridelog.compare("rav4-2009", file)}[command]()
     assert json.loads(json.dumps(found.as_json())) == printed
     assert main([command, str(file), *more]) == 0
     assert capsys.readouterr().out.rstrip() == repr(found).rstrip()
