@@ -22,7 +22,7 @@ from logger.store.formats import vehicle_file
 
 if TYPE_CHECKING:
     from logger.identification.drive_model import DriveModel
-    from logger.identification.prediction_error_fit import Fit, Options
+    from logger.identification.prediction_error_fit import Fit, FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.identification.unknown_road.road_state import Options as RoadOptions
@@ -243,10 +243,10 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
 
 def _road(question: Question) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.obstacle_paths import Bump, Step
+    from logger.identification.obstacle_paths import Bump, RoadStep
     from logger.identification.unknown_inputs import RoadInput
 
-    kinds, found = {"bump": Bump, "step": Step}, dict[str, Any]()
+    kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
     for name, numbers in question.obstacles.items():
         if name not in kinds:
             raise BadInput(f"obstacle {name}: expected {' or '.join(kinds)}")
@@ -316,7 +316,7 @@ def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: f
     return free(given.vehicle, name, start, between)
 
 
-def _options(model: DriveModel, question: Question) -> Options:
+def _options(model: DriveModel, question: Question) -> FitOptions:
     from logger.identification.session import fit_options
 
     half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz

@@ -264,8 +264,8 @@ def _bench(
     return bench_of(word, model, checked_runs(drives, thin), list(map(str, effect_files)), numbers, searches)
 
 
-def _on_a_road(run: Run) -> drive_file.Run:
+def _on_a_road(run: Run) -> drive_file.DriveOnRoad:
     track = run.track
     if track is None:
         raise BadInput(f"{run.path}: expected a run with the profile that it was driven on")
-    return drive_file.Run(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)}, track=track)
+    return drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)}, track=track)

@@ -19,7 +19,7 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
@@ -76,7 +76,7 @@ def main() -> int:
 def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
     model = VehicleModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
-    return fit(model, model.measured, Options(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
+    return fit(model, model.measured, FitOptions(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
 
 
 def rough(seed: int) -> Run:
@@ -240,7 +240,7 @@ def rubbing(figures: Figures) -> None:
                                [rubbing_run(seed, road_seed=seed % RUBBING_ROADS)], effects=there)
         noise: list[Noise] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
         began = time.process_time()
-        found = fit(model, model.measured, Options(noise=noise, starts=model.trials()))
+        found = fit(model, model.measured, FitOptions(noise=noise, starts=model.trials()))
         times.append(time.process_time() - began)
         errors.append([(found.parameters[name] - value) / found.standard_errors[name] for name, value in truth.items()])
     off = np.array(errors)
@@ -268,7 +268,7 @@ def passes(figures: Figures) -> None:
             numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
             model = VehicleModel(CAR, numbers, records, road)
-            found = fit(model, model.measured, Options(noise=[RoadNoise(model.road_spectra)]))
+            found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
             told = with_common_roughness(model, found).fit
             errors.append([found.parameters[name] / value - 1 for name, value in wanted.items()])
             alone.append([found.standard_errors[name] / value for name, value in wanted.items()])
@@ -376,7 +376,7 @@ def no_answer_without_a_road(figures: Figures) -> None:
 def fitted_input(car: Vehicle, record: Run, road: RoadInput, wanted: list[str]) -> Fit:
     numbers = [free_input(road, name) if is_input(name) else free(car, name) for name in wanted]
     model = VehicleModel(car, numbers, [record], road)
-    return fit(model, model.measured, Options(noise=[White()]))
+    return fit(model, model.measured, FitOptions(noise=[White()]))
 
 
 def response_of(wanted: list[str]) -> AxleResponse:

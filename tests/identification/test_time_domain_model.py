@@ -12,7 +12,7 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import TOGETHER, NotIdentifiable
 from logger.identification.noise_models import White
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, free_input, is_input
 from logger.profiles.track import Track
@@ -57,7 +57,7 @@ def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], r
 
 def found(*asked: object) -> Fit:
     made = model(*asked)  # type: ignore[arg-type]
-    return fit(made, made.measured, Options(noise=[White()], starts=made.trials()))
+    return fit(made, made.measured, FitOptions(noise=[White()], starts=made.trials()))
 
 
 def off(result: Fit, truth: dict[str, float]) -> Array:

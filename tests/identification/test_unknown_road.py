@@ -10,7 +10,7 @@ import pytest
 
 from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.fisher_scoring import Problem, RoadFit
+from logger.identification.unknown_road.fisher_scoring import RoadFit, RoadProblem
 from logger.identification.unknown_road.road_fit import fit_roads
 from logger.identification.unknown_road.road_state import GD_N0, NOISE, Options
 from logger.profiles.track import Track
@@ -99,7 +99,7 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     road = track(120.0, 2)
     drives = [driven(HALF, road, 12.0, 25.0, 1), driven(HALF, road, 20.0, 25.0, 2, 0.4)]
     options = Options(free_waviness=True, probes=40, scale_off=0.01)
-    problem = Problem(response(HALF, MASS, DAMPERS), [drives], options)
+    problem = RoadProblem(response(HALF, MASS, DAMPERS), [drives], options)
     x = problem.start()
     x[-2] = 0.3
     one = problem.roads[0]
