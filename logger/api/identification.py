@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from logger.api.bench import slow_words, unsaid
 from logger.api.drives import Run, read_run
+from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.api.shown import Result
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
@@ -31,10 +32,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-NOISES = ("auto", "white", "ar", "road")
-MOST_TRIES = 1000
-# Of roads that were not measured: how wavy.
-WAVINESS, FLATTEST, STEEPEST = 2.0, 1.0, 3.5
+USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"
 # By how much the distances of two drives over one road may disagree.
 _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
@@ -48,7 +46,7 @@ class Question:
     free            names, as of ``identify``
     start, bounds   where numbers start and stay, by name
     obstacles       on the road: numbers [m] of a ``bump`` or a ``step``; without ``start_m`` it is looked for
-    noise           what the model leaves: one of ``NOISES``
+    noise           what the model leaves: one of ``NOISE_MODELS``
     low_pass_hz     what lies above is left out [Hz]; None: nothing is
     robust          single wild readings count less
     tries           further starts
@@ -64,7 +62,7 @@ class Question:
     low_pass_hz: float | None = None
     robust: bool = False
     tries: int = 0
-    waviness: float = WAVINESS
+    waviness: float = USUAL_WAVINESS
     said: str = "{}"
 
     def wrong(self, option: str, words: str) -> BadInput:
@@ -107,7 +105,8 @@ def identify(
     vehicle: Model | Path | str, runs: Run | Path | str | Sequence[Run | Path | str], free: Sequence[str], *,
     start: Mapping[str, float] | None = None, bounds: Mapping[str, tuple[float, float]] | None = None,
     obstacles: Mapping[str, Mapping[str, float]] | None = None, noise: str = "auto", low_pass_hz: float | None = None,
-    robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured", waviness: float = WAVINESS,
+    robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured",
+    waviness: float = USUAL_WAVINESS,
 ) -> Identification:
     """Find numbers of a vehicle, of its effects, and of what is not known of the road, each with its standard error.
 
@@ -134,11 +133,11 @@ def identify(
     >>> abs(found.parameters["sprung_mass_kg"] - 900.0) < 4 * found.standard_errors["sprung_mass_kg"], found.converged
     (True, True)
     """
-    if road not in ("measured", "unmeasured", "same") or noise not in NOISES or not 0 <= tries <= MOST_TRIES:
-        raise BadInput(f"identify: expected road measured, unmeasured or same, noise out of {', '.join(NOISES)}, and "
-                       f"0 to {MOST_TRIES} tries, found {road}, {noise} and {tries}")
-    if not FLATTEST <= waviness <= STEEPEST:
-        raise BadInput(f"identify: expected a waviness of {FLATTEST:g} to {STEEPEST:g}, found {waviness:g}")
+    for name, word, known in (("road", road, ("measured", "unmeasured", "same")), ("noise", noise, NOISE_MODELS)):
+        if word not in known:
+            raise BadInput(f"{name} {word}: expected one of {', '.join(known)}")
+    TRIES.check("tries", tries)
+    WAVINESS.check("waviness", waviness)
     model = model_of(vehicle)
     word = str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
     given = [runs] if isinstance(runs, Run | Path | str) else list(runs)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.bench import TOLERANCE, Bench, Tell, bench_of, deviation_of, unsaid
+from logger.api.bench import Bench, Tell, bench_of, deviation_of, unsaid
 from logger.api.drives import Run, read_run
+from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
 from logger.api.shown import Result
 from logger.api.vehicles import Model, model_of
@@ -50,7 +51,7 @@ class Comparison(Result):
         return self.spectra
 
 
-def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = TOLERANCE) -> Comparison:
+def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL_TOLERANCE) -> Comparison:
     """Compare a model with measurements: the error, where it sits, and what kind of thing is missing.
 
     vehicle      a model, or a name or file as in ``read_vehicle``
@@ -121,7 +122,7 @@ class Diagnosis(Result):
 
 def diagnose(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = TOLERANCE, progress: Tell = unsaid,
+    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
 ) -> Diagnosis:
     """Which physical effect a model lacks: each that is known is tried, and judged on what no fit saw. It takes from
     seconds to minutes, and the compiler of the ``lab`` extra.
@@ -210,7 +211,7 @@ class AddedEffect(Result):
 
 def add_effect(
     name: Path | str, vehicle: Model | Path | str, runs: Runs, *, start: Mapping[str, float] | None = None,
-    tolerance: float = TOLERANCE, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
 ) -> AddedEffect:
     """Add a physical effect to a model: fitted with the car's numbers on all of the runs.
 
