@@ -40,7 +40,7 @@ from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from ..support.drives.bumps import bump_record, road_record
-from ..support.drives.rubbing import FRICTION_N, GROWN_AT_MPS, rubbing_run
+from ..support.drives.rubbing import FRICTION_N, rubbing_run
 from .figures import Figures
 
 Array = npt.NDArray[np.float64]
@@ -228,10 +228,10 @@ def unknown_bump(figures: Figures) -> None:
 
 
 def rubbing(figures: Figures) -> None:
-    """Mass and dry friction together, on drives by Newton's laws that SciPy integrated."""
+    """Mass and dry friction together, on drives of the validation's own simulator."""
     truth = {MASS: 875.0, FRICTION: FRICTION_N}
     law = shipped_effects()["dry_friction"]
-    there = [chosen(law, {"friction_force_n": 60.0, "transition_velocity_m_per_s": GROWN_AT_MPS})]
+    there = [chosen(law, {"friction_force_n": 60.0})]
     move = move_named(there, FRICTION)
     assert move is not None
     errors, times = [], []
@@ -247,7 +247,7 @@ def rubbing(figures: Figures) -> None:
     figures.at_most("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 1.3, "")
     figures.at_least("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 0.7, "")
     figures.at_least("mass and friction: within two standard errors", 100 * float((np.abs(off) < 2).mean()), 90.0, "%")
-    print(f"   {RUBBING_DRAWS} draws on {RUBBING_ROADS} roads, 10 s each; standard errors of the last "
+    print(f"   {RUBBING_DRAWS} draws on {RUBBING_ROADS} roads, 15 s each; standard errors of the last "
           f"{found.standard_errors[MASS]:.1f} kg and {found.standard_errors[FRICTION]:.1f} N; "
           f"{np.median(times):.1f} s of the processor a fit")
 
