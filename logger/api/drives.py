@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from logger.api.ranges import ADDED, NOISE, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
-from logger.api.shown import Result, Shown, line, table
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
@@ -203,7 +203,7 @@ def _profile_of(track: Track) -> Profile:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Result):
+class Estimate(CommandResult):
     """The road's roughness from a drive's acceleration, in w windows.
 
     mean_iri_m_per_km    of the windows that are known; NaN: none is

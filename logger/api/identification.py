@@ -13,7 +13,7 @@ import numpy.typing as npt
 from logger.api.bench import slow_words, unsaid
 from logger.api.drives import Run, read_run
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
-from logger.api.shown import Result
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.runs import SKIP_S
@@ -71,7 +71,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FittedNumbers:
     """A fit, the model with its numbers, the object for a program, and the lines for a person."""
 
     fit: Fit | RoadFit
@@ -81,7 +81,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result):
+class Identification(CommandResult):
     """Numbers that were found.
 
     parameters        by name; ``standard_errors`` likewise
@@ -186,7 +186,7 @@ def records_of(drives: Sequence[tuple[Drive, Track | None]], skip_s: float, ques
 
 
 def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                      warn: Callable[[str], None] = unsaid) -> Found:
+                      warn: Callable[[str], None] = unsaid) -> FittedNumbers:
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
 
     word    by which the user knows the vehicle
@@ -216,7 +216,7 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     common = with_common_roughness(model, fit)
     fit = common.fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
-    return Found(
+    return FittedNumbers(
         fit, _fitted(given, model, fit),
         {**as_json(fit, *checks), "common_roughness": common.share, "runs": [record.name for record in records]},
         [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common)])
@@ -340,7 +340,7 @@ def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_f
 
 
 def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                        one_road: bool) -> Found:
+                        one_road: bool) -> FittedNumbers:
     """The fit over roads that were not measured: one for all runs, or one for each. BadInput and ``NotIdentifiable`` as
     ``identify``."""
     from logger.identification.session import UnusableRun, drives_of
@@ -364,7 +364,7 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
         raise question.wrong("free", f": {error}") from None
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
-    return Found(
+    return FittedNumbers(
         fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values())))),
         {**as_json(fit, parameters), "runs": [record.name for record in records]},
         [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters)])

@@ -11,7 +11,7 @@ from logger.api.bench import Bench, Tell, bench_of, deviation_of, unsaid
 from logger.api.drives import Run, read_run
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
-from logger.api.shown import Result
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
@@ -25,7 +25,7 @@ Runs = Run | Path | str | Sequence[Run | Path | str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
+class Comparison(CommandResult):
     """A model beside its measurements. Errors are rms(measured - model) / rms(measured), the first 2 s of each run left
     out.
 
@@ -95,7 +95,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Result):
+class Diagnosis(CommandResult):
     """Which physical effects a model lacks.
 
     baseline_error       of the model as it stands
@@ -158,7 +158,7 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class Number:
+class ShiftedNumber:
     """A number of the car, refitted without an effect and with it, each with its standard error.
 
     nominal    as it was given
@@ -175,7 +175,7 @@ class Number:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AddedEffect(Result):
+class AddedEffect(CommandResult):
     """A model with one more effect, fitted with the car's numbers on all of the runs.
 
     effect              its name; ``parameters`` and ``standard_errors`` by name
@@ -197,7 +197,7 @@ class AddedEffect(Result):
     noise_floor_error: float
     p_value: float
     helps: bool
-    numbers: tuple[Number, ...]
+    numbers: tuple[ShiftedNumber, ...]
     model: Model
 
     def figures(self) -> list[Html]:
@@ -239,7 +239,7 @@ def add_effect(
     found = bench.added(bench.searched(effect, values, progress), 1 if is_given else len(effect.trials()), progress)
     told = as_json(found)
     numbers = tuple(
-        Number(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
+        ShiftedNumber(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
                one["with_standard_error"], one["name"] in told["biased"]) for one in told["numbers"])
     return AddedEffect(
         "\n".join(addition_lines(found)), told, told["effect"], told["parameters"], told["standard_errors"],

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.drives import Run
-from logger.api.shown import Result, Shown, line, table
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import record_file
 
@@ -59,7 +59,7 @@ def read_record(path: Path | str) -> Record:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comfort(Result):
+class Comfort(CommandResult):
     """Values of the vertical axis; those of the others and of health are in ``as_json``.
 
     weighting       that it was weighted by

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
-from logger.api.shown import Result, Shown, line, table
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import drive_file, profile_file
 
@@ -136,7 +136,7 @@ def roughness_of(iso_class: str | None, gd_n0_cm3: float | None, iri_m_per_km: f
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Iri(Result):
+class Iri(CommandResult):
     """The IRI of a profile [m/km], whole and in w windows.
 
     iri_m_per_km          of the left track, or of the only one
@@ -190,7 +190,7 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoadClass(Result):
+class RoadClass(CommandResult):
     """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
 
     road_class       A to H (ISO 8608)

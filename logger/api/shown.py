@@ -45,7 +45,7 @@ class Shown(ABC):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Shown):
+class CommandResult(Shown):
     """What a command says.
 
     text    the lines that it prints

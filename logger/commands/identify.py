@@ -45,7 +45,7 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.api.identification import Found, Question
+    from logger.api.identification import FittedNumbers, Question
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.prediction_error_fit import Fit
     from logger.identification.unknown_road.fisher_scoring import RoadFit
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE if found.fit.converged else EXIT_CHECK_FAILED
 
 
-def _found(args: argparse.Namespace) -> Found:
+def _found(args: argparse.Namespace) -> FittedNumbers:
     from logger.api.identification import on_measured_roads, on_unmeasured_roads, records_of
     from logger.commands.lab_model import warned
     from logger.shipped import vehicle_path

@@ -407,7 +407,7 @@ def cut(data, places):
     return [(a // 100 * 160_000, data[a:b]) for a, b in pairwise(edges)]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.sampled_from(["ps2119", "lines"]),
     st.lists(st.one_of(st.sampled_from([ROAD, SPOKEN, ROAD[5:200]]), st.binary(max_size=30)), max_size=4).map(b"".join),

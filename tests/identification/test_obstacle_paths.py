@@ -52,7 +52,7 @@ def test_against_a_dense_profile(one: Obstacle) -> None:
 
 
 @given(st.floats(-3, 6), st.floats(0.01, 0.3), st.floats(0.3, 5), st.floats(0.01, 0.4))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_slopes_are_those_of_the_path(start_m: float, height_m: float, width_m: float, patch_m: float) -> None:
     for kind, numbers in ((Bump, [start_m, height_m, width_m]), (RoadStep, [start_m, height_m])):
         slopes = kind(*numbers).slopes(patch_m)
