@@ -137,6 +137,7 @@ def test_one_drive_over_a_road_of_which_only_the_kind_is_known() -> None:
     assert fitted.roads[NOISE] == pytest.approx(NOISE_MPS2, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_probes_have_in_common_is_small_at_the_end() -> None:
     """Estimates that differ by nothing but the probes: their scatter is the standard error over the root of so many."""
     drives = [[driven(HALF, track(60.0, 3), 14.0, 50.0, 3)]]
@@ -164,6 +165,7 @@ def test_two_drives_over_one_road_at_different_speeds() -> None:
     assert np.corrcoef(*slopes)[0, 1] > 0.8
 
 
+@pytest.mark.slow
 def test_distances_that_disagree_a_little_are_found() -> None:
     road = track(150.0, 4)
     slow, fast = driven(HALF, road, 10.0, 120.0, 1), driven(HALF, road, 18.0, 120.0, 2)
@@ -195,6 +197,7 @@ def test_roads_add_up() -> None:
     assert {f"road1.{GD_N0}", f"road2.{GD_N0}", NOISE} == set(both.roads)
 
 
+@pytest.mark.slow
 def test_what_no_such_drive_can_tell() -> None:
     drive = driven(HALF, track(150.0, 5), 14.0, 120.0, 5)
     with pytest.raises(NotIdentifiable) as caught:

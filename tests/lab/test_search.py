@@ -97,6 +97,7 @@ STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": 
 ROUGHER = {"bump_stop": 2.0, "wheel_lift": 6.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALONE)
 def test_every_effect_is_accepted_where_it_is_what_is_missing(name: str) -> None:
     there = chosen(EFFECTS[name], EFFECTS[name].usual | STRONGER.get(name, {}))
