@@ -13,7 +13,7 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
 from logger.api.identification import Identification, identify
-from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Number, add_effect, compare, diagnose
+from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
@@ -37,12 +37,12 @@ __all__ = [
     "Log",
     "Model",
     "NotIdentifiable",
-    "Number",
     "Profile",
     "Record",
     "RoadClass",
     "Run",
     "Samples",
+    "ShiftedNumber",
     "add_effect",
     "classify",
     "comfort",

@@ -10,6 +10,7 @@ from pathlib import Path
 # Set before NumPy is imported, here and in every command that a test starts.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import hypothesis
 import pytest
 
 from logger.demo.simulated_drive import Drive, record, simulate_drive
@@ -17,6 +18,10 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
 from .support.drives.short_drive import SHORT_PLAN
+
+# A busy machine is no fault of an example.
+hypothesis.settings.register_profile("any_machine", deadline=None)
+hypothesis.settings.load_profile("any_machine")
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
 from logger.units import STANDARD_GRAVITY_MPS2
 
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
-TOLERANCE = 0.04
-TOLERANCES = (0.001, 0.5)
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
 _LEAST_MPS2 = 1e-4
 _ALIKE, _NEAR = 0.8, 0.3
@@ -217,9 +216,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
 def deviation_of(tolerance: float) -> float:
     """The deviation, as a share, that a tolerance either way is taken for. BadInput for one that no car's numbers
     have."""
-    low, high = TOLERANCES
-    if not low <= tolerance <= high:
-        raise BadInput(f"tolerance {tolerance:g}: expected {low:g} to {high:g}")
+    TOLERANCE.check("tolerance", tolerance)
     return tolerance / _BAND_DEVIATIONS
 
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.ranges import ADDED, NOISE, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
-from logger.api.shown import Result, Shown, table
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
@@ -55,9 +56,9 @@ class Run(drive_file.Drive, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The acceleration over time."""
-        from logger.chart_data import Curves, Line
+        from logger.chart_data import Curves
 
-        return [Curves("Run", "time [s]", "acceleration [m/s2]", (Line("sensor", self.time_s, self.accel_z_mps2),))]
+        return [Curves("Run", "time [s]", "acceleration [m/s2]", (line("sensor", self.time_s, self.accel_z_mps2),))]
 
     @property
     def track(self) -> Track | None:
@@ -162,9 +163,11 @@ def simulate(
     )
     from logger.vehicle.structure import body_point
 
-    if not (10.0 <= rate_hz <= 10_000.0 and noise_mps2 >= 0 and step_mps2 >= 0):
-        raise BadInput(f"{name}: expected 10 to 10000 Hz, and no noise or step below 0, found {rate_hz:g} Hz, "
-                       f"{noise_mps2:g} and {step_mps2:g} m/s2")
+    RATE.check("rate_hz", rate_hz)
+    ADDED.check("noise_mps2", noise_mps2)
+    ADDED.check("step_mps2", step_mps2)
+    if not isinstance(speed_mps, tuple):
+        SPEED.check("speed_mps", speed_mps)
     model = model_of(vehicle)
     road = profile if isinstance(profile, Profile) else read_profile(profile)
     try:
@@ -173,7 +176,7 @@ def simulate(
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
         place = body_point(car.structure, car.vehicle.sensor.ahead_m, car.vehicle.sensor.left_m)
         knots = (_knots(*speed_mps, name) if isinstance(speed_mps, tuple) else
-                 at_one_speed(track, float(car.structure.behind_m.max()), _in_range(speed_mps, name)))
+                 at_one_speed(track, float(car.structure.behind_m.max()), speed_mps))
         motion = motion_along(*knots, track.start_m, rate_hz)
         columns = recorded_drive(car, bool(model.effects), {SENSOR: place}, track, motion, rate_hz,
                                  SensorErrors(noise_mps2, step_mps2, seed))
@@ -181,12 +184,6 @@ def simulate(
         raise BadInput(f"{name}: {error}") from None
     time_s, accel_z_mps2, recorded_mps, distance_m = columns.values()
     return Run(Path(name), rate_hz, time_s, accel_z_mps2, recorded_mps, distance_m, None, None, _profile_of(track))
-
-
-def _in_range(speed_mps: float, name: str) -> float:
-    if not 0.1 <= speed_mps <= 100.0:
-        raise BadInput(f"{name}: expected a speed of 0.1 to 100 m/s, found {speed_mps:g}")
-    return speed_mps
 
 
 def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
@@ -206,7 +203,7 @@ def _profile_of(track: Track) -> Profile:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Result):
+class Estimate(CommandResult):
     """The road's roughness from a drive's acceleration, in w windows.
 
     mean_iri_m_per_km    of the windows that are known; NaN: none is
@@ -269,9 +266,9 @@ def estimate(
     model = model_of(vehicle)
     if model.effects:
         raise BadInput(f"{model.vehicle.name}: expected a vehicle without effects")
-    if not (1e-4 <= noise_mps2 <= 100.0 and 0.0 <= step_mps2 <= 100.0 and 1.0 <= window_m <= 1000.0):
-        raise BadInput("estimate: expected 1e-4 to 100 m/s2 of noise, a step of 0 to 100 m/s2 and windows of 1 to 1000 "
-                       f"m, found {noise_mps2:g} and {step_mps2:g} m/s2, {window_m:g} m")
+    NOISE.check("noise_mps2", noise_mps2)
+    ADDED.check("step_mps2", step_mps2)
+    WINDOW.check("window_m", window_m)
     drive = run if isinstance(run, Run) else read_run(run)
     found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
     told, windows = as_json(str(drive.path), found), found.windows

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from logger.api.bench import slow_words, unsaid
 from logger.api.drives import Run, read_run
-from logger.api.shown import Result
+from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.runs import SKIP_S
@@ -21,7 +22,7 @@ from logger.store.formats import vehicle_file
 
 if TYPE_CHECKING:
     from logger.identification.drive_model import DriveModel
-    from logger.identification.prediction_error_fit import Fit, Options
+    from logger.identification.prediction_error_fit import Fit, FitOptions
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.identification.unknown_road.road_state import Options as RoadOptions
@@ -31,10 +32,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-NOISES = ("auto", "white", "ar", "road")
-MOST_TRIES = 1000
-# Of roads that were not measured: how wavy.
-WAVINESS, FLATTEST, STEEPEST = 2.0, 1.0, 3.5
+USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"
 # By how much the distances of two drives over one road may disagree.
 _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
@@ -48,7 +46,7 @@ class Question:
     free            names, as of ``identify``
     start, bounds   where numbers start and stay, by name
     obstacles       on the road: numbers [m] of a ``bump`` or a ``step``; without ``start_m`` it is looked for
-    noise           what the model leaves: one of ``NOISES``
+    noise           what the model leaves: one of ``NOISE_MODELS``
     low_pass_hz     what lies above is left out [Hz]; None: nothing is
     robust          single wild readings count less
     tries           further starts
@@ -64,7 +62,7 @@ class Question:
     low_pass_hz: float | None = None
     robust: bool = False
     tries: int = 0
-    waviness: float = WAVINESS
+    waviness: float = USUAL_WAVINESS
     said: str = "{}"
 
     def wrong(self, option: str, words: str) -> BadInput:
@@ -73,7 +71,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FittedNumbers:
     """A fit, the model with its numbers, the object for a program, and the lines for a person."""
 
     fit: Fit | RoadFit
@@ -83,7 +81,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result):
+class Identification(CommandResult):
     """Numbers that were found.
 
     parameters        by name; ``standard_errors`` likewise
@@ -107,7 +105,8 @@ def identify(
     vehicle: Model | Path | str, runs: Run | Path | str | Sequence[Run | Path | str], free: Sequence[str], *,
     start: Mapping[str, float] | None = None, bounds: Mapping[str, tuple[float, float]] | None = None,
     obstacles: Mapping[str, Mapping[str, float]] | None = None, noise: str = "auto", low_pass_hz: float | None = None,
-    robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured", waviness: float = WAVINESS,
+    robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured",
+    waviness: float = USUAL_WAVINESS,
 ) -> Identification:
     """Find numbers of a vehicle, of its effects, and of what is not known of the road, each with its standard error.
 
@@ -134,11 +133,11 @@ def identify(
     >>> abs(found.parameters["sprung_mass_kg"] - 900.0) < 4 * found.standard_errors["sprung_mass_kg"], found.converged
     (True, True)
     """
-    if road not in ("measured", "unmeasured", "same") or noise not in NOISES or not 0 <= tries <= MOST_TRIES:
-        raise BadInput(f"identify: expected road measured, unmeasured or same, noise out of {', '.join(NOISES)}, and "
-                       f"0 to {MOST_TRIES} tries, found {road}, {noise} and {tries}")
-    if not FLATTEST <= waviness <= STEEPEST:
-        raise BadInput(f"identify: expected a waviness of {FLATTEST:g} to {STEEPEST:g}, found {waviness:g}")
+    for name, word, known in (("road", road, ("measured", "unmeasured", "same")), ("noise", noise, NOISE_MODELS)):
+        if word not in known:
+            raise BadInput(f"{name} {word}: expected one of {', '.join(known)}")
+    TRIES.check("tries", tries)
+    WAVINESS.check("waviness", waviness)
     model = model_of(vehicle)
     word = str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
     given = [runs] if isinstance(runs, Run | Path | str) else list(runs)
@@ -187,7 +186,7 @@ def records_of(drives: Sequence[tuple[Drive, Track | None]], skip_s: float, ques
 
 
 def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                      warn: Callable[[str], None] = unsaid) -> Found:
+                      warn: Callable[[str], None] = unsaid) -> FittedNumbers:
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
 
     word    by which the user knows the vehicle
@@ -217,7 +216,7 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     common = with_common_roughness(model, fit)
     fit = common.fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
-    return Found(
+    return FittedNumbers(
         fit, _fitted(given, model, fit),
         {**as_json(fit, *checks), "common_roughness": common.share, "runs": [record.name for record in records]},
         [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common)])
@@ -244,10 +243,10 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
 
 def _road(question: Question) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.obstacle_paths import Bump, Step
+    from logger.identification.obstacle_paths import Bump, RoadStep
     from logger.identification.unknown_inputs import RoadInput
 
-    kinds, found = {"bump": Bump, "step": Step}, dict[str, Any]()
+    kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
     for name, numbers in question.obstacles.items():
         if name not in kinds:
             raise BadInput(f"obstacle {name}: expected {' or '.join(kinds)}")
@@ -317,7 +316,7 @@ def _free_number(given: vehicle_file.Model, road: RoadInput, name: str, start: f
     return free(given.vehicle, name, start, between)
 
 
-def _options(model: DriveModel, question: Question) -> Options:
+def _options(model: DriveModel, question: Question) -> FitOptions:
     from logger.identification.session import fit_options
 
     half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz
@@ -341,7 +340,7 @@ def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_f
 
 
 def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Record], question: Question,
-                        one_road: bool) -> Found:
+                        one_road: bool) -> FittedNumbers:
     """The fit over roads that were not measured: one for all runs, or one for each. BadInput and ``NotIdentifiable`` as
     ``identify``."""
     from logger.identification.session import UnusableRun, drives_of
@@ -365,7 +364,7 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
         raise question.wrong("free", f": {error}") from None
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
-    return Found(
+    return FittedNumbers(
         fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values())))),
         {**as_json(fit, parameters), "runs": [record.name for record in records]},
         [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters)])

@@ -7,10 +7,11 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.bench import TOLERANCE, Bench, Tell, bench_of, deviation_of, unsaid
+from logger.api.bench import Bench, Tell, bench_of, deviation_of, unsaid
 from logger.api.drives import Run, read_run
+from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
-from logger.api.shown import Result
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
@@ -24,7 +25,7 @@ Runs = Run | Path | str | Sequence[Run | Path | str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
+class Comparison(CommandResult):
     """A model beside its measurements. Errors are rms(measured - model) / rms(measured), the first 2 s of each run left
     out.
 
@@ -50,7 +51,7 @@ class Comparison(Result):
         return self.spectra
 
 
-def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = TOLERANCE) -> Comparison:
+def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL_TOLERANCE) -> Comparison:
     """Compare a model with measurements: the error, where it sits, and what kind of thing is missing.
 
     vehicle      a model, or a name or file as in ``read_vehicle``
@@ -94,7 +95,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Result):
+class Diagnosis(CommandResult):
     """Which physical effects a model lacks.
 
     baseline_error       of the model as it stands
@@ -121,7 +122,7 @@ class Diagnosis(Result):
 
 def diagnose(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = TOLERANCE, progress: Tell = unsaid,
+    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
 ) -> Diagnosis:
     """Which physical effect a model lacks: each that is known is tried, and judged on what no fit saw. It takes from
     seconds to minutes, and the compiler of the ``lab`` extra.
@@ -157,7 +158,7 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class Number:
+class ShiftedNumber:
     """A number of the car, refitted without an effect and with it, each with its standard error.
 
     nominal    as it was given
@@ -174,7 +175,7 @@ class Number:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AddedEffect(Result):
+class AddedEffect(CommandResult):
     """A model with one more effect, fitted with the car's numbers on all of the runs.
 
     effect              its name; ``parameters`` and ``standard_errors`` by name
@@ -196,7 +197,7 @@ class AddedEffect(Result):
     noise_floor_error: float
     p_value: float
     helps: bool
-    numbers: tuple[Number, ...]
+    numbers: tuple[ShiftedNumber, ...]
     model: Model
 
     def figures(self) -> list[Html]:
@@ -210,7 +211,7 @@ class AddedEffect(Result):
 
 def add_effect(
     name: Path | str, vehicle: Model | Path | str, runs: Runs, *, start: Mapping[str, float] | None = None,
-    tolerance: float = TOLERANCE, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
 ) -> AddedEffect:
     """Add a physical effect to a model: fitted with the car's numbers on all of the runs.
 
@@ -238,7 +239,7 @@ def add_effect(
     found = bench.added(bench.searched(effect, values, progress), 1 if is_given else len(effect.trials()), progress)
     told = as_json(found)
     numbers = tuple(
-        Number(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
+        ShiftedNumber(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
                one["with_standard_error"], one["name"] in told["biased"]) for one in told["numbers"])
     return AddedEffect(
         "\n".join(addition_lines(found)), told, told["effect"], told["parameters"], told["standard_errors"],
@@ -263,8 +264,8 @@ def _bench(
     return bench_of(word, model, checked_runs(drives, thin), list(map(str, effect_files)), numbers, searches)
 
 
-def _on_a_road(run: Run) -> drive_file.Run:
+def _on_a_road(run: Run) -> drive_file.DriveOnRoad:
     track = run.track
     if track is None:
         raise BadInput(f"{run.path}: expected a run with the profile that it was driven on")
-    return drive_file.Run(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)}, track=track)
+    return drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)}, track=track)

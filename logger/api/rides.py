@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.drives import Run
-from logger.api.shown import Result, Shown, table
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import record_file
 
@@ -40,11 +40,11 @@ class Record(record_file.AccelerationRecord, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The axes over time."""
-        from logger.chart_data import Curves, Line
+        from logger.chart_data import Curves
 
         time_s = self.start_s + np.arange(len(self.accel_z_mps2)) / self.rate_hz
         return [Curves("Record", "time [s]", "acceleration [m/s2]", tuple(
-            Line(axis, time_s, one) for axis, one in self.by_axis.items() if one is not None))]
+            line(axis, time_s, one) for axis, one in self.by_axis.items() if one is not None))]
 
 
 def read_record(path: Path | str) -> Record:
@@ -59,7 +59,7 @@ def read_record(path: Path | str) -> Record:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comfort(Result):
+class Comfort(CommandResult):
     """Values of the vertical axis; those of the others and of health are in ``as_json``.
 
     weighting       that it was weighted by

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.shown import Result, Shown, table
+from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
+from logger.api.shown import CommandResult, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import drive_file, profile_file
 
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
 
 Array = npt.NDArray[np.float64]
-
-_SHORTEST_M = 11.0
-_MOST_SAMPLES = 20_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,11 +47,11 @@ class Profile(profile_file.Profile, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The elevation of each track."""
-        from logger.chart_data import Curves, Line
+        from logger.chart_data import Curves
 
         tracks = {"left": self.elevation_m, "right": self.elevation_right_m}
         return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
-            Line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
+            line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
 
 
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
@@ -81,13 +79,14 @@ def write_profile(path: Path | str, profile: Profile) -> None:
 
 
 def random_road(
-    *, iso_class: str | None = None, gd_n0_cm3: float | None = None, length_m: float = 1000.0,
-    spacing_m: float = 0.05, seed: int = 1, waviness: float = 2.0,
+    *, iso_class: str | None = None, gd_n0_cm3: float | None = None, iri_m_per_km: float | None = None,
+    length_m: float = 1000.0, spacing_m: float = 0.05, seed: int = 1, waviness: float = 2.0,
 ) -> Profile:
     """A random road with the displacement spectrum Gd(n) = Gd(n0) (n / n0)^-w of ISO 8608 (Eq 4.1, 4.2 of Blum 2015).
 
     iso_class    A to H: the geometric mean of its degrees of roughness; or
-    gd_n0_cm3    a degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]
+    gd_n0_cm3    a degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]; or
+    iri_m_per_km    an IRI, of which Gd(n0) follows (Eq 4.40, or for a waviness other than 2 from its own relation)
     length_m     11 m or more; ``spacing_m`` between samples, 0.3 m or less [m]
     seed         one seed is one road
     waviness     w, 1.5 to 3
@@ -103,25 +102,41 @@ def random_road(
       wheel tracks                          1
       elevation, standard deviation  0.005887  m
     """
-    from logger.roads.iso8608 import CLASS_GD_N0_CM3, generate
+    from logger.roads.iso8608 import generate
 
-    if (iso_class is None) == (gd_n0_cm3 is None):
-        raise BadInput("random_road: expected iso_class or gd_n0_cm3")
-    if iso_class is not None and iso_class not in CLASS_GD_N0_CM3:
-        raise BadInput(f"random_road: expected a class out of {', '.join(CLASS_GD_N0_CM3)}, found {iso_class!r}")
-    roughness_cm3 = CLASS_GD_N0_CM3[iso_class] if iso_class is not None else gd_n0_cm3
-    assert roughness_cm3 is not None
-    if not roughness_cm3 > 0 or not 1.5 <= waviness <= 3.0:
-        raise BadInput(f"random_road: expected a roughness above 0 and a waviness from 1.5 to 3, found "
-                       f"{roughness_cm3:g} and {waviness:g}")
-    if not (0 < spacing_m <= 0.3 and length_m >= _SHORTEST_M and length_m / spacing_m <= _MOST_SAMPLES):
-        raise BadInput(f"random_road: expected {_SHORTEST_M:g} m or more, 0.3 m apart or less, found {length_m:g} m "
-                       f"and {spacing_m:g} m")
+    ROAD_WAVINESS.check("waviness", waviness)
+    LENGTH.check("length_m", length_m)
+    SPACING.check("spacing_m", spacing_m)
+    roughness_cm3 = roughness_of(iso_class, gd_n0_cm3, iri_m_per_km, length_m, waviness)
+    if length_m / spacing_m > MOST_ROAD_SAMPLES:
+        raise BadInput(f"length_m {length_m:g}, spacing_m {spacing_m:g}: expected at most {MOST_ROAD_SAMPLES} samples")
     return Profile(0.0, spacing_m, generate(roughness_cm3, length_m, spacing_m, seed, waviness), None)
 
 
+def roughness_of(iso_class: str | None, gd_n0_cm3: float | None, iri_m_per_km: float | None, length_m: float,
+                 waviness: float) -> float:
+    """Gd(n0) of a road [cm3] that is asked for by one of the first three. BadInput for none, several, or one that there
+    is not."""
+    from logger.roads import gd_iri, iso8608
+
+    if sum(one is not None for one in (iso_class, gd_n0_cm3, iri_m_per_km)) != 1:
+        raise BadInput("random_road: expected one of iso_class, gd_n0_cm3 and iri_m_per_km")
+    if iso_class is not None:
+        if iso_class not in iso8608.CLASS_GD_N0_CM3:
+            raise BadInput(f"iso_class {iso_class}: expected one of {', '.join(iso8608.CLASS_GD_N0_CM3)}")
+        return iso8608.CLASS_GD_N0_CM3[iso_class]
+    if gd_n0_cm3 is not None:
+        ROUGHNESS.check("gd_n0_cm3", gd_n0_cm3)
+        return gd_n0_cm3
+    assert iri_m_per_km is not None
+    IRI.check("iri_m_per_km", iri_m_per_km)
+    if waviness == iso8608.STANDARD_WAVINESS:
+        return iso8608.gd_n0_from_iri(iri_m_per_km)
+    return gd_iri.gd_of_road(iri_m_per_km, length_m, waviness).value
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Iri(Result):
+class Iri(CommandResult):
     """The IRI of a profile [m/km], whole and in w windows.
 
     iri_m_per_km          of the left track, or of the only one
@@ -175,7 +190,7 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoadClass(Result):
+class RoadClass(CommandResult):
     """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
 
     road_class       A to H (ISO 8608)

@@ -12,8 +12,7 @@ from logger.errors import BadInput
 if TYPE_CHECKING:
     from logger.runs import Run
     from logger.simulation.simulated_runs import SimulatedRuns
-    from logger.store.formats.drive_file import Drive
-    from logger.store.formats.drive_file import Run as DriveOnRoad
+    from logger.store.formats.drive_file import Drive, DriveOnRoad
 
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
 # What the lab looks at lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.

@@ -24,6 +24,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.ranges import ADDED, NOISE, WINDOW
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
@@ -40,12 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
                              "also says where the sensor sits")
-    add_number(parser, "--noise", 1e-4, 100.0, "m/s2", default=NOISE_MPS2, metavar="MPS2",
+    add_number(parser, "--noise", *NOISE, default=NOISE_MPS2, metavar="MPS2",
                help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it blurs the "
                     "steps, what is found on the way corrects it")
-    add_number(parser, "--step", 0.0, 100.0, "m/s2", default=STEP_MPS2, metavar="MPS2",
+    add_number(parser, "--step", *ADDED, default=STEP_MPS2, metavar="MPS2",
                help="step that readings are rounded to [m/s2] (default: 0, none)")
-    add_number(parser, "--window", 1.0, 1000.0, "m", metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
+    add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")

@@ -39,12 +39,13 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.api.identification import Found, Question
+    from logger.api.identification import FittedNumbers, Question
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.prediction_error_fit import Fit
     from logger.identification.unknown_road.fisher_scoring import RoadFit
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    from logger.api.identification import FLATTEST, MOST_TRIES, NOISES, STEEPEST
+    from logger.runs import SKIP_S
 
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
                         help="folder with drive.csv and profile.csv, or a drive.csv")
@@ -71,21 +72,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--same-road", action="store_true",
                         help="the road was not measured; all runs are over the same one; their places may be "
                              "off by 10 m, their distances by 1 per cent")
-    add_number(parser, "--waviness", FLATTEST, STEEPEST, metavar="W",
+    add_number(parser, "--waviness", *WAVINESS, metavar="W",
                help="of a road that was not measured (default: 2); to find it, add road.waviness to --free")
     parser.add_argument("--start", action="append", default=[], metavar="PARAM=VALUE",
                         help="where to start instead of the vehicle's value; may repeat")
     parser.add_argument("--bounds", action="append", default=[], metavar="PARAM=LOW,HIGH",
                         help="where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat")
-    add_number(parser, "--tries", 0, MOST_TRIES, kind=int, default=0, metavar="N",
+    add_number(parser, "--tries", *TRIES, kind=int, default=0, metavar="N",
                help="so many further starts, spread around")
-    parser.add_argument("--noise", choices=NOISES, default="auto",
+    parser.add_argument("--noise", choices=NOISE_MODELS, default="auto",
                         help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
                              "the profile does not contain, through the car); auto: the likeliest (default)")
     parser.add_argument("--low-pass", type=float, metavar="HZ", help="leave out what lies above, for example 20")
     parser.add_argument("--robust", action="store_true", help="let single wild readings count less (Huber's loss)")
-    parser.add_argument("--skip", type=float, default=2.0, metavar="S",
-                        help="beginning of each run that is left out [s] (default: 2)")
+    parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
+                        help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the vehicle with the fitted values")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
@@ -111,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE if found.fit.converged else EXIT_CHECK_FAILED
 
 
-def _found(args: argparse.Namespace) -> Found:
+def _found(args: argparse.Namespace) -> FittedNumbers:
     from logger.api.identification import on_measured_roads, on_unmeasured_roads, records_of
     from logger.commands.lab_model import warned
     from logger.shipped import vehicle_path
@@ -144,7 +145,7 @@ def _check_given(args: argparse.Namespace) -> None:
 
 
 def _question(args: argparse.Namespace) -> Question:
-    from logger.api.identification import WAVINESS, Question
+    from logger.api.identification import USUAL_WAVINESS, Question
 
     obstacles = {name: {key: values[0] for key, values in (_numbers(one, f"--{name}", 1) for one in text.split(","))}
                  for name, text in (("bump", args.bump), ("step", args.step)) if text is not None}
@@ -153,7 +154,7 @@ def _question(args: argparse.Namespace) -> Question:
         {name: values[0] for name, values in (_numbers(text, "--start", 1) for text in args.start)},
         {name: (values[0], values[1]) for name, values in (_numbers(text, "--bounds", 2) for text in args.bounds)},
         obstacles, args.noise, args.low_pass, args.robust, args.tries,
-        WAVINESS if args.waviness is None else args.waviness, "--{}")
+        USUAL_WAVINESS if args.waviness is None else args.waviness, "--{}")
 
 
 def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.ranges import TOLERANCE, USUAL_TOLERANCE
 from logger.commands.numbers import add_number
 from logger.errors import BadInput
 from logger.report.text_layout import WIDTH
@@ -32,11 +33,9 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_tolerance(parser: argparse.ArgumentParser) -> None:
     """--tolerance, for ``deviation_of``."""
-    from logger.api.bench import TOLERANCE, TOLERANCES
-
-    add_number(parser, "--tolerance", *TOLERANCES, default=TOLERANCE, metavar="SHARE",
+    add_number(parser, "--tolerance", *TOLERANCE, default=USUAL_TOLERANCE, metavar="SHARE",
                help="how far off the vehicle's masses, springs and dampers may well be (default: "
-                    f"{TOLERANCE:g}, 4 %%)")
+                    f"{USUAL_TOLERANCE:g}, 4 %%)")
 
 
 def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
@@ -44,15 +43,15 @@ def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
     return bench_from(args.vehicle, args.runs, args.effect_file, args.tolerance, searches)
 
 
-def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str] = (), tolerance: float | None = None,
-               searches: str | None = None) -> Bench:
+def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str] = (),
+               tolerance: float = USUAL_TOLERANCE, searches: str | None = None) -> Bench:
     """The same, where they are not of a command line."""
-    from logger.api.bench import TOLERANCE, bench_of, deviation_of
+    from logger.api.bench import bench_of, deviation_of
     from logger.api.run_checks import lab_runs
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
 
-    numbers, model = deviation_of(TOLERANCE if tolerance is None else tolerance), read_model(vehicle_path(vehicle))
+    numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
     return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned)
 
 

@@ -6,6 +6,7 @@ import argparse
 from math import isfinite
 from typing import Any
 
+from logger.api.ranges import Range
 from logger.errors import BadInput
 
 
@@ -15,12 +16,9 @@ def add_number(
 ) -> None:
     """Add an option whose number lies from ``low`` to ``high`` (infinity: no end). BadInput, which names the option,
     for another one; ``rest`` as ``add_argument`` takes it."""
-    allowed = f"{low:g} or more" if high == float("inf") else f"{low:g} to {high:g} {unit}".rstrip()
-
     def number(text: str) -> float:
         value = kind(text)
-        if not low <= value <= high:
-            raise BadInput(f"{option} {value if kind is int else format(value, 'g')}: expected {allowed}")
+        Range(low, high, unit).check(option, value)
         return value
 
     number.__name__ = kind.__name__  # argparse names it when a text is no number at all

@@ -14,6 +14,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from logger.roads.elevation_spectrum import Array, Roughness
     from logger.store.formats.profile_file import Profile
 
-_SHORTEST_M = 11.0  # for an IRI
-_MOST_SAMPLES = 20_000_000
 _LINES_AT_ONCE = 100_000
 
 
@@ -35,12 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rough = make.add_mutually_exclusive_group(required=True)
     rough.add_argument("--class", dest="road_class", metavar="A-H", type=str.upper, choices=list("ABCDEFGH"),
                        help="class; the road gets the geometric mean of its degrees of roughness")
-    add_number(rough, "--gd", 1e-3, 1e7, "cm3", metavar="CM3", help="degree of roughness Gd(n0) [cm3]")
-    add_number(rough, "--iri", 0.01, 1000, "m/km", metavar="M_PER_KM",
+    add_number(rough, "--gd", *ROUGHNESS, metavar="CM3", help="degree of roughness Gd(n0) [cm3]")
+    add_number(rough, "--iri", *IRI, metavar="M_PER_KM",
                help="IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation")
-    add_number(make, "--waviness", 1.5, 3.0, default=2.0, metavar="W", help="1.5 to 3 (default: 2)")
-    add_number(make, "--length", _SHORTEST_M, 1e6, "m", default=1000.0, metavar="M", help="[m] (default: 1000)")
-    add_number(make, "--spacing", 0.001, 0.3, "m", default=0.05, metavar="M",
+    add_number(make, "--waviness", *ROAD_WAVINESS, default=2.0, metavar="W", help="1.5 to 3 (default: 2)")
+    add_number(make, "--length", *LENGTH, default=1000.0, metavar="M", help="[m] (default: 1000)")
+    add_number(make, "--spacing", *SPACING, default=0.05, metavar="M",
                help="between samples [m] (default: 0.05)")
     add_number(make, "--seed", 0, inf, kind=int, default=1, metavar="N",
                help="another number, another road (default: 1)")
@@ -66,18 +65,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _generate(args: argparse.Namespace) -> int:
+    from logger.api.roads import roughness_of
     from logger.roads.iri import iri
     from logger.roads.iso8608 import generate, road_class
 
     if args.json and args.out is None:
         raise BadInput("--json: expected --out FILE with it, as stdout holds the JSON")
-    if args.length / args.spacing > _MOST_SAMPLES:
-        raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected at most {_MOST_SAMPLES} samples")
-    gd_n0_cm3 = _wanted_gd(args)
+    if args.length / args.spacing > MOST_ROAD_SAMPLES:
+        raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected at most "
+                       f"{MOST_ROAD_SAMPLES} samples")
+    gd_n0_cm3 = roughness_of(args.road_class, args.gd, args.iri, args.length, args.waviness)
     last_m = int(args.length / args.spacing + 1e-9) * args.spacing
-    if last_m < _SHORTEST_M:
+    if last_m < LENGTH.low:
         raise BadInput(f"--length {args.length:g} --spacing {args.spacing:g}: expected the last sample at "
-                       f"{_SHORTEST_M:g} m or more, it lies at {last_m:g} m")
+                       f"{LENGTH.low:g} m or more, it lies at {last_m:g} m")
     elevation = generate(gd_n0_cm3, args.length, args.spacing, args.seed, args.waviness)
     made = {
         "class": road_class(gd_n0_cm3), "gd_n0_cm3": gd_n0_cm3, "waviness": args.waviness, "seed": args.seed,
@@ -93,18 +94,6 @@ def _generate(args: argparse.Namespace) -> int:
     else:
         print(_made_in_words(made, args.out), file=sys.stderr)
     return EXIT_DONE
-
-
-def _wanted_gd(args: argparse.Namespace) -> float:
-    from logger.roads import gd_iri, iso8608
-
-    if args.road_class is not None:
-        return iso8608.CLASS_GD_N0_CM3[args.road_class]
-    if args.gd is not None:
-        return float(args.gd)
-    if args.waviness == iso8608.STANDARD_WAVINESS:
-        return iso8608.gd_n0_from_iri(args.iri)
-    return gd_iri.gd_of_road(args.iri, args.length, args.waviness).value
 
 
 def _csv(elevation_m: Array, spacing_m: float) -> Iterator[str]:

@@ -22,6 +22,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.ranges import ADDED, RATE, SPEED
 from logger.commands.lab_model import check_out
 from logger.commands.numbers import add_number, named_numbers
 from logger.errors import EXIT_DONE, BadInput
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from logger.vehicle.structure import Output, Structure
     from logger.vehicle.vehicle import Vehicle
 
-_SPEEDS_MPS = (0.1, 100.0)
-_RATES_HZ = (10.0, 10_000.0)
 _FLAT_M = (1.0, 10_000.0)
 WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
 OUTPUTS = ("wheels", "travel", "tires", "body")
@@ -53,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; "
                              "pothole: start_m, depth_m, length_m[, edge_m]")
     speed = parser.add_mutually_exclusive_group()
-    add_number(speed, "--speed", *_SPEEDS_MPS, "m/s", metavar="MPS", help="the same all the way [m/s]")
+    add_number(speed, "--speed", *SPEED, metavar="MPS", help="the same all the way [m/s]")
     speed.add_argument("--speed-file", type=Path, metavar="FILE",
                        help="CSV with t_s,speed_mps, straight lines between them; the drive lasts as long as the file")
     parser.add_argument("--effect", action="append", default=[], metavar="NAME[:PARAM=VALUE,...]",
@@ -66,11 +65,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run")
     parser.add_argument("--profile-out", type=Path, metavar="FILE",
                         help="write the road that was driven as well, with its obstacles")
-    add_number(parser, "--rate", *_RATES_HZ, "Hz", default=100.0, metavar="HZ",
+    add_number(parser, "--rate", *RATE, default=100.0, metavar="HZ",
                help="samples a second (default: 100)")
-    add_number(parser, "--noise", 0.0, 100.0, "m/s2", default=0.0, metavar="MPS2",
+    add_number(parser, "--noise", *ADDED, default=0.0, metavar="MPS2",
                help="r.m.s. of the sensor's noise [m/s2]")
-    add_number(parser, "--step", 0.0, 100.0, "m/s2", default=0.0, metavar="MPS2",
+    add_number(parser, "--step", *ADDED, default=0.0, metavar="MPS2",
                help="the sensor gives whole multiples of this only [m/s2]")
     add_number(parser, "--seed", 0, inf, kind=int, default=1, metavar="N",
                help="another number, another noise (default: 1)")

@@ -31,14 +31,14 @@ class VehicleModel(DriveModel):
     exact = True
 
     def predict(self, values: Array) -> list[Array]:
-        """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
+        """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
         car = sensed_car(self.vehicle_with(values))
         return [road.samples(_response(car, road.s, road.under_wheels(car.structure, self.road_with(values, run))))
                 for run, road in enumerate(self._roads)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``Differentiable``; derivatives are exact but for those by places and lengths of the car, which shift the
-        road."""
+        """As ``DifferentiablePredictor``; derivatives are exact but for those by places and lengths of the car, which
+        shift the road."""
         vehicle = self.vehicle_with(values)
         car = sensed_car(vehicle)
         changes = {index: sensitivity(vehicle, one) for index, one in enumerate(self.parameters)

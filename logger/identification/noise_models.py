@@ -20,6 +20,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import minimize_scalar
 
 from logger.dsp.decimating_low_pass import LowPass
 from logger.dsp.linear_prediction import Whitener, burg, ladder, levinson
@@ -38,7 +39,7 @@ _MEMORY_S, _FILTER_MEMORY_S = 4.0, 1.0
 _GRID = 8192
 # The level of the road against that of the sensor is searched over so many powers of e.
 _RATIO_LOGS = 40.0
-_GOLDEN_STEPS = 60
+_RATIO_CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +191,7 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
     """Powers of the road and of the sensor whose sum of spectra is the likeliest (P. Whittle 1953), with a deviation of
     the sensor of at least ``floor``.
 
-    For each ratio of the two the common level has a formula; the ratio is found by golden section.
+    For each ratio of the two the common level has a formula; the ratio is searched.
     """
     rate_hz = 2 * float(f_hz[-1])
     periodograms, road_parts, sensor_parts = [], [], []
@@ -205,19 +206,15 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
     periodogram = periodogram + floor**2 * sensor_all
     unit = float(road_all.mean() / sensor_all.mean())
 
-    def deviance(log_ratio: float) -> tuple[float, float]:
+    def level_of(log_ratio: float) -> tuple[Array, float]:
         shape = np.exp(log_ratio) / unit * road_all + sensor_all
-        level = float((periodogram / shape).mean())
-        return float(np.log(shape * level).mean()), level
+        return shape, float((periodogram / shape).mean())
 
-    low, high = -_RATIO_LOGS / 2, _RATIO_LOGS / 2
-    golden = (np.sqrt(5) - 1) / 2
-    for _ in range(_GOLDEN_STEPS):
-        left, right = high - golden * (high - low), low + golden * (high - low)
-        if deviance(left)[0] < deviance(right)[0]:
-            high = right
-        else:
-            low = left
-    ratio = (low + high) / 2
-    level = deviance(ratio)[1]
+    def deviance(log_ratio: float) -> float:
+        shape, level = level_of(log_ratio)
+        return float(np.log(shape * level).mean())
+
+    ratio = float(minimize_scalar(deviance, bounds=(-_RATIO_LOGS / 2, _RATIO_LOGS / 2), method="bounded",
+                                  options={"xatol": _RATIO_CLOSE}).x)
+    level = level_of(ratio)[1]
     return float(np.exp(ratio)) / unit * level, max(level, floor**2)

@@ -127,7 +127,7 @@ class Bump:
 
 
 @dataclass(frozen=True)
-class Step:
+class RoadStep:
     """A joint after which the road stays higher, or with a negative height lower (4.4.5 of Blum 2015) [m]."""
 
     start_m: float
@@ -153,7 +153,7 @@ class Step:
         }
 
 
-Obstacle = Bump | Step
+Obstacle = Bump | RoadStep
 
 
 def _minus_edge(x: Array) -> Array:

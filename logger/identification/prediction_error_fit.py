@@ -11,7 +11,7 @@ the data cannot tell. Solution, in this order:
 4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
    whether the model at its best has anything to do with what was measured.
 
-It knows models by ``Model`` only.
+It knows models by ``Predictor`` only.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _FAR = 3.0
 _ROOT_STEPS = 60
 
 
-class Model(Protocol):
+class Predictor(Protocol):
     """What can be fitted: numbers in, one prediction per record out, as long as what was measured."""
 
     @property
@@ -73,7 +73,7 @@ class Model(Protocol):
 
 
 @runtime_checkable
-class Differentiable(Model, Protocol):
+class DifferentiablePredictor(Predictor, Protocol):
     """A model that knows its derivatives: exact ones, at the price of a prediction, or differences of predictions."""
 
     @property
@@ -83,13 +83,13 @@ class Differentiable(Model, Protocol):
         """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
 
 
-def least_share(model: Model) -> float:
+def least_share(model: Predictor) -> float:
     """What is left of a measurement is taken for no less than this share of it, as predictions are no better."""
-    return LEAST_SHARE_SIMULATED if isinstance(model, Differentiable) and not model.exact else LEAST_SHARE
+    return LEAST_SHARE_SIMULATED if isinstance(model, DifferentiablePredictor) and not model.exact else LEAST_SHARE
 
 
 @dataclass(frozen=True)
-class Options:
+class FitOptions:
     """How to fit.
 
     rate_hz        of all records
@@ -154,13 +154,13 @@ class Fit:
     ends: Array
 
 
-def fit(model: Model, measured: Sequence[Array], options: Options | None = None) -> Fit:
+def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None = None) -> Fit:
     """Fit a model's free numbers to records (n,), each as long as its prediction.
 
     Raises NotIdentifiable when the data cannot tell them, ValueError for measurements of other lengths than the
     predictions or nothing but zeros, no free number, or a start outside its bounds.
     """
-    problem = _Problem(model, measured, options or Options())
+    problem = _FitProblem(model, measured, options or FitOptions())
     starts = problem.starts()
     findings = problem.structural_findings(problem.beside(starts[0]))
     if findings and problem.options.refuse:
@@ -222,12 +222,12 @@ class _Linearised:
 
 
 @dataclass(eq=False)
-class _Problem:
+class _FitProblem:
     """A model and its measurements."""
 
-    model: Model
+    model: Predictor
     measured: Sequence[Array]
-    options: Options
+    options: FitOptions
 
     def __post_init__(self) -> None:
         self.free = list(self.model.parameters)
@@ -236,8 +236,8 @@ class _Problem:
         self.low_pass = LowPass(self.options.rate_hz, self.options.low_pass_hz)
         self.coordinates = Coordinates(self.free)
         self.low, self.high = self.coordinates.low, self.coordinates.high
-        self.exact = isinstance(self.model, Differentiable) and self.model.exact
-        self.simulated = isinstance(self.model, Differentiable) and not self.model.exact
+        self.exact = isinstance(self.model, DifferentiablePredictor) and self.model.exact
+        self.simulated = isinstance(self.model, DifferentiablePredictor) and not self.model.exact
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         if not any(one.any() for one in self.measured):
             raise ValueError("expected measurements that move, found nothing but 0")
@@ -270,7 +270,7 @@ class _Problem:
         known = self._linearised
         if known is None or not np.array_equal(known.x, x):
             values = self.coordinates.values(x)
-            if isinstance(self.model, Differentiable):
+            if isinstance(self.model, DifferentiablePredictor):
                 predictions, slopes = self.model.linearised(values)
                 self._check(predictions)
             else:
@@ -322,7 +322,7 @@ def robust_deviation(white: Array) -> float:
 # --- descent ---
 
 
-def _descend(problem: _Problem, start: Array, noise: Whitening, robust: bool) -> Minimum[_Point]:
+def _descend(problem: _FitProblem, start: Array, noise: Whitening, robust: bool) -> Minimum[_Point]:
     """The nearest minimum: by squares, or by Huber's loss with the deviation that residuals have at the start."""
     deviation = None
     if robust:
@@ -343,7 +343,7 @@ def _descend(problem: _Problem, start: Array, noise: Whitening, robust: bool) ->
                     low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
-def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, int, bool]:
+def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point, int, bool]:
     """Noise model and numbers in turn, until neither moves: (noise, place, steps, whether they came to rest)."""
     kinds, steps = list(problem.options.noise), 0
     for _ in range(_MOST_NOISE_ROUNDS):
@@ -369,7 +369,7 @@ def _innovations(problem: _Problem, point: _Point) -> tuple[Whitening, _Point, i
 # --- the result ---
 
 
-def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[Finding], iterations: int,
+def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: list[Finding], iterations: int,
             settled: bool, ends: Array) -> Fit:
     names = [one.name for one in problem.free]
     slopes = noise(problem.linearised(point.x).slopes)
@@ -403,7 +403,7 @@ def _result(problem: _Problem, point: _Point, noise: Whitening, findings: list[F
     )
 
 
-def _covariance(problem: _Problem, point: _Point, slopes: Array) -> Array:
+def _covariance(problem: _FitProblem, point: _Point, slopes: Array) -> Array:
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
     count, p = slopes.shape
     information = slopes.T @ slopes

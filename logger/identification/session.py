@@ -18,7 +18,7 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_search import located
-from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.drive_operator import Drive
@@ -89,7 +89,7 @@ def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequenc
     return VehicleModel(vehicle, parameters, records, road)
 
 
-def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> Options:
+def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust: bool, tries: int) -> FitOptions:
     """How to fit a model of records at one rate.
 
     noise          noise model: white, ar, road, or auto, the likeliest of them
@@ -105,13 +105,13 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
             raise UnusableRun(run, f"expected more than {reach} samples for --low-pass {low_pass_hz:g}, found "
                                    f"{len(measured)} after the first {model.records[run].skip_s:g} s")
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
-    return Options(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
+    return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
                    starts=[*model.trials(), *spread_starts(model.parameters, tries)])
 
 
 def upright_fit(
-    model_of: Callable[[list[Run]], DriveModel], records: list[Run], options: Callable[[DriveModel], Options]
+    model_of: Callable[[list[Run]], DriveModel], records: list[Run], options: Callable[[DriveModel], FitOptions]
 ) -> Fit:
     """The fit of the model of records. NotIdentifiable for what they do not tell, or tell only when they are turned
     over; ValueError as ``fit``."""

@@ -47,7 +47,7 @@ class SimulatedModel(DriveModel):
         self._tracks: dict[tuple[int, tuple[Obstacle, ...]], WheelTracks] = {}
 
     def predict(self, values: Array) -> list[Array]:
-        """As ``Model``: accelerations without the beginnings of the records [m/s2]."""
+        """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
         roads = [self.road_with(values, run) for run in range(len(self.records))]
         farther_m = [record.distance_m * (1 / road.speed_scale - 1)
                      for record, road in zip(self.records, roads, strict=True)]
@@ -56,7 +56,7 @@ class SimulatedModel(DriveModel):
         return [one[record.first:] for record, one in zip(self.records, predictions, strict=True)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """As ``Differentiable``: differences, to both sides of a number unless it is at a bound."""
+        """As ``DifferentiablePredictor``: differences, to both sides of a number unless it is at a bound."""
         columns = []
         for index, one in enumerate(self.parameters):
             step = self._step(one, float(values[index]))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from logger.identification.obstacle_paths import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, Step
+from logger.identification.obstacle_paths import LARGEST_HEIGHT_M, LARGEST_WIDTH_M, Bump, Obstacle, RoadStep
 from logger.vehicle.named_parameters import WEAKEST, Free
 
 SPEED_SCALE, EACH = "speed_scale", "each"
@@ -34,7 +34,7 @@ class RoadInput:
     """What lies on the profile of a run, and how its distances are to be read: distance / speed_scale is true [m]."""
 
     bump: Bump | None = None
-    step: Step | None = None
+    step: RoadStep | None = None
     speed_scale: float = 1.0
 
     @property

@@ -153,8 +153,8 @@ def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
             continue
         inner = xy[first + 1:last] - xy[first]
         chord = xy[last] - xy[first]
-        length = hypot(*chord)
-        along = np.clip(inner @ chord / length**2, 0.0, 1.0) if length > 0 else np.zeros(len(inner))
+        square = hypot(*chord) ** 2  # 0 between points that are all but one
+        along = np.clip(inner @ chord / square, 0.0, 1.0) if square > 0 else np.zeros(len(inner))
         off = np.linalg.norm(inner - along[:, None] * chord, axis=1)
         worst = int(off.argmax())
         if off[worst] > tolerance:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput, free_input, is_input
 from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4
@@ -36,7 +36,7 @@ def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput 
     noise: list[Noise] = [White()]
     if ours:
         noise += [Autoregressive(), RoadNoise(model.road_spectra)]
-    return fit(model, model.measured, Options(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))
+    return fit(model, model.measured, FitOptions(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))
 
 
 def mass_and_bump(record: Run, taken: Bump, low_pass_hz: float | None = None) -> Fit:

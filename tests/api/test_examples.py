@@ -109,6 +109,17 @@ def test_each_record_shows_itself(names: dict[str, Any]) -> None:
     assert sum(len(one.charts()) for one in shown) >= 6
 
 
+def test_a_long_run_is_drawn_with_its_peaks_and_few_points() -> None:
+    accel = np.sin(np.arange(360_001) / 50.0)
+    accel[123_456] = 9.0
+    run = ridelog.make_run(accel, 10.0, rate_hz=100.0)
+    (chart,) = run.charts()
+    (drawn,) = chart.lines
+    assert len(drawn.x) < 5000 and drawn.y.max() == 9.0 and (np.diff(drawn.x) >= 0).all()
+    assert drawn.x[drawn.y.argmax()] == run.time_s[123_456]
+    assert len(run._repr_html_()) < 200_000
+
+
 @pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare"])
 def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     from logger.commands.main import main

@@ -19,7 +19,7 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, Noise, RoadNoise, White
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input, is_input
@@ -40,7 +40,7 @@ from logger.vehicle.named_parameters import changed, free, names
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 from ..support.drives.bumps import bump_record, road_record
-from ..support.drives.rubbing import FRICTION_N, GROWN_AT_MPS, rubbing_run
+from ..support.drives.rubbing import FRICTION_N, rubbing_run
 from .figures import Figures
 
 Array = npt.NDArray[np.float64]
@@ -76,7 +76,7 @@ def main() -> int:
 def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
     model = VehicleModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
-    return fit(model, model.measured, Options(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
+    return fit(model, model.measured, FitOptions(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
 
 
 def rough(seed: int) -> Run:
@@ -228,10 +228,10 @@ def unknown_bump(figures: Figures) -> None:
 
 
 def rubbing(figures: Figures) -> None:
-    """Mass and dry friction together, on drives by Newton's laws that SciPy integrated."""
+    """Mass and dry friction together, on drives of the validation's own simulator."""
     truth = {MASS: 875.0, FRICTION: FRICTION_N}
     law = shipped_effects()["dry_friction"]
-    there = [chosen(law, {"friction_force_n": 60.0, "transition_velocity_m_per_s": GROWN_AT_MPS})]
+    there = [chosen(law, {"friction_force_n": 60.0})]
     move = move_named(there, FRICTION)
     assert move is not None
     errors, times = [], []
@@ -240,14 +240,14 @@ def rubbing(figures: Figures) -> None:
                                [rubbing_run(seed, road_seed=seed % RUBBING_ROADS)], effects=there)
         noise: list[Noise] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
         began = time.process_time()
-        found = fit(model, model.measured, Options(noise=noise, starts=model.trials()))
+        found = fit(model, model.measured, FitOptions(noise=noise, starts=model.trials()))
         times.append(time.process_time() - began)
         errors.append([(found.parameters[name] - value) / found.standard_errors[name] for name, value in truth.items()])
     off = np.array(errors)
     figures.at_most("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 1.3, "")
     figures.at_least("mass and friction: error over standard error, rms", rms(off.ravel().tolist()), 0.7, "")
     figures.at_least("mass and friction: within two standard errors", 100 * float((np.abs(off) < 2).mean()), 90.0, "%")
-    print(f"   {RUBBING_DRAWS} draws on {RUBBING_ROADS} roads, 10 s each; standard errors of the last "
+    print(f"   {RUBBING_DRAWS} draws on {RUBBING_ROADS} roads, 15 s each; standard errors of the last "
           f"{found.standard_errors[MASS]:.1f} kg and {found.standard_errors[FRICTION]:.1f} N; "
           f"{np.median(times):.1f} s of the processor a fit")
 
@@ -268,7 +268,7 @@ def passes(figures: Figures) -> None:
             numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
             model = VehicleModel(CAR, numbers, records, road)
-            found = fit(model, model.measured, Options(noise=[RoadNoise(model.road_spectra)]))
+            found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
             told = with_common_roughness(model, found).fit
             errors.append([found.parameters[name] / value - 1 for name, value in wanted.items()])
             alone.append([found.standard_errors[name] / value for name, value in wanted.items()])
@@ -376,7 +376,7 @@ def no_answer_without_a_road(figures: Figures) -> None:
 def fitted_input(car: Vehicle, record: Run, road: RoadInput, wanted: list[str]) -> Fit:
     numbers = [free_input(road, name) if is_input(name) else free(car, name) for name in wanted]
     model = VehicleModel(car, numbers, [record], road)
-    return fit(model, model.measured, Options(noise=[White()]))
+    return fit(model, model.measured, FitOptions(noise=[White()]))
 
 
 def response_of(wanted: list[str]) -> AxleResponse:

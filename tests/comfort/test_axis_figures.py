@@ -81,7 +81,7 @@ def test_exponential_average_of_a_blow_and_of_a_steady_shake() -> None:
 
 
 @given(cuts=st.lists(st.integers(0, len(RECORD)), max_size=20))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_exponential_average_has_the_same_bits_for_any_split(cuts: list[int]) -> None:
     stream = ExponentialRms(RATE_HZ)
     pieces = np.concatenate([stream.process(piece) for piece in np.split(RECORD, sorted(cuts))])

@@ -64,7 +64,7 @@ def test_running_rms_is_the_mean_over_the_last_second(tau_s: float) -> None:
 
 
 @given(cuts=st.lists(st.integers(0, len(RECORD)), max_size=30))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_running_rms_has_the_same_bits_for_any_split(cuts: list[int]) -> None:
     stream = RunningRms(RATE_HZ)
     pieces = np.concatenate([stream.process(piece) for piece in np.split(RECORD, sorted(cuts))])

@@ -24,6 +24,7 @@ def add(effect: str, vehicle: Path | str, out: Path, *arguments: str) -> int:
     return main(["add-effect", effect, "--vehicle", str(vehicle), "--out", str(out), *arguments])
 
 
+@pytest.mark.slow
 def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, second = tmp_path / "with-friction.yaml", tmp_path / "with-both.yaml"
     assert add("dry_friction", "rav4-2009", first, *runs, "--json") == 0

@@ -70,6 +70,7 @@ def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(len(line) <= 100 for line in lines)
 
 
+@pytest.mark.slow
 def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
                               ) -> None:
     """As ``ridelog simulate`` writes them: a right model is right, and friction is no late clock besides."""

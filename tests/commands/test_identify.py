@@ -244,6 +244,7 @@ def test_an_effect_that_the_car_lacks_is_one_line(runs: list[str]) -> None:
         identify(runs, FRICTION)
 
 
+@pytest.mark.slow
 def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = []
     for speed_mps in (10.0, 17.0):

@@ -116,6 +116,7 @@ def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.Ca
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
 
 
+@pytest.mark.slow
 def test_somebody_who_wants_another_one_first(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                               answering: Callable[..., list[str]]) -> None:
     answering("roll", "sensor_gain", "y")
@@ -137,6 +138,7 @@ def test_nobody_to_ask_and_bad_input_is_one_line(ridelog: Path, runs: list[str],
     assert done.stderr == f"ridelog: --out {out}: expected a folder\n"
 
 
+@pytest.mark.slow
 def test_no_more_files_are_written_than_were_looked_at(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.bumps import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.formats.drive_file import Run, read_run, write_profile
+from logger.store.formats.drive_file import DriveOnRoad, read_run, write_profile
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
@@ -36,7 +36,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def simulated(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> Run:
+def simulated(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> DriveOnRoad:
     assert main(["simulate", "--vehicle", vehicle, "--profile", str(folder / "profile.csv"),
                  "--out", str(folder / "drive.csv"), *arguments]) == 0
     return read_run(folder)

@@ -115,7 +115,7 @@ def test_the_second_address_is_found() -> None:
     assert bma220.read_raw() == bytes((4, 8, 252))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     suspended=st.booleans(),
     in_reset=st.booleans(),
@@ -137,7 +137,7 @@ def test_any_state_of_the_chip_ends_in_one_that_runs_as_set(
     bma220.check_settings()
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(stuck=st.dictionaries(
     st.sampled_from([0x00, 0x02, 0x1E, 0x20, 0x22, 0x2E, SUSPEND, SOFT_RESET]), st.integers(0, 255), min_size=1
 ))
@@ -159,7 +159,7 @@ def test_a_broken_chip_is_a_documented_error_or_runs_as_set(stuck: dict[int, int
 ERRNOS = st.sampled_from([errno.EREMOTEIO, errno.ENXIO, errno.ETIMEDOUT, errno.EBUSY, errno.EIO, errno.EAGAIN])
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     failures=st.dictionaries(st.integers(0, 40), st.tuples(ERRNOS, st.booleans()), min_size=1, max_size=5),
     suspended=st.booleans(),
@@ -297,7 +297,7 @@ def test_all_256_bytes_on_every_axis(range_g: int, counts_per_g: int) -> None:
     assert decoder.anomalies == sum(any((byte + 85 * axis) % 4 for axis in range(3)) for byte in range(256))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(data=st.lists(st.binary(min_size=3, max_size=3), max_size=40), cuts=st.sets(st.integers(0, 40)))
 def test_blocks_of_any_size_give_the_same_samples_and_counts(data: list[bytes], cuts: set[int]) -> None:
     whole, parts = Bma220Decoder(2), Bma220Decoder(2)
@@ -322,7 +322,7 @@ def test_an_empty_block_has_the_right_shapes() -> None:
     assert (block.t_us.dtype, block.clipped.dtype) == (np.int64, np.bool_)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(data=st.binary(max_size=8).filter(lambda data: len(data) != 3))
 def test_a_sample_of_another_length_is_refused_and_leaves_nothing(data: bytes) -> None:
     decoder = Bma220Decoder(2)

@@ -96,7 +96,7 @@ def test_joined_compressed_files_read_as_one(tmp_path: Path) -> None:
     assert read(path) == (EVENTS, False)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(times=st.lists(st.integers(0, LATEST_US), max_size=20), data=st.binary(min_size=1, max_size=40),
        source=st.sampled_from(SOURCES), packed=st.booleans())
 def test_any_events_come_back_exactly(
@@ -297,7 +297,7 @@ def test_compressed_bomb_does_not_fill_the_memory(tmp_path: Path, filler: bytes)
         tracemalloc.stop()
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(data=st.binary(max_size=200), packed=st.booleans())
 def test_random_bytes_raise_nothing_else(
     tmp_path_factory: pytest.TempPathFactory, data: bytes, packed: bool

@@ -123,7 +123,7 @@ TEXT_PIECES = [b"$GPRMC,1*00\r\n", b"$", b"$GP", b"\x00", b"\r", b"\n"]
 PIECES = st.sampled_from([*TEXT_PIECES, b"\xb5", b"\xb5\x62", ubx(b""), ubx(b"$A\n"), ubx(bytes(300))])
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.lists(st.one_of(PIECES, st.binary(max_size=20)), max_size=12).map(b"".join),
     st.lists(st.integers(0, 600), max_size=8),
@@ -218,7 +218,7 @@ def test_start_bytes_settle_the_place():
         assert len(frames) >= 115
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(
     st.lists(st.one_of(st.integers(1, 60).map(words), st.binary(max_size=9)), max_size=6).map(b"".join),
     st.lists(st.integers(0, 1500), max_size=8),

@@ -519,7 +519,7 @@ PIECES = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.lists(PIECES, max_size=10).map(b"".join), st.lists(st.integers(0, 600), max_size=6))
 def test_cuts_do_not_matter(data, places):
     edges = [0, *sorted(min(place, len(data)) for place in places), len(data)]
@@ -531,14 +531,14 @@ def test_cuts_do_not_matter(data, places):
 ALPHABET = st.sampled_from([bytes((byte,)) for byte in b"$*,.\r\nGPRMCANSEW0123456789\xb5\x62"])
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.one_of(st.binary(max_size=500), st.lists(ALPHABET, max_size=300).map(b"".join)))
 def test_noise_gives_no_fix_and_no_error(data):
     fixes, counters = decode(data)
     assert fixes == [] or counters.sentences > 0
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126, exclude_characters="$*"), max_size=100))
 def test_anything_behind_a_right_checksum_is_survived(fields):
     for kind in ("RMC", "GGA", "VTG", "GSA", "ZDA"):

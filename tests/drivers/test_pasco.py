@@ -360,8 +360,8 @@ def test_samples_lost_at_even_intervals_are_no_slower_sensor(rate_hz, every, cou
 @pytest.mark.parametrize("tolerance_ppm", [10, 50, 500])
 @pytest.mark.parametrize("off_ppm", [-50, -400, -5000, 30])
 def test_a_tight_tolerance_makes_no_losses(tolerance_ppm, off_ppm):
-    """A clock that is off by more than its profile grants loses nothing by it: ten minutes."""
-    truth_us, arrival_us = radio(100 * (1 + off_ppm * 1e-6), 60_000, 12, latency_us=4000, burst_max=1)
+    """A clock that is off by more than its profile grants loses nothing by it: five minutes."""
+    truth_us, arrival_us = radio(100 * (1 + off_ppm * 1e-6), 30_000, 12, latency_us=4000, burst_max=1)
     clock = SampleClock(100, tolerance_ppm * 1e-6)
     error_us = timed(clock, arrival_us) - truth_us
     assert clock.resyncs == 0
@@ -407,7 +407,7 @@ def cut(data, places):
     return [(a // 100 * 160_000, data[a:b]) for a, b in pairwise(edges)]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.sampled_from(["ps2119", "lines"]),
     st.lists(st.one_of(st.sampled_from([ROAD, SPOKEN, ROAD[5:200]]), st.binary(max_size=30)), max_size=4).map(b"".join),

@@ -197,7 +197,7 @@ def test_cues_of_a_playing_bus_are_on_the_recordings_time() -> None:
 
 # ---- the port
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(chunks=st.lists(st.binary(max_size=20), max_size=20), sizes=st.lists(st.integers(1, 30), min_size=1, max_size=9))
 def test_a_loaded_port_gives_every_byte_once_in_order(chunks: list[bytes], sizes: list[int]) -> None:
     port = RecordedPort()

@@ -40,7 +40,7 @@ def test_a_field_takes_its_bits_and_no_others() -> None:
     assert MIDDLE.insert(0b1111_1111, 0b010) == 0b1101_0111
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(byte=st.integers(0, 255), value=st.integers(-300, 300), low=st.integers(0, 7), more=st.integers(0, 7))
 def test_any_field_of_any_byte(byte: int, value: int, low: int, more: int) -> None:
     field = Field("any", min(7, low + more), low)

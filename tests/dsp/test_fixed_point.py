@@ -119,7 +119,7 @@ def test_scales_are_not_coarser_than_they_must_be() -> None:
 
 @every_cascade
 @given(seed=st.integers(0, 2**32), size=st.sampled_from([1e-3, 1e-6, 0.0]))
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 def test_from_any_state_silence_becomes_zero(cascade: FixedCascade, seed: int, size: float) -> None:
     """Any, but small enough to stay in the words: no input leads to states in which all is large at random."""
     rng = np.random.default_rng(seed)
@@ -162,7 +162,7 @@ def test_reset_is_what_a_steady_input_comes_to(cascade: FixedCascade) -> None:
 
 
 @given(cuts=st.lists(st.integers(0, 500), max_size=20))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_any_split_gives_the_same_bits(cuts: list[int]) -> None:
     record = np.random.default_rng(3).standard_normal(500)
     stream = FixedFilter(CASCADES["wk", 32])

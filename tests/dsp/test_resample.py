@@ -74,7 +74,7 @@ MESSY_RUNS = bits(on_grid(*MESSY)[0])
 
 
 @given(cuts=st.lists(st.integers(0, len(MESSY[0])), max_size=30))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_any_split_gives_the_same_bits(cuts: list[int]) -> None:
     assert bits(on_grid(*MESSY, cuts=cuts)[0]) == MESSY_RUNS
 
@@ -217,7 +217,7 @@ def test_the_decimating_filter_passes_and_stops(factor: int) -> None:
 
 
 @given(cuts=st.lists(st.integers(1, 1500), max_size=20), factor=st.sampled_from([1, 2, 3, 8]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_any_split_decimates_to_the_same_bits(cuts: list[int], factor: int) -> None:
     rng = np.random.default_rng(9)
     values = rng.standard_normal(1500)

@@ -18,7 +18,7 @@ RECORD = np.random.default_rng(1).standard_normal(1000) + 9.8
 
 
 @given(cuts=st.lists(st.integers(0, len(RECORD)), max_size=40))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_any_split_gives_the_same_bits(cuts: list[int]) -> None:
     whole = BlockFilter(WK).process(RECORD)
     stream = BlockFilter(WK)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from logger.dsp.thinning import thinned
@@ -34,7 +34,6 @@ def test_white_noise_stays_white() -> None:
     assert tenths == pytest.approx([0.25] * 10, rel=0.06)
 
 
-@settings(deadline=None)  # the first call loads scipy
 @given(st.integers(1, 300), st.integers(1, 12), st.floats(-5, 5))
 def test_every_so_many_samples_and_a_steady_one_stays(count: int, factor: int, level: float) -> None:
     found = thinned(np.full(count, level), factor)

@@ -49,7 +49,7 @@ def test_sums_are_those_of_the_samples_between_the_multiples() -> None:
         np.testing.assert_allclose(window.speed_mps, speed_mps)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(cuts=st.lists(st.integers(0, 600), max_size=12), seed=st.integers(0, 10))
 def test_portions_do_not_matter(cuts: list[int], seed: int) -> None:
     count = 600

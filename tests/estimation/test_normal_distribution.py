@@ -38,7 +38,7 @@ def test_distribution_takes_infinities() -> None:
     assert distribution(np.array([-np.inf, np.inf])).tolist() == [0.0, 1.0]
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     mean=st.floats(-20, 20), deviation=st.floats(0.05, 5), low=st.floats(-6, 6), width=st.floats(0.02, 12),
     open_side=st.sampled_from(("", "low", "high")),
@@ -71,7 +71,7 @@ def test_bounds_far_off_hold_the_variable_near_the_nearer_one(off: float, side: 
     assert 0 < variance[0] <= 2e-2
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     mean=st.floats(-1e3, 1e3), variance=st.floats(1e-6, 1e4), low=st.floats(-1e4, 1e4), width=st.floats(1e-4, 1e4),
 )
@@ -93,7 +93,7 @@ def test_within_of_the_mirror_image_is_the_mirror_image() -> None:
     assert one[0] == pytest.approx(-other[0], rel=1e-9) and one[1] == pytest.approx(other[1], rel=1e-6)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(mean=st.floats(-30, 30), deviation=st.floats(0.1, 10))
 def test_mean_absolute_is_that_of_the_folded_normal(mean: float, deviation: float) -> None:
     expected = foldnorm.mean(abs(mean) / deviation, scale=deviation)

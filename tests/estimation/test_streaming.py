@@ -180,7 +180,7 @@ def in_one_go(coarse: bool) -> list[tuple[object, ...]]:
 
 
 @pytest.mark.parametrize("coarse", [False, True])
-@settings(deadline=None, max_examples=5)
+@settings(max_examples=5)
 @given(cuts=st.lists(st.integers(0, 3600), max_size=12))
 def test_any_split_gives_the_same_bits(coarse: bool, cuts: list[int]) -> None:
     one, sensor = driven(((0, 9), (12, 15), (20, 0), (24, 0), (36, 14))), COARSE if coarse else FINE

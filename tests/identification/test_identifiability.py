@@ -9,7 +9,7 @@ import pytest
 
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
-from logger.identification.prediction_error_fit import Options, fit
+from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -75,7 +75,7 @@ def test_a_flat_road_says_nothing_of_a_damper() -> None:
 
 def test_who_asks_not_to_be_refused_gets_the_verdict() -> None:
     model = VehicleModel(CAR, [free(CAR, DAMPER)], [bump_record(CAR, height_m=1e-4)])
-    assert [finding.kind for finding in fit(model, model.measured, Options(refuse=False)).verdict] == [WEAK]
+    assert [finding.kind for finding in fit(model, model.measured, FitOptions(refuse=False)).verdict] == [WEAK]
 
 
 def test_structure_is_read_off_the_derivatives() -> None:

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from logger.identification.obstacle_paths import Bump, Obstacle, ObstaclePath, Step
+from logger.identification.obstacle_paths import Bump, Obstacle, ObstaclePath, RoadStep
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
 
 WAY = np.concatenate([np.linspace(-2, 9, 700), np.full(3, 9.0), np.linspace(9, 4, 90)])
-OBSTACLES = [Bump(3.0, 0.15, 2.6), Bump(2.2, -0.05, 0.4), Step(4.1, 0.038), Step(1.0, -0.02)]
+OBSTACLES = [Bump(3.0, 0.15, 2.6), Bump(2.2, -0.05, 0.4), RoadStep(4.1, 0.038), RoadStep(1.0, -0.02)]
 
 
 def height(one: Obstacle, x: float) -> float:
-    if isinstance(one, Step):
+    if isinstance(one, RoadStep):
         return one.height_m if x >= one.start_m else 0.0
     inside = 0 <= x - one.start_m <= one.width_m
     return one.height_m / 2 * (1 - np.cos(2 * np.pi * (x - one.start_m) / one.width_m)) if inside else 0.0
@@ -52,9 +52,9 @@ def test_against_a_dense_profile(one: Obstacle) -> None:
 
 
 @given(st.floats(-3, 6), st.floats(0.01, 0.3), st.floats(0.3, 5), st.floats(0.01, 0.4))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_slopes_are_those_of_the_path(start_m: float, height_m: float, width_m: float, patch_m: float) -> None:
-    for kind, numbers in ((Bump, [start_m, height_m, width_m]), (Step, [start_m, height_m])):
+    for kind, numbers in ((Bump, [start_m, height_m, width_m]), (RoadStep, [start_m, height_m])):
         slopes = kind(*numbers).slopes(patch_m)
         for index, name in enumerate(["start_m", "height_m", "width_m"][: len(numbers)]):
             step = 1e-5 * (np.arange(len(numbers)) == index)
@@ -66,7 +66,9 @@ def test_slopes_are_those_of_the_path(start_m: float, height_m: float, width_m: 
                 assert edge.mean() < 0.01
 
 
-@pytest.mark.parametrize("wrong", [(Bump, 0.0, 0.1, 0.0), (Bump, 0.0, 0.0, 1.0), (Step, 0.0, 0.0), (Step, 0.0, 2.0)])
-def test_what_is_none(wrong: tuple[type[Bump] | type[Step], float]) -> None:
+@pytest.mark.parametrize("wrong", [
+    (Bump, 0.0, 0.1, 0.0), (Bump, 0.0, 0.0, 1.0), (RoadStep, 0.0, 0.0), (RoadStep, 0.0, 2.0),
+])
+def test_what_is_none(wrong: tuple[type[Bump] | type[RoadStep], float]) -> None:
     with pytest.raises(ValueError, match="expected"):
         wrong[0](*wrong[1:])

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White
-from logger.identification.prediction_error_fit import Fit, Options, fit, spread_starts
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.runs import normalised_rms
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -28,7 +28,7 @@ BUMP = bump_record(CAR)
 WHITE = [White()]
 
 
-def mass_fit(start: float = 700.0, options: Options | None = None) -> Fit:
+def mass_fit(start: float = 700.0, options: FitOptions | None = None) -> Fit:
     model = VehicleModel(CAR, [free(CAR, MASS, start)], [BUMP])
     return fit(model, model.measured, options)
 
@@ -63,7 +63,7 @@ def test_scipy_on_the_stepping_simulation_says_the_same() -> None:
     deviation = np.sqrt(2 * theirs.cost / (BUMP.count - 2))
     errors = deviation * np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
     model = VehicleModel(CAR, [free(CAR, MASS, 790), free(CAR, RATE, 25_000)], [BUMP])
-    ours = fit(model, model.measured, Options(noise=WHITE))
+    ours = fit(model, model.measured, FitOptions(noise=WHITE))
     unit = np.array([875, 23_088])
     assert np.array(list(ours.parameters.values())) / unit == pytest.approx(theirs.x, abs=2e-3 * errors.min())
     assert np.array(list(ours.standard_errors.values())) / unit == pytest.approx(errors, rel=2e-3)
@@ -93,10 +93,10 @@ def test_bounds_hold_and_are_told() -> None:
 
 
 def test_several_starts_and_the_best_of_them() -> None:
-    found = mass_fit(options=Options(starts=[{MASS: 400.0}, {MASS: 2000.0}]))
+    found = mass_fit(options=FitOptions(starts=[{MASS: 400.0}, {MASS: 2000.0}]))
     assert found.ends[:, 0] == pytest.approx(found.parameters[MASS], rel=1e-4)
     with pytest.raises(ValueError, match="every start between its bounds"):
-        mass_fit(options=Options(starts=[{MASS: 4.0}]))
+        mass_fit(options=FitOptions(starts=[{MASS: 4.0}]))
     numbers = [free(CAR, MASS), free(CAR, "sensor.ahead_m")]
     starts = spread_starts(numbers, 40)
     masses = np.array([start[MASS] for start in starts])
@@ -107,7 +107,7 @@ def test_several_starts_and_the_best_of_them() -> None:
 def test_a_model_without_derivatives_is_a_regression() -> None:
     time = np.linspace(0, 3, 200)
     measured = 0.5 + 2 * time + 0.1 * np.random.default_rng(1).standard_normal(200)
-    found = fit(Line(time), [measured], Options(noise=WHITE))
+    found = fit(Line(time), [measured], FitOptions(noise=WHITE))
     columns = np.stack([np.ones(200), time], axis=1)
     solution, left, *_ = np.linalg.lstsq(columns, measured, rcond=None)
     assert list(found.parameters.values()) == pytest.approx(solution.tolist(), abs=1e-6)
@@ -119,7 +119,7 @@ def test_wild_readings_count_less() -> None:
     generator = np.random.default_rng(2)
     measured = 0.5 + 2 * time + 0.05 * generator.standard_normal(300)
     measured[generator.choice(300, 25, replace=False)] += 4.0
-    plain, robust = (fit(Line(time), [measured], Options(noise=WHITE, robust=one)) for one in (False, True))
+    plain, robust = (fit(Line(time), [measured], FitOptions(noise=WHITE, robust=one)) for one in (False, True))
     assert robust.parameters["a"] == pytest.approx(0.5, abs=0.05) != pytest.approx(plain.parameters["a"], abs=0.2)
     assert robust.parameters["b"] == pytest.approx(2.0, abs=0.03)
     assert robust.standard_errors["b"] < 0.2 * plain.standard_errors["b"]
@@ -127,7 +127,7 @@ def test_wild_readings_count_less() -> None:
 
 def test_robust_errors_are_right() -> None:
     time, generator = np.linspace(-1, 1, 150), np.random.default_rng(3)
-    found = [fit(Line(time), [2 * time + 0.1 * generator.standard_t(3, 150)], Options(noise=WHITE, robust=True))
+    found = [fit(Line(time), [2 * time + 0.1 * generator.standard_t(3, 150)], FitOptions(noise=WHITE, robust=True))
              for _ in range(60)]
     spread = np.std([one.parameters["b"] for one in found])
     assert np.mean([one.standard_errors["b"] for one in found]) == pytest.approx(spread, rel=0.25)
@@ -136,7 +136,8 @@ def test_robust_errors_are_right() -> None:
 def test_a_low_pass_leaves_out_what_is_only_noise() -> None:
     hum = 2.0 * np.sin(2 * np.pi * 33.0 * BUMP.time_s)
     model = VehicleModel(CAR, [free(CAR, MASS, 700)], [BUMP])
-    plain, low = (fit(model, [model.measured[0] + hum], Options(noise=WHITE, low_pass_hz=one)) for one in (None, 20.0))
+    plain, low = (fit(model, [model.measured[0] + hum], FitOptions(noise=WHITE, low_pass_hz=one))
+                  for one in (None, 20.0))
     assert low.standard_errors[MASS] < 0.1 * plain.standard_errors[MASS]
     assert low.parameters[MASS] == pytest.approx(875, rel=0.003)
 
@@ -147,7 +148,7 @@ def test_innovations_bring_the_errors_right_that_output_error_has_wrong() -> Non
     for _ in range(40):
         noise = lfilter([0.05], [1.0, -0.95], generator.standard_normal(400))
         for name, kind in (("white", White()), ("ar", Autoregressive())):
-            found = fit(Line(time), [2 * time + noise], Options(noise=[kind], refuse=False))
+            found = fit(Line(time), [2 * time + noise], FitOptions(noise=[kind], refuse=False))
             outcome[name].append((found.parameters["b"] - 2) / found.standard_errors["b"])
     assert np.std(outcome["white"]) > 3
     assert np.std(outcome["ar"]) < 1.6
@@ -158,7 +159,7 @@ def test_a_rough_road_outside_the_model() -> None:
     for seed in range(6):
         record = bump_record(CAR, 12.0, seed=seed, iri_outside=5.0, start_m=8.0)
         model = VehicleModel(CAR, [free(CAR, MASS, 1000), free(CAR, RATE, 20_000)], [record])
-        found = fit(model, model.measured, Options(noise=[White(), Autoregressive(), RoadNoise(model.road_spectra)]))
+        found = fit(model, model.measured, FitOptions(noise=[White(), Autoregressive(), RoadNoise(model.road_spectra)]))
         assert (found.noise.name, found.converged) == ("road", True)
         scores += [(found.parameters[MASS] - 875) / found.standard_errors[MASS]]
         levels += [found.noise.levels["gd_n0_cm3"]]
@@ -177,7 +178,7 @@ def test_what_is_not_asked_right() -> None:
 def test_records_of_nothing_but_zeros() -> None:
     model = VehicleModel(CAR, [free(CAR, MASS)], [BUMP])
     with pytest.raises(ValueError, match="expected measurements that move, found nothing but 0"):
-        fit(model, [np.zeros_like(model.measured[0])], Options(refuse=False))
+        fit(model, [np.zeros_like(model.measured[0])], FitOptions(refuse=False))
 
 
 def test_another_record_than_this_one_is_not_explained() -> None:
@@ -185,7 +186,7 @@ def test_another_record_than_this_one_is_not_explained() -> None:
     other = road_record(CAR, 10.0, 14.0, 2).kept_mps2
     with pytest.raises(NotIdentifiable, match="explains nothing of what was measured"):
         fit(model, [other])
-    assert fit(model, [other], Options(refuse=False)).verdict[0].kind == UNEXPLAINED
+    assert fit(model, [other], FitOptions(refuse=False)).verdict[0].kind == UNEXPLAINED
     assert not fit(model, model.measured).verdict
 
 
@@ -194,5 +195,5 @@ def test_a_robust_loss_has_no_ends_of_its_own() -> None:
                for seed, height_m in enumerate((0.15, 0.10))]
     wanted = [free(CAR, MASS), free(CAR, "both.suspension_damping_n_s_per_m")]
     model = VehicleModel(CAR, wanted, records)
-    found = fit(model, model.measured, Options(robust=True, low_pass_hz=20.0, starts=spread_starts(wanted, 4)))
+    found = fit(model, model.measured, FitOptions(robust=True, low_pass_hz=20.0, starts=spread_starts(wanted, 4)))
     assert np.abs(found.ends / [875, 1776] - 1).max() < 0.01

@@ -8,7 +8,7 @@ import pytest
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.noise_models import RoadNoise
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Options, fit
+from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
 from logger.identification.unknown_inputs import RoadInput, expanded, free_input
 from logger.profiles.track import Track
@@ -41,7 +41,7 @@ def fitted(speeds_mps: tuple[float, ...], roads: tuple[int, ...]) -> tuple[Vehic
     road = RoadInput(bump=Bump(20.5, 0.08, 3.6))
     numbers = [free(CAR, MASS)] + [free_input(road, one) for one in expanded("each.bump.start_m", len(records))]
     model = VehicleModel(CAR, numbers, records, road)
-    found = fit(model, model.measured, Options(noise=[RoadNoise(model.road_spectra)]))
+    found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
     return model, with_common_roughness(model, found), found.standard_errors[MASS]
 
 

@@ -12,24 +12,25 @@ from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import TOGETHER, NotIdentifiable
 from logger.identification.noise_models import White
 from logger.identification.obstacle_paths import Bump
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import RoadInput, free_input, is_input
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
+from logger.studies.drives import rav4
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effect_parameters import free_number, move_named
 from logger.vehicle.named_parameters import free
 
 from ..support.drives.bumps import bump_record, road_record
-from ..support.drives.rubbing import CAR, FRICTION_N, GROWN_AT_MPS, rubbing_run
+from ..support.drives.rubbing import FRICTION_N, rubbing_run
 
 Array = npt.NDArray[np.float64]
 
-EFFECTS = shipped_effects()
+CAR, EFFECTS = rav4(), shipped_effects()
 MASS, FRICTION = "sprung_mass_kg", "dry_friction.friction_force_n"
 FLAT = Track(1.0, np.zeros(2))
 
@@ -38,8 +39,8 @@ def effect(name: str, **values: float) -> Chosen:
     return chosen(EFFECTS[name], values)
 
 
-def rubbing(friction_n: float, grown_at_mps: float = 0.0) -> Chosen:
-    return effect("dry_friction", friction_force_n=friction_n, transition_velocity_m_per_s=grown_at_mps)
+def rubbing(friction_n: float) -> Chosen:
+    return effect("dry_friction", friction_force_n=friction_n)
 
 
 def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], road: RoadInput | None = None
@@ -57,7 +58,7 @@ def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], r
 
 def found(*asked: object) -> Fit:
     made = model(*asked)  # type: ignore[arg-type]
-    return fit(made, made.measured, Options(noise=[White()], starts=made.trials()))
+    return fit(made, made.measured, FitOptions(noise=[White()], starts=made.trials()))
 
 
 def off(result: Fit, truth: dict[str, float]) -> Array:
@@ -86,13 +87,13 @@ def test_a_linear_car_does_as_the_exact_model_says() -> None:
 
 @pytest.fixture(scope="module")
 def errors() -> Array:
-    """Of mass and friction, in standard errors, over draws of the sensor's noise on one drive by Newton's laws."""
+    """Of mass and friction, in standard errors, over draws of the sensor's noise on drives by Newton's laws."""
     truth = {MASS: CAR.sprung_mass_kg, FRICTION: FRICTION_N}
-    there, starts = [rubbing(60.0, GROWN_AT_MPS)], {MASS: 800.0, FRICTION: 60.0}
-    return np.array([off(found([rubbing_run(seed)], there, starts), truth) for seed in range(10)])
+    there, starts = [rubbing(60.0)], {MASS: 800.0, FRICTION: 60.0}
+    return np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
 
 
-def test_mass_and_friction_are_found_on_a_drive_by_newtons_laws(errors: Array) -> None:
+def test_mass_and_friction_are_found_on_drives_by_newtons_laws(errors: Array) -> None:
     print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
     assert np.abs(errors).max() < 3.0
 

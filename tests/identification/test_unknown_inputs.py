@@ -11,9 +11,9 @@ import pytest
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import WEAK, NotIdentifiable
 from logger.identification.noise_models import White
-from logger.identification.obstacle_paths import Bump, Step
+from logger.identification.obstacle_paths import Bump, RoadStep
 from logger.identification.obstacle_search import located
-from logger.identification.prediction_error_fit import Fit, Options, fit
+from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import (
     RoadInput,
     changed_input,
@@ -85,7 +85,7 @@ def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
     place = np.arange(-10.0, 100.0, 0.1)
     rough = Track(0.1, generate(64.0, 120.0, 0.1, 1)[: len(place)], place[0])
     record = replace(on_flat_road(car), track=rough)
-    road = RoadInput(Bump(3.0, 0.1, 2.0), Step(8.0, -0.03), 1.03)
+    road = RoadInput(Bump(3.0, 0.1, 2.0), RoadStep(8.0, -0.03), 1.03)
     one = model(car, [record, replace(record, distance_m=record.distance_m + 1)], road,
                 *(name for name in input_names(road) if name != START), "run2.bump.start_m")
     values = np.array([each.start for each in one.parameters])
@@ -124,7 +124,7 @@ def test_an_axle_distance_that_is_not_known_hides_the_speed() -> None:
     axles = ("front.cg_distance_m", "rear.cg_distance_m")
     one = model(HALF, [on_flat_road(HALF)], RoadInput(bump=Bump(2.0, 0.15, 2.6)), WIDTH, START, SPEED, *axles)
     with pytest.raises(NotIdentifiable, match="speed_scale"):
-        fit(one, one.measured, Options(noise=[White()]))
+        fit(one, one.measured, FitOptions(noise=[White()]))
 
 
 def test_a_drive_that_never_met_the_bump_says_nothing_of_it() -> None:
@@ -135,7 +135,7 @@ def test_a_drive_that_never_met_the_bump_says_nothing_of_it() -> None:
 @pytest.mark.parametrize("height_m", [0.0381, -0.0381])
 def test_a_bridge_joint_from_a_known_mass(height_m: float) -> None:
     record = step_record(HALF, height_m)
-    road = RoadInput(step=Step(10.3, height_m / 2))
+    road = RoadInput(step=RoadStep(10.3, height_m / 2))
     fitted = found(HALF, [record], road, "step.height_m", "step.start_m")
     error_m = fitted.standard_errors["step.height_m"]
     assert fitted.parameters["step.height_m"] == pytest.approx(height_m, abs=4 * error_m)
@@ -146,7 +146,7 @@ def test_a_bridge_joint_from_a_known_mass(height_m: float) -> None:
 def test_a_step_on_a_road_whose_profile_is_known() -> None:
     place = np.arange(-20.0, 120.0, 0.1)
     rough = Track(0.1, generate(64.0, 150.0, 0.1, 4)[: len(place)], place[0])
-    fitted = found(HALF, [step_record(HALF, 0.03, track=rough)], RoadInput(step=Step(10.1, 0.02)),
+    fitted = found(HALF, [step_record(HALF, 0.03, track=rough)], RoadInput(step=RoadStep(10.1, 0.02)),
                    "step.height_m", "step.start_m", MASS)
     for name, truth in (("step.height_m", 0.03), (MASS, 875.0)):
         assert fitted.parameters[name] == pytest.approx(truth, abs=max(4 * fitted.standard_errors[name], 2e-3 * truth))
@@ -155,16 +155,16 @@ def test_a_step_on_a_road_whose_profile_is_known() -> None:
 def test_a_mass_in_proportion_to_the_height_that_was_assumed() -> None:
     """Fig 4.31: what a wrong height does, and that with the height free it does nothing."""
     record = step_record(HALF, 0.0381)
-    masses = [found(HALF, [record], RoadInput(step=Step(10.0, height_m)), MASS).parameters[MASS]
+    masses = [found(HALF, [record], RoadInput(step=RoadStep(10.0, height_m)), MASS).parameters[MASS]
               for height_m in (0.0254, 0.0381, 0.0508)]
     assert masses[0] < 0.8 * masses[1] < 0.7 * masses[2]
-    free_height = found(HALF, [record], RoadInput(step=Step(10.0, 0.0254)), MASS, "step.height_m", "step.start_m")
+    free_height = found(HALF, [record], RoadInput(step=RoadStep(10.0, 0.0254)), MASS, "step.height_m", "step.start_m")
     assert free_height.parameters[MASS] == pytest.approx(875, abs=4 * free_height.standard_errors[MASS])
 
 
 def test_where_an_obstacle_lies() -> None:
     assert located(HALF, on_flat_road(HALF), RoadInput(bump=Bump(0.0, 0.1, 3.2)), "bump") == pytest.approx(2.0, abs=0.5)
-    assert located(HALF, step_record(HALF, -0.03), RoadInput(step=Step(0.0, -0.02)), "step") == pytest.approx(
+    assert located(HALF, step_record(HALF, -0.03), RoadInput(step=RoadStep(0.0, -0.02)), "step") == pytest.approx(
         10.0, abs=0.3)
     long = replace(on_flat_road(HALF), distance_m=on_flat_road(HALF).distance_m * 1.0 + 1e5 * (np.arange(600) > 300))
     with pytest.raises(ValueError, match="expected a start_m"):
@@ -181,13 +181,13 @@ def test_three_runs_each_with_its_own_start() -> None:
 
 
 def test_names_and_bounds() -> None:
-    road = RoadInput(Bump(3.0, 0.1, 2.0), Step(8.0, -0.03), 1.0)
+    road = RoadInput(Bump(3.0, 0.1, 2.0), RoadStep(8.0, -0.03), 1.0)
     assert input_names(road) == [START, HEIGHT, WIDTH, "step.start_m", "step.height_m", SPEED]
     assert run_and_name("run2.bump.start_m") == (1, START)
     assert expanded(f"each.{START}", 1) == [START]
     assert (is_input("run3.speed_scale"), is_input("each.step.height_m"), is_input(MASS)) == (True, True, False)
     assert changed_input(road, {"run2.speed_scale": 1.1, HEIGHT: 0.2, "step.start_m": 7.0}, 1) == RoadInput(
-        Bump(3.0, 0.2, 2.0), Step(7.0, -0.03), 1.1)
+        Bump(3.0, 0.2, 2.0), RoadStep(7.0, -0.03), 1.1)
     assert changed_input(road, {"run2.speed_scale": 1.1}, 0) == road
     down = free_input(road, "step.height_m")
     assert (down.start, down.by_factors) == (-0.03, True)

@@ -10,7 +10,7 @@ import pytest
 
 from logger.identification.identifiability import APART, SILENT, TOGETHER, WEAK, NotIdentifiable
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.identification.unknown_road.fisher_scoring import Problem, RoadFit
+from logger.identification.unknown_road.fisher_scoring import RoadFit, RoadProblem
 from logger.identification.unknown_road.road_fit import fit_roads
 from logger.identification.unknown_road.road_state import GD_N0, NOISE, Options
 from logger.profiles.track import Track
@@ -99,7 +99,7 @@ def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     road = track(120.0, 2)
     drives = [driven(HALF, road, 12.0, 25.0, 1), driven(HALF, road, 20.0, 25.0, 2, 0.4)]
     options = Options(free_waviness=True, probes=40, scale_off=0.01)
-    problem = Problem(response(HALF, MASS, DAMPERS), [drives], options)
+    problem = RoadProblem(response(HALF, MASS, DAMPERS), [drives], options)
     x = problem.start()
     x[-2] = 0.3
     one = problem.roads[0]
@@ -137,6 +137,7 @@ def test_one_drive_over_a_road_of_which_only_the_kind_is_known() -> None:
     assert fitted.roads[NOISE] == pytest.approx(NOISE_MPS2, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_probes_have_in_common_is_small_at_the_end() -> None:
     """Estimates that differ by nothing but the probes: their scatter is the standard error over the root of so many."""
     drives = [[driven(HALF, track(60.0, 3), 14.0, 50.0, 3)]]
@@ -164,6 +165,7 @@ def test_two_drives_over_one_road_at_different_speeds() -> None:
     assert np.corrcoef(*slopes)[0, 1] > 0.8
 
 
+@pytest.mark.slow
 def test_distances_that_disagree_a_little_are_found() -> None:
     road = track(150.0, 4)
     slow, fast = driven(HALF, road, 10.0, 120.0, 1), driven(HALF, road, 18.0, 120.0, 2)
@@ -195,6 +197,7 @@ def test_roads_add_up() -> None:
     assert {f"road1.{GD_N0}", f"road2.{GD_N0}", NOISE} == set(both.roads)
 
 
+@pytest.mark.slow
 def test_what_no_such_drive_can_tell() -> None:
     drive = driven(HALF, track(150.0, 5), 14.0, 120.0, 5)
     with pytest.raises(NotIdentifiable) as caught:

@@ -97,6 +97,7 @@ def test_only_a_model_that_is_astray_spares_what_moves_it() -> None:
     assert [diagnosis._least_of_left(one, gain) for one in bases] == pytest.approx([10.0, 10.0, 10.0])
 
 
+@pytest.mark.slow
 def test_bending_that_a_bracket_stood_in_for_is_found_beside_tires() -> None:
     hidden = [chosen(EFFECTS["body_bending"], EFFECTS["body_bending"].usual | {
                   "frequency_hz": 27.8, "damping_ratio": 0.066, "participation": -1.24}),

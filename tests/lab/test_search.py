@@ -97,6 +97,7 @@ STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": 
 ROUGHER = {"bump_stop": 2.0, "wheel_lift": 6.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALONE)
 def test_every_effect_is_accepted_where_it_is_what_is_missing(name: str) -> None:
     there = chosen(EFFECTS[name], EFFECTS[name].usual | STRONGER.get(name, {}))
@@ -129,6 +130,7 @@ def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too
     assert tried.state.effects[-1].values["contact_patch_m"] == pytest.approx(0.75 * CAR.contact_patch_m, rel=0.1)
 
 
+@pytest.mark.slow
 def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() -> None:
     friction = chosen(EFFECTS["dry_friction"], {"friction_force_n": 90.0})
     offset = chosen(EFFECTS["sensor_offset"], {"offset_m": 0.4})
@@ -217,6 +219,7 @@ def test_of_two_that_explain_alike_the_simpler_is_taken() -> None:
     assert diagnosis._simplest_of_the_best([first, part], 5000.0) is part  # has a number of the first, and no other
 
 
+@pytest.mark.slow
 def test_what_explains_little_of_what_is_left_only_stands_in_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     friction = chosen(EFFECTS["dry_friction"], {"friction_force_n": 200.0})
     problem = Problem(runs_of(CAR, [friction]), CAR, Tolerance(), firm=True)
@@ -229,6 +232,7 @@ def test_what_explains_little_of_what_is_left_only_stands_in_for_it(monkeypatch:
     assert diagnose(problem, few).verdict != ()
 
 
+@pytest.mark.slow
 def test_a_bracket_and_a_bending_body_are_told_apart_though_one_can_take_the_others_place() -> None:
     bracket = chosen(EFFECTS["sensor_mount_resonance"], {"frequency_hz": 29.6, "damping_ratio": 0.05})
     bending = chosen(EFFECTS["body_bending"], {"frequency_hz": 14.7, "damping_ratio": 0.057, "participation": -0.15})
@@ -252,6 +256,7 @@ def test_a_simpler_effect_begins_where_one_with_its_numbers_stands() -> None:
     assert found.whole_gain > 100 and found.starts == 15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "delay_s"), [(1.01, 0.05), (1.02, 0.08)])
 def test_a_wrong_speed_and_a_late_clock_are_both_found_though_either_alone_gains_little(
         scale: float, delay_s: float) -> None:

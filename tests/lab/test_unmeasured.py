@@ -214,6 +214,7 @@ def test_what_was_not_fitted_says_so() -> None:
     assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
 
 
+@pytest.mark.slow
 def test_no_noise_at_all_breaks_nothing() -> None:
     runs = [run_of([], speed, 85.0, seed, noise_mps2=0.0) for seed, speed in ((1, 9.0), (2, 15.0))]
     problem = SameRoad(runs, CAR, Tolerance())

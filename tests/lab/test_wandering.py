@@ -73,6 +73,7 @@ def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> Non
     assert laid.error(state) < 1.1 * undisturbed.error(problem_of(true).start())
 
 
+@pytest.mark.slow
 def test_a_distance_that_wanders_lacks_no_physics_and_hides_none(wrong: tuple[float, float]) -> None:
     for effects in ([], [TIRES]):
         runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(driven(effects))]
@@ -113,6 +114,7 @@ def test_runs_that_do_not_wander_stay_where_they_were_recorded(effects: list[Cho
     assert problem.deviance(state) < problem.deviance(aligned(problem, problem.start())) + 2.0
 
 
+@pytest.mark.slow
 def test_a_factor_of_all_runs_is_found_beside_distances_that_wander() -> None:
     scale = chosen(EFFECTS["speed_scale"], {"scale": 1.01})
     runs = [with_wrong_speed(run, 0.05, 1.0, 3 + i) for i, run in enumerate(driven([scale]))]
@@ -121,6 +123,7 @@ def test_a_factor_of_all_runs_is_found_beside_distances_that_wander() -> None:
     assert found.after.effects[0].p.scale == pytest.approx(1.01, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [0.001, 0.004])
 def test_runs_may_each_have_their_own_factor_and_start(apart: float) -> None:
     plain = driven([TIRES], (8.0, 14.0, 11.0, 17.0))

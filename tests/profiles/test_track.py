@@ -30,7 +30,7 @@ def by_hand(x: np.ndarray, z: np.ndarray, low: float, high: float) -> float:
 
 
 @given(ROADS)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_average_over_the_patch_is_exact(numbers: tuple[int, int, float, float]) -> None:
     seed, count, spacing_m, patch_m = numbers
     z, x = road(seed, count), START_M + spacing_m * np.arange(count)
@@ -40,7 +40,7 @@ def test_the_average_over_the_patch_is_exact(numbers: tuple[int, int, float, flo
 
 
 @given(ROADS)
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_the_mean_over_a_step_is_exact_forward_back_and_standing(numbers: tuple[int, int, float, float]) -> None:
     seed, count, spacing_m, patch_m = numbers
     path = TirePath(START_M, spacing_m, road(seed, count), patch_m)

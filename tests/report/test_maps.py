@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from logger.report.maps import Colouring, joined, simplified, track_map
@@ -90,7 +90,8 @@ def test_small_maps_are_well_formed(drive, rows: int) -> None:
     assert "no map" in track_map(drive(rows, {i: {"lat_deg": None} for i in range(rows)}), (BY_CLASS,), ())
 
 
-@settings(deadline=None, max_examples=50)
+@example([(0.0, 1e-303), (0.0, 0.0), (0.0, 0.0)], 1.0)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.floats(0, 100), st.floats(0, 100)), min_size=1, max_size=40), st.floats(0.1, 20))
 def test_what_is_left_out_lies_on_the_line(points: list[tuple[float, float]], tolerance: float) -> None:
     kept = simplified(points, tolerance)

@@ -54,7 +54,7 @@ VALUES = [
 ]
 
 
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.dictionaries(st.integers(0, len(COLUMNS) - 1), st.sampled_from(VALUES), max_size=4),
                         min_size=1, max_size=5))
 def test_any_value_in_any_column_gives_a_page(drive, tmp_path: Path, changes: list[dict[int, str]]) -> None:

@@ -63,7 +63,7 @@ def printed_smoothing(psd: np.ndarray, step: float, low: float, high: float) -> 
     return float(total / (high - low))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(0.6, 30), st.floats(1.1, 40), st.integers(0, 2**31))
 def test_smoothing_is_that_of_equation_2_4(low_steps: float, width_steps: float, seed: int) -> None:
     step = 0.004

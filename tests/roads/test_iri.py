@@ -225,7 +225,7 @@ def test_windows_weigh_up_to_the_whole_and_share_steps() -> None:
 
 
 @given(st.integers(30, 2000), st.floats(0.006, 0.3), st.floats(0.1, 50), st.integers(0, 99))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_iri_scales_with_height_and_forgets_slope(count: int, spacing_m: float, scale: float, seed: int) -> None:
     if (count - 1) * spacing_m < 11.0:
         count = int(11.0 / spacing_m) + 2

@@ -30,7 +30,7 @@ def stream(spacing_m: float, window_m: float, sizes: list[int]) -> tuple[np.ndar
 
 @given(st.sampled_from([0.05, 0.25]), st.sampled_from([0.26, 7.62, 10.0, 100.0]),
        st.lists(st.one_of(st.integers(1, 9), st.integers(1, 700)), min_size=1, max_size=8))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_any_split_gives_the_same_bits(spacing_m: float, window_m: float, sizes: list[int]) -> None:
     slopes, windows = stream(spacing_m, window_m, sizes)
     assert slopes.tobytes() == SLOPE[spacing_m].tobytes()

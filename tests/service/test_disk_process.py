@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from ..support.faults.kills import KILLS, SERVICES, WRITES_NO_MORE
 
 
+@pytest.mark.slow
 def test_a_dozen_kills(tmp_path: Path) -> None:
     case, = KILLS.some()
     found = KILLS.trial(tmp_path, case)

@@ -67,20 +67,20 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
     assert expected[-1] == "close"
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 1000))
 def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
     assert rows_of(short_drive.header, cut_anywhere(short_drive.events, seed)).rows == expected
 
 
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(lines_drive: Drive, seed: int) -> None:
     whole = rows_of(lines_drive.header, lines_drive.events).rows
     assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == whole
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 1000))
 def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
     rng = random.Random(seed)
@@ -95,7 +95,7 @@ def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[s
     assert rows.rows == expected
 
 
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
 def test_bursts_joined_as_a_slow_reader_gets_them_give_the_same_road(
     short_drive: Drive, expected: list[str], seed: int
@@ -206,7 +206,7 @@ def with_outages(events: list[Event], seed: int) -> list[Event]:
     return kept
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
 def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(
     short_drive: Drive, seed: int, only: str, bridge_s: int

@@ -81,8 +81,7 @@ def test_one_line_in_a_hundred_lost_shows_where_it_was() -> None:
     assert found == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("second", [31.0, 47.37, 66.6, 80.0])
-@pytest.mark.parametrize("count", [1, 2, 7])
+@pytest.mark.parametrize(("second", "count"), [(31.0, 1), (47.37, 1), (66.6, 2), (80.0, 7)])
 def test_a_single_line_that_is_lost_shows(second: float, count: int) -> None:
     drive = drive_at(100)
     first = round(second * 100)

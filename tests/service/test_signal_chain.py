@@ -44,7 +44,7 @@ def chain_for(oversample: int = 1, axis: str = "+z") -> SignalChain:
     return SignalChain(Axis.from_word(axis), WEIGHTING, oversample, None, coarse=False)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(cuts=st.lists(st.integers(80, 400), max_size=8), oversample=st.sampled_from([1, 4]))
 def test_portions_change_no_bit(cuts: list[int], oversample: int) -> None:
     """Once the first half second, whose mean the filters start from, has come at once."""

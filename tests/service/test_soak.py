@@ -14,6 +14,7 @@ from ..support.drives.car_days import START_US, CarDay
 from ..support.faults.soak import MAX_FILE_BYTES, soak
 
 
+@pytest.mark.slow
 def test_half_an_hour_of_driving_and_parking_leaves_what_it_should(tmp_path: Path) -> None:
     day = CarDay(2, datetime(2026, 12, 31, 23, 57, tzinfo=UTC), cycle_s=900)
     quota_bytes = RESERVE_BYTES + 300_000

@@ -143,6 +143,7 @@ def test_files_are_the_contract_and_hide_the_answer(kind: str, effect: str | Non
         assert effect != "roll" or header.endswith("elevation_right_m")
 
 
+@pytest.mark.slow
 def test_a_distance_wanders_as_far_as_its_wrong_speed_takes_it() -> None:
     far_m, near_m = [], []
     for seed in range(12):

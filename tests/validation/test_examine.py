@@ -35,6 +35,7 @@ def short_drives(monkeypatch: pytest.MonkeyPatch) -> None:
 
 # --- the lab --------------------------------------------------------------------------------------------------------
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "seed", "effect"), [
     ("none", 3, None), ("one", 1, "dry_friction"), ("one", 2, "sensor_gain"), ("one", 2, "sensor_bandwidth"),
 ])

@@ -30,6 +30,7 @@ def asked(folder: Path, **more: object) -> Namespace:
     return Namespace(**given | more)
 
 
+@pytest.mark.slow
 def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = told_of(1, "sensor_mount_resonance", tmp_path, capsys)
     first = next(one for one in told["candidates"] if one["effect"] == told["verdict"][0])
@@ -40,6 +41,7 @@ def test_a_missing_effect_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
     assert any("share one scale" in one or "only together" in one for one in told["sentences"])
 
 
+@pytest.mark.slow
 def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = told_of(2, None, tmp_path, capsys)
     assert told["verdict"] == []

@@ -133,7 +133,7 @@ def work_n_m(laws: CornerLaws, amplitude_m: float, omega: float) -> tuple[float,
 
 @pytest.mark.parametrize("name", FORCES)
 @given(st.floats(1e-3, 0.1), st.floats(1.0, 100.0), st.randoms(use_true_random=False))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_no_force_gives_energy_over_a_closed_round(name: str, amplitude_m: float, omega: float, random) -> None:
     effect = EFFECTS[name]
     values = {one.name: one.value(random.uniform(*sorted(map(one.coordinate, (one.low, one.high)))))

@@ -159,7 +159,7 @@ def test_a_bump_under_the_left_front_wheel_lifts_nose_and_left_side() -> None:
 
 
 @given(st.integers(0, 3), st.floats(-1.5, 1.5), st.floats(-0.7, 0.7), st.floats(0.05, 40.0))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_outputs_in_time_and_in_frequency_agree(index: int, ahead_m: float, left_m: float, f_hz: float) -> None:
     """C (i w - A)^-1 B + D of the state space is the frequency response; a rate is i w times what it is the rate of."""
     car = full_car.structure(FULL)

@@ -287,6 +287,7 @@ def test_coulomb_friction_takes_the_same_from_each_swing_and_holds_at_last() -> 
     assert abs(travel[-1]) <= friction_n / k
 
 
+@pytest.mark.slow
 def test_compiled_and_plain_python_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stepping_loop.COMPILED, "the tests need the lab extra"
     rough = 0.02 * np.random.default_rng(1).standard_normal((2, 20)).repeat(4, axis=1).T

@@ -87,7 +87,7 @@ class Score:
     correction: Array
 
 
-class Problem:
+class RoadProblem:
     """All roads, in coordinates: logarithms of sizes, places in metres, other numbers over half their bounds' width.
 
     In this order: the car's numbers; of each road its level, its waviness if free, and the places of its drives but

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.unknown_road.drive_operator import Drive
-from logger.identification.unknown_road.fisher_scoring import Problem, RoadFit
+from logger.identification.unknown_road.fisher_scoring import RoadFit, RoadProblem
 from logger.identification.unknown_road.road_state import LinearCar, Options
 
 
@@ -17,7 +17,7 @@ def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options
     Raises NotIdentifiable when the drives cannot tell them, ValueError for no drive or no free number.
     """
     options = options or Options()
-    problem = Problem(car, roads, options)
+    problem = RoadProblem(car, roads, options)
     x = problem.start()
     first = problem.look(problem.beside(x), information=True)
     findings = problem.structural(first)
@@ -27,7 +27,7 @@ def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options
     before = here.error
     here, settled, steps = problem.descend(here)
     if options.last_probes > options.probes:
-        problem = Problem(car, roads, replace(options, probes=options.last_probes))
+        problem = RoadProblem(car, roads, replace(options, probes=options.last_probes))
         here, settled, more = problem.descend(problem.look(here.x, information=True))
         steps += more
     here = problem.look(here.x, information=True)

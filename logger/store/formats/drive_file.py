@@ -58,13 +58,13 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Drive):
+class DriveOnRoad(Drive):
     """A drive over a known road, ``track``."""
 
     track: Track
 
 
-def read_run(folder: Path | str) -> Run:
+def read_run(folder: Path | str) -> DriveOnRoad:
     """Read a folder with ``drive.csv`` and ``profile.csv``.
 
     Times come back on the even grid that their digits are a rounding of.
@@ -75,7 +75,7 @@ def read_run(folder: Path | str) -> Run:
     if not path.is_dir():
         raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE}")
     drive = replace(read_drive(path / DRIVE), path=path)
-    return Run(**vars(drive), track=track_of(read_profile(path / PROFILE)))
+    return DriveOnRoad(**vars(drive), track=track_of(read_profile(path / PROFILE)))
 
 
 def read_drive(path: Path | str) -> Drive:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.identification.obstacle_paths import Step
+from logger.identification.obstacle_paths import RoadStep
 from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
@@ -27,7 +27,7 @@ def run(effort: Effort) -> Result:
         Column("ours, innovations form [kg]", ".1f")),
         tuple(zip((1000 * np.array(heights)).tolist(), in_proportion.tolist(), white.tolist(), masses.tolist(),
                   strict=True)))
-    taken = RoadInput(step=Step(_STEP_AT_M, HEIGHTS_M[0]))
+    taken = RoadInput(step=RoadStep(_STEP_AT_M, HEIGHTS_M[0]))
     place = {"step.height_m": HEIGHTS_M[0], "step.start_m": _STEP_AT_M}
     known, both = fitted(record, place, True, taken), fitted(record, {MASS: 700.0, **place}, True, taken)
     ours = Table("Ours: the step estimated", (
@@ -52,7 +52,7 @@ def run(effort: Effort) -> Result:
 
 
 def _mass(record: Run, height_m: float, ours: bool) -> float:
-    return fitted(record, {MASS: TRUTH[MASS]}, ours, RoadInput(step=Step(_STEP_AT_M, height_m))).parameters[MASS]
+    return fitted(record, {MASS: TRUTH[MASS]}, ours, RoadInput(step=RoadStep(_STEP_AT_M, height_m))).parameters[MASS]
 
 
 STUDY = Study("fig_4_31", "Mass by the height that a bridge's step is taken for", "Fig 4.31, section 4.4.5",

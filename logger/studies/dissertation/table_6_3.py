@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.obstacle_paths import Step
+from logger.identification.obstacle_paths import RoadStep
 from logger.identification.prediction_error_fit import Fit
 from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
@@ -60,7 +60,7 @@ class _Found:
 
 def _drive(step_m: float, iri: float, seed: int) -> _Found:
     record = without_profile(record_of(bridge(_STEP_AT_M, step_m), BRIDGE_MPS, _SECONDS, PS_2119.on(iri, seed)))
-    taken = RoadInput(step=Step(_STEP_AT_M, step_m * _TAKEN_FACTOR))
+    taken = RoadInput(step=RoadStep(_STEP_AT_M, step_m * _TAKEN_FACTOR))
     place = {"step.height_m": step_m * _TAKEN_FACTOR, "step.start_m": _STEP_AT_M}
     theirs = fitted(record, {MASS: TRUTH[MASS]}, False, taken)
     known = fitted(record, place, True, taken)

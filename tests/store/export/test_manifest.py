@@ -18,13 +18,13 @@ NAMES = st.from_regex(r"[0-9]{5}-[0-9]{3}\.(csv|json)|[0-9]{5}\.dump\.gz", fullm
 MANIFESTS = st.builds(Manifest, st.from_regex(r"[0-9a-f]{12}", fullmatch=True), st.dictionaries(NAMES, DIGESTS))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(MANIFESTS)
 def test_what_was_written_is_read(manifest: Manifest) -> None:
     assert read_manifest([format_manifest(manifest)]) == manifest
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(MANIFESTS, st.data())
 def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataObject) -> None:
     text = format_manifest(manifest)
@@ -42,7 +42,7 @@ def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataOb
         assert "expected" in str(error) or "does not fit" in str(error)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match=r"expected|does not fit"):

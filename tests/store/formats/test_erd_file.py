@@ -131,7 +131,7 @@ def test_what_is_no_erd_file_is_refused(tmp_path: Path, content: str | bytes, ex
 @given(st.binary(max_size=300), st.sampled_from([b"", b"ERDFILEV2.00\n", b"ERDFILEV2.00\n2,-1,-1,8,1,0.25,-1\n",
                                                  header("2,-1,-1,1,5,0.25,-1", *GOOD).encode(),
                                                  header("1,-1,-1,1,2,0.25,-1", *GOOD).encode()]))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_any_bytes_are_read_or_refused(noise: bytes, start: bytes) -> None:
     try:
         erd = parse_erd(start + noise, "noise.erd")

@@ -47,7 +47,7 @@ def test_two_tracks_are_read(path: Path, ending: str, mark: bytes, tail: str) ->
 
 
 @given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), min_size=1, max_size=20))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_numbers_survive_to_the_last_bit(pairs: list[tuple[float, float]]) -> None:
     text = "\n".join([HEADER, *(f"{a!r},{b!r}" for a, b in pairs)])
     assert parse_table(text.encode(), "x").tolist() == [list(pair) for pair in pairs]

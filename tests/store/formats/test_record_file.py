@@ -88,7 +88,7 @@ def test_headers_that_will_not_do(tmp_path: Path, header: str) -> None:
 
 
 @given(data=st.binary(max_size=200))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_any_bytes_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = tmp_path_factory.mktemp("bytes") / "a.csv"
     for head in (b"", HEADER.encode() + b"\n0.0,1\n"):

@@ -124,7 +124,7 @@ def as_its_model_knows_it(car: Vehicle) -> Vehicle:
 
 
 @given(cars())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_a_written_vehicle_is_read_back_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, car: Vehicle) -> None:
     path = tmp_path_factory.getbasetemp() / "written.yaml"
     car = as_its_model_knows_it(car)
@@ -283,7 +283,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 @given(st.text(max_size=200))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:
         parse_mapping(text, "f")
@@ -342,7 +342,7 @@ steps_taken = st.builds(Step, names, st.floats(0, 10), st.none() | st.floats(0, 
 
 
 @given(st.lists(chosen_effects(), max_size=5, unique_by=lambda one: one.effect.name), st.lists(steps_taken, max_size=4))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_a_written_model_is_read_back_to_the_last_bit(
     tmp_path_factory: pytest.TempPathFactory, effects: list[Chosen], history: list[Step]
 ) -> None:

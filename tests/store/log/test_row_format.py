@@ -127,7 +127,7 @@ def test_a_date_of_another_age_is_refused_and_never_written(day: str) -> None:
         assert format_row(replace(RECORD, utc_us=utc_us)) == format_row(replace(RECORD, utc_us=None))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(record=records)
 def test_round_trip(record: WindowRecord) -> None:
     row = format_row(record)
@@ -167,7 +167,7 @@ def test_wrong_check_is_refused(row: str) -> None:
         parse_row(row)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(text=st.text(max_size=80))
 def test_any_text_is_a_row_or_refused(text: str) -> None:
     with pytest.raises(BadRow):
@@ -210,7 +210,7 @@ def test_endless_line_is_read_in_pieces() -> None:
     assert damaged(data) == 4
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(data=st.binary(max_size=300))
 def test_random_bytes_are_damage(data: bytes) -> None:
     assert intact(data) == []

@@ -67,13 +67,9 @@ def road_under(
 
 def judge(
     vehicle: Vehicle, roads: list[Callable[[np.ndarray], np.ndarray]], distance: Callable[[np.ndarray], np.ndarray],
-    time_s: np.ndarray, rtol: float = 1e-10, longest_step_s: float = 2e-3, friction_n: float = 0.0,
-    grown_at_mps: float = 0.02,
+    time_s: np.ndarray, rtol: float = 1e-10,
 ) -> Told:
-    """What the car does at the times, the front tires being at ``distance(time)`` of the left and right road.
-
-    Each suspension rubs with ``friction_n`` tanh(rate / ``grown_at_mps``).
-    """
+    """What the car does at the times, the front tires being at ``distance(time)`` of the left and right road."""
     wheels = wheels_of(vehicle)
     w = len(wheels)
     a, left, mu, k, c, kt = (np.array([getattr(one, name) for one in wheels])
@@ -93,9 +89,8 @@ def judge(
         def extension(q: np.ndarray) -> np.ndarray:
             return q[0] + np.multiply.outer(a, q[1]) + np.multiply.outer(left, q[2]) - q[3:]
 
-        x, rate, across = extension(heights), extension(rates), (slice(None),) + (None,) * (y.ndim - 1)
-        force = k[across] * x + c[across] * rate  # pulls the body down, the wheel up
-        force = force + friction_n * np.tanh(rate / grown_at_mps)
+        x, across = extension(heights), (slice(None),) + (None,) * (y.ndim - 1)
+        force = k[across] * x + c[across] * extension(rates)  # pulls the body down, the wheel up
         for axle, bar in enumerate(bars):
             twist = bar * (x[2 * axle] - x[2 * axle + 1]) / b**2
             force[2 * axle] += twist
@@ -112,8 +107,7 @@ def judge(
     # Standing still: the plane through the road under the wheels, if they are all in one; tests take care of that.
     plane, *_ = np.linalg.lstsq(np.stack([np.ones(w), a, left], axis=1), start, rcond=None)
     rest = np.concatenate([plane, start, np.zeros(3 + w)])
-    found = solve_ivp(derivative, (time_s[0], time_s[-1]), rest, "DOP853", time_s, rtol=rtol, atol=1e-13,
-                      max_step=longest_step_s)
+    found = solve_ivp(derivative, (time_s[0], time_s[-1]), rest, "DOP853", time_s, rtol=rtol, atol=1e-13, max_step=2e-3)
     z = under(time_s)
     body, wheel, travel = accelerations(found.y, z)
     return Told(*body, wheel.T, travel.T, (found.y[3:3 + w] - z).T)

@@ -1,0 +1,39 @@
+"""Ranges of what may be asked, at a terminal and in Python alike."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from logger.errors import BadInput
+
+
+class Range(NamedTuple):
+    """What a number may be, ends included; ``high`` infinite: no end."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def check(self, name: str, value: float) -> None:
+        """BadInput for a value outside; ``name``: of what it is."""
+        if not self.low <= value <= self.high:
+            shown = value if isinstance(value, int) else format(value, "g")
+            ends = (f"{self.low:g} or more" if self.high == float("inf") else
+                    f"{self.low:g} to {self.high:g} {self.unit}".rstrip())
+            raise BadInput(f"{name} {shown}: expected {ends}")
+
+
+TOLERANCE = Range(0.001, 0.5)
+USUAL_TOLERANCE = 0.04
+"""How far off a car's masses, springs and dampers may well be, as a share."""
+SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Range(0.0, 100.0, "m/s2")
+"""Of a simulated drive; what its sensor adds, noise or steps. An estimate's steps likewise."""
+NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
+"""Of an estimate: noise of a reading, length of a window."""
+LENGTH, SPACING = Range(11.0, 1e6, "m"), Range(0.001, 0.3, "m")
+"""Of a random road; a shorter one has no IRI."""
+ROUGHNESS, IRI, ROAD_WAVINESS = Range(1e-3, 1e7, "cm3"), Range(0.01, 1000, "m/km"), Range(1.5, 3.0)
+MOST_ROAD_SAMPLES = 20_000_000
+TRIES, WAVINESS = Range(0, 1000), Range(1.0, 3.5)
+"""Of an identification: further starts, waviness of a road that was not measured."""
+NOISE_MODELS = ("auto", "white", "ar", "road")

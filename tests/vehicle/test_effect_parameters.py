@@ -1,0 +1,49 @@
+"""Numbers of effects as fits move them: by name, within bounds, and their derivatives."""
+
+from __future__ import annotations
+
+import pytest
+
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.effect import chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, free_number, move_named, moved, moves_of, slope_of
+
+EFFECTS = shipped_effects()
+USUAL = [chosen(effect, effect.usual) for effect in EFFECTS.values()]
+
+
+def test_every_number_that_moves_is_found_by_its_name() -> None:
+    for move in moves_of(USUAL):
+        one = USUAL[move.effect].effect
+        assert move_named(USUAL, f"{one.name}.{one.parameters[move.parameter].name}") == move
+    assert move_named(USUAL, "sprung_mass_kg") is None
+
+
+def test_every_number_is_free_from_where_it_stands() -> None:
+    for move in moves_of(USUAL):
+        parameter = USUAL[move.effect].effect.parameters[move.parameter]
+        value = USUAL[move.effect].values[parameter.name]
+        one = free_number(USUAL, move)
+        assert (one.start, one.low, one.high) == (value, parameter.low, parameter.high)
+        assert one.weakest_at(one.start) > 0
+
+
+def test_coordinates_there_and_back() -> None:
+    moves = moves_of(USUAL)
+    back = moved(USUAL, moves, coordinates_of(USUAL, moves))
+    for one, other in zip(back, USUAL, strict=True):
+        assert dict(one.values) == pytest.approx(dict(other.values))
+
+
+def test_slopes_are_those_of_the_coordinates() -> None:
+    for effect, parameter in (("dry_friction", 0), ("sensor_gain", 0), ("top_mount_compliance", 0)):
+        one = EFFECTS[effect].parameters[parameter]
+        step = 1e-6 * one.start
+        rise = one.coordinate(one.start + step) - one.coordinate(one.start - step)
+        assert slope_of(one, one.start) == pytest.approx(rise / (2 * step), rel=1e-6)
+
+
+def test_a_strength_that_is_large_may_be_known_as_roughly_as_a_size() -> None:
+    friction = free_number([chosen(EFFECTS["dry_friction"], {"friction_force_n": 60.0})], Move(0, 0))
+    assert friction.weakest_at(10.0) * friction.unit == pytest.approx(30.0)
+    assert friction.weakest_at(600.0) * friction.unit == pytest.approx(300.0)
