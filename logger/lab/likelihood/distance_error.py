@@ -51,6 +51,12 @@ class ErrorSize:
         return ErrorSize(*map(float, np.exp(logs)))
 
     @property
+    def is_unusual(self) -> bool:
+        """Whether starts or factors are much farther off than a good recorder's: a late clock or a wrong speed may be
+        the cause."""
+        return max(self.start_m / USUAL.start_m, self.scale / USUAL.scale) > _UNUSUAL
+
+    @property
     def cost(self) -> float:
         """Minus twice the log of the prior density, without its constant."""
         return float((((self.logs - USUAL.logs) / _LOG_DEVIATIONS) ** 2).sum())
@@ -60,7 +66,7 @@ USUAL = ErrorSize()
 """Of a good recorder."""
 # Priors of the logarithms of the three sizes. A walk of centimetres is common; a start or a factor that is ten times
 # as far off as usual is a late clock or a wrong wheel radius, which are effects.
-_LOG_DEVIATIONS = np.array([0.8, 1.5, 0.8])
+_LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +131,14 @@ class RecordError:
         samples = np.arange(self.run.count)
         at = np.linspace(0, self.run.count - 1, self.knots)
         return np.asarray(np.interp(samples, at, k[: self.knots]) + self.basis[:, -2:] @ k[self.knots : -_RECORDER])
+
+    def without_trend(self, k: Array) -> Array:
+        """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
+        moved, way = self.moved_m(k), self.run.distance_m - self.run.distance_m[0]
+        trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
+        found = self.through(moved - trend)
+        found[self.knots + 1 :] = k[self.knots + 1 :]
+        return found
 
     def through(self, moved_m: Array) -> Array:
         """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""

@@ -35,26 +35,28 @@ class CandidateFit:
         return self.found.state.effects[-1]
 
 
-def roughly_fitted(base: Baseline, screened: Screened) -> list[CandidateFit]:
-    """An effect fitted from each of its trials by the slopes of the model without it, best first."""
-    return sorted((_rough_fit(base, trial) for trial in screened.trials), key=lambda one: -one.gain)
+def roughly_fitted(score: float, base: Baseline, screened: Screened) -> list[CandidateFit]:
+    """An effect fitted from each of its trials by the slopes of a model without it, best first.
+
+    score    of the model that gains are counted from
+    """
+    return sorted((_rough_fit(score, base, trial) for trial in screened.trials), key=lambda one: -one.gain)
 
 
-def refined(base: Baseline, one: CandidateFit, worth: float = 0.0, rounds: int = _ROUNDS) -> CandidateFit:
+def refined(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = _ROUNDS) -> CandidateFit:
     """The same with slopes of its own."""
-    found = fit(base.posterior, one.found.state, one.found.numbers, rounds, worth)
-    return CandidateFit(found, base.score - found.linear.score)
+    found = fit(one.found.posterior, one.found.state, one.found.numbers, rounds, worth)
+    return CandidateFit(found, score - found.linear.score)
 
 
-def _rough_fit(base: Baseline, trial: Trial) -> CandidateFit:
-    posterior = base.posterior
+def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
+    posterior, numbers = base.posterior, base.found.numbers
     if trial.start is not None:
-        linear = LinearModel(posterior, trial.start, base.found.numbers)
-        state = trial.start
+        linear, state = LinearModel(posterior, trial.start, numbers), trial.start
     else:
-        linear = base.found.linear.holding(trial.one.effect.replaces)
+        linear = base.linear.holding(trial.one.effect.replaces)
         state = State((*base.state.effects, trial.one), posterior.prior.within_wall(trial.logs), linear.state.record,
                       linear.size, [])
     state = minimised(linear, state, moves_of(state.effects), _STEPS)
-    there = laid_out(posterior, state, list(linear.numbers or ()), base.score)
-    return CandidateFit(MapFit(there, list(linear.numbers or ())), base.score - there.score)
+    there = laid_out(posterior, state, list(linear.numbers or ()), score)
+    return CandidateFit(MapFit(there, list(linear.numbers or ())), score - there.score)

@@ -33,42 +33,60 @@ _WORTH_ALIGNING = 0.004
 
 
 @dataclass(frozen=True, eq=False)
-class Baseline:
-    """A fitted model that effects are tried on.
+class _Quadratic:
+    """A fitted model to second order, under a prior of the car's numbers.
 
-    found          the fit
-    score          minus twice the log of its evidence
-    explanation    what a full explanation of the residuals would gain
-    linear         the model beside its state, without the wall of the prior: a car that is bent to the wall hides what
-                   effects do
-    rough          predictions of a rough simulation, for comparing with others
     residuals      whitened (kept,) per run
     covariance     (p, p) of the car's numbers
     newton_step    (p,) the way to where these fit best
     objective      squares of the residuals there, and the cost of what is off
     """
 
-    found: MapFit
-    score: float
-    explanation: float
     linear: LinearModel
-    rough: list[Array]
     residuals: list[Array]
     covariance: Array
     newton_step: Array
     objective: float
 
     @staticmethod
-    def of(found: MapFit) -> Baseline:
-        """From a fit."""
-        linear, state = found.linear.without_wall(), found.state
+    def of(linear: LinearModel) -> _Quadratic:
+        """Of a model beside its state."""
+        state = linear.state
         here = linear.eliminated(state.predictions)
         covariance = np.asarray(np.linalg.inv(linear.information(state.logs)), float)
         gradient = linear.gradient(here.residuals, state.logs)
-        newton_step = covariance @ gradient
-        return Baseline(found, found.linear.score, gain_of_an_explanation(found.posterior, state), linear,
-                        _roughly(linear, state.effects, state.logs), here.residuals, covariance, newton_step,
-                        here.squares + linear.prior.cost(state.logs) - float(gradient @ newton_step))
+        step = covariance @ gradient
+        return _Quadratic(linear, here.residuals, covariance, step,
+                          here.squares + linear.prior.cost(state.logs) - float(gradient @ step))
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A fitted model that effects are tried on.
+
+    found          the fit
+    score          minus twice the log of its evidence
+    explanation    what a full explanation of the residuals would gain
+    rough          predictions of a rough simulation, for comparing with others
+    quadratics     under the prior, and, where its wall holds a number, without the wall: a car that is bent to the wall
+                   hides what effects do
+    """
+
+    found: MapFit
+    score: float
+    explanation: float
+    rough: list[Array]
+    quadratics: tuple[_Quadratic, ...]
+
+    @staticmethod
+    def of(found: MapFit) -> Baseline:
+        """From a fit."""
+        linear, state = found.linear, found.state
+        quadratics = [_Quadratic.of(linear)]
+        if linear.prior.at_the_wall(state.logs):
+            quadratics.append(_Quadratic.of(linear.without_wall()))
+        return Baseline(found, linear.score, gain_of_an_explanation(found.posterior, state),
+                        _roughly(linear, state.effects, state.logs), tuple(quadratics))
 
     @property
     def posterior(self) -> Posterior:
@@ -76,9 +94,29 @@ class Baseline:
         return self.found.posterior
 
     @property
+    def linear(self) -> LinearModel:
+        """The model beside its state."""
+        return self.found.linear
+
+    @property
     def state(self) -> State:
         """The model."""
         return self.found.state
+
+    def gain(self, objective: float, logs: Array, linear: LinearModel) -> float:
+        """By how much an objective is below this model's own; it was found under the prior of ``linear``, at these
+        numbers of the car (p,)."""
+        wall = self.posterior.prior.cost(logs) - linear.prior.cost(logs)
+        return self.quadratics[0].objective - objective - wall
+
+
+def as_recorded(base: Baseline) -> Baseline:
+    """The model in the nominal car, with starts and factors of the distances as they were recorded."""
+    posterior, state = base.posterior, base.state
+    record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
+    there = posterior.at(state.effects, np.zeros_like(state.logs), record)
+    numbers = posterior.number_slopes(there, posterior.prior.steps)
+    return Baseline.of(MapFit(LinearModel(posterior, there, numbers), numbers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +158,13 @@ def screened(base: Baseline, effect: Effect, seen: Misalignment) -> Screened:
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     nominal = np.zeros_like(base.state.logs)
-    bent = prior.at_the_wall(base.state.logs)
     best: dict[tuple[float, ...], Trial] = {}
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         one = chosen(effect, values)
-        found = [_beside(base, one, base.state.logs) if effect.replaces else _trial(base, one)]
-        if bent:  # numbers that are bent towards what an effect does say little of what it does
-            found.append(_beside(base, one, nominal))
+        found = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
+        if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does
+            found.append(_as_it_is(base, one, nominal))
         if not effect.reshapes and values is not trials[0]:
             found.append(_aligned_anew(base, one, found[0]))
         trial = max(found, key=lambda one: one.gain)
@@ -140,55 +177,64 @@ def _roughly(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> lis
     return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
 
 
-def _trial(base: Baseline, one: Chosen) -> Trial:
-    """A trial at the strength at which it explains most."""
-    linear, state = base.linear, base.state
-    there = _roughly(linear, (*state.effects, one), state.logs)
+def _scaled(base: Baseline, one: Chosen) -> list[Trial]:
+    """A trial at the strength at which it explains most, under each prior."""
+    there = _roughly(base.linear, (*base.state.effects, one), base.state.logs)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    return [_trial(base, quadratic, one, change) for quadratic in base.quadratics]
+
+
+def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Array]) -> Trial:
+    linear = quadratic.linear
     white = linear.whitened(change)
-    here = state.logs + base.newton_step
+    here = base.state.logs + quadratic.newton_step
     mixed, own = linear.mixed(white)
-    absorbed = base.covariance @ mixed
-    along = sum(float(c @ r) for c, r in zip(white, base.residuals, strict=True)) - float(mixed @ base.newton_step)
+    absorbed = quadratic.covariance @ mixed
+    along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
+             - float(mixed @ quadratic.newton_step))
     own -= float(mixed @ absorbed)
+
+    def at(share: float, values: Chosen) -> Trial:
+        logs = here - share * absorbed
+        objective = quadratic.objective - 2 * share * along + share**2 * own
+        return Trial(values, base.gain(objective, logs, linear), logs, change)
+
     if not own > 0:
         return Trial(one, 0.0, here, change)
     strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
     strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
     scaled = scaled_by(one, strength)
-    whole = Trial(one, 2 * along - own, here - absorbed, change)
     if scaled is None:
-        return whole
-    shared = Trial(scaled, 2 * strength * along - strength**2 * own, here - strength * absorbed,
-                   change)
+        return at(1.0, one)
     if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
-        return shared
+        return at(strength, scaled)
     # A resonance that is half as strong lies elsewhere, and may do something else altogether.
-    return max((_as_predicted(base, trial) for trial in (shared, whole)), key=lambda trial: trial.gain)
+    return max((_as_predicted(base, linear, trial) for trial in (at(strength, scaled), at(1.0, one))),
+               key=lambda trial: trial.gain)
 
 
-def _as_predicted(base: Baseline, trial: Trial) -> Trial:
+def _as_predicted(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
     """The same with the gain that it truly has, the car's numbers counted to first order: sensors are tried on one body
     then."""
-    linear, state = base.linear, base.state
+    state = base.state
     there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
     step = trial.logs - state.logs
     moved_there = [one + step @ columns for one, columns in zip(there, base.found.numbers, strict=True)]
-    return replace(trial, gain=base.objective - linear.objective(moved_there, trial.logs))
+    return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
 
 
-def _beside(base: Baseline, one: Chosen, logs: Array) -> Trial:
+def _as_it_is(base: Baseline, one: Chosen, logs: Array) -> Trial:
     """A trial as it is, in a car with these numbers (p,), which then take one step of Newton's; those that the effect
     sets are held at their nominal values."""
-    linear = base.linear.holding(one.effect.replaces)
+    linear = base.quadratics[-1].linear.holding(one.effect.replaces)
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
     there = _roughly(linear, (*base.state.effects, one), logs)
     found = linear.eliminated(there)
     pull = linear.gradient(found.residuals, logs)
     step = np.linalg.solve(linear.information(logs), pull)
     change = [new - old for new, old in zip(there, base.rough, strict=True)]
-    gain = base.objective - found.squares - linear.prior.cost(logs) + float(pull @ step)
-    return Trial(one, gain, logs + step, change)
+    objective = found.squares + linear.prior.cost(logs) - float(pull @ step)
+    return Trial(one, base.gain(objective, logs + step, linear), logs + step, change)
 
 
 def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:

@@ -16,7 +16,7 @@ from functools import partial
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
-from logger.lab.selection.screening import Baseline, Screened, screened
+from logger.lab.selection.screening import Baseline, Screened, as_recorded, screened
 from logger.vehicle.effect import Effect, Misalignment
 
 Progress = Callable[[str], None]
@@ -24,7 +24,7 @@ Progress = Callable[[str], None]
 MOST_EFFECTS = 4
 """No more than so many are looked for."""
 _MOST_FITTED, _MOST_REFINED = 6, 3
-_WORTH_FITTING, _WORTH_REFINING = 0.03, 0.7
+_WORTH_FITTING, _WORTH_REFINING = 0.03, 0.25
 """Of the gain of the best one: an effect that promises less is not fitted, or not with slopes of its own."""
 _WORTH_A_ROUND = 0.02
 """A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
@@ -102,24 +102,31 @@ class Search:
         return replace(found, now=now, gains=gains)
 
     def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
-        """Every effect tried on a model."""
+        """Every effect tried on a model; and beside its runs as they were recorded, where it lies far from there: what
+        an effect does may have been taken for a start or a factor of the distance."""
         with ThreadPoolExecutor(self.workers) as pool:
-            promises: list[Screened] = []
-            for done, one in enumerate(pool.map(lambda effect: screened(now, effect, self.seen), effects), 1):
-                self.progress(f"screened {done} of {len(effects)} effects")
-                promises.append(one)
-            promises.sort(key=lambda one: -one.gain)
-            least = _WORTH_FITTING * promises[0].gain if promises else 0.0
-            worth = [one for one in promises[:_MOST_FITTED] if one.gain > least]
+            promises = self._screened(pool, now, effects)
+            worth = [(now, one) for one in _worth_fitting(promises)]
+            if now.state.size.is_unusual:
+                there = as_recorded(now)
+                worth += [(there, one) for one in _worth_fitting(self._screened(pool, there, effects))]
             self.progress(f"fitting {len(worth)} of them")
-            rough = [tries[0] for tries in pool.map(lambda one: roughly_fitted(now, one), worth)]
-            rough.sort(key=lambda one: -one.gain)
+            tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
+            rough = _best_of_each(tries)
             near = [one for one in rough[:_MOST_REFINED] if one.gain > _WORTH_REFINING * rough[0].gain]
             self.progress(f"refining {len(near)} of them")
-            fine = list(pool.map(lambda one: refined(now, one, _WORTH_A_ROUND * now.explanation), near))
-        fits = sorted([*fine, *(one for one in rough if one not in near)], key=lambda one: -one.gain)
+            fine = list(pool.map(lambda one: refined(now.score, one, _WORTH_A_ROUND * now.explanation), near))
+        fits = _best_of_each([*fine, *(one for one in rough if one not in near)])
         fitted = {one.effect.name for one in fits}
         return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
+
+    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect]) -> list[Screened]:
+        """Effects tried beside a model, the most promising first."""
+        found = []
+        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, self.seen), effects), 1):
+            self.progress(f"screened {done} of {len(effects)} effects")
+            found.append(one)
+        return sorted(found, key=lambda one: -one.gain)
 
     def accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
@@ -178,3 +185,16 @@ class Search:
             now = others[least]
             names.remove(least)
         return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
+
+
+def _worth_fitting(promises: Sequence[Screened]) -> list[Screened]:
+    """Those that promise enough, of some that are sorted by what they promise."""
+    return [one for one in promises[:_MOST_FITTED] if one.gain > _WORTH_FITTING * promises[0].gain]
+
+
+def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Of every effect the fit that is best, best first."""
+    found: dict[str, CandidateFit] = {}
+    for one in sorted(fits, key=lambda one: -one.gain):
+        found.setdefault(one.effect.name, one)
+    return list(found.values())
