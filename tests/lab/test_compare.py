@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
+from logger.lab.compare import Comparison, compare
+from logger.report.comparison_text import as_json, conclusion, evidence, headline
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -55,7 +56,7 @@ def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
 
 def test_missing_friction_is_physics(lacking: Comparison) -> None:
     assert lacking.missing
-    names = [mark.name for mark in lacking.marks.found]
+    names = [test.name for test in lacking.tests.found]
     assert "force by rate" in names and "direction" not in names
     assert "ridelog diagnose" in conclusion(lacking)
     assert f"error {lacking.plain.error:.3f}" in headline(lacking)[0]
@@ -70,7 +71,7 @@ def test_the_effect_in_the_model_leaves_noise() -> None:
 
 
 def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Comparison) -> None:
-    residuals = lacking.plain.beside
+    residuals = lacking.plain.residuals
     left = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
                            zip(residuals.runs, residuals.predictions, strict=True)])
     measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.report.quantities import chance, measured, numbers_of, unit_of
 from logger.lab.residuals.unexplained import spatial_line_of
+from logger.report.quantities import chance, measured, numbers_of, unit_of
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects

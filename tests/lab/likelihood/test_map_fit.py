@@ -12,7 +12,7 @@ import pytest
 
 from logger.lab.addition import add
 from logger.lab.candidates import Base, fitted, misalignment, screened
-from logger.lab.fitting import Problem, located
+from logger.lab.fitting import Problem
 from logger.lab.nuisance import Tolerance, wander_of
 from logger.lab.settling import settled
 from logger.runs import Run

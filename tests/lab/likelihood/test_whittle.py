@@ -58,7 +58,7 @@ def test_powers_scatter_by_their_degrees_of_freedom() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [49.6, 75.0, 99.5, 99.8, 99.99999, 100.00001, 101.0, 119.8, 174.0])
-@pytest.mark.parametrize("seconds", [3.0, 5.5, 20.0, 61.3])
+@pytest.mark.parametrize("seconds", [5.0, 12.0, 33.0, 61.3])
 def test_every_band_has_a_power_whatever_the_rate_and_the_length(rate_hz: float, seconds: float) -> None:
     run = run_of(round(seconds * rate_hz), rate_hz)
     bands, noise = Bands(run), white(run.count, 3)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,7 @@ def loud() -> MapFit:
     return refitted(posterior, posterior.start()).found
 
 
-@pytest.mark.parametrize("name", ["sensor_offset", "sensor_gain", "tire_damping", "time_offset", "damper_asymmetry"])
+@pytest.mark.parametrize("name", ["sensor_offset", "sensor_gain", "tire_damping", "damper_asymmetry"])
 def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: MapFit, name: str) -> None:
     (hidden,) = undetectable_effects(loud, [EFFECTS[name]])
     posterior, state = loud.posterior, loud.state
@@ -69,11 +67,10 @@ def slow_run(noise_mps2: float, of_motion: float = 0.0) -> SimulatedRuns:
 def beside(runs: SimulatedRuns, patch: float = 0.0) -> MapFit:
     """A car with a patch that is longer by a share, not fitted."""
     posterior = posterior_of(runs)
-    start = posterior.start()
     logs = np.where(np.array(posterior.prior.names) == "contact_patch_m", patch, 0.0)
-    state = posterior.at((), logs) if patch else start
+    state = posterior.at((), logs)
     numbers = posterior.number_slopes(state, posterior.prior.steps)
-    return MapFit(LinearModel(posterior, replace(state), numbers), numbers)
+    return MapFit(LinearModel(posterior, state, numbers), numbers)
 
 
 def test_another_contact_length_than_the_cars_own_shows_on_a_rough_road_driven_slowly() -> None:

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.likelihood.lag import aligned, drift
+from logger.lab.likelihood.lag import drift, lags
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
-from logger.lab.residuals.road_coherence import with_road
 from logger.lab.residuals.force_state_map import force_map
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
+from logger.lab.residuals.road_coherence import with_road
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
-from ..support.lab.runs_with_residual import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
+from ...support.lab.runs_with_residual import CAR, RATE_HZ, Residual, a_run, beside_with, measuring, recorded_by
 
 Array = npt.NDArray[np.float64]
 NOISE_MPS2 = 0.05
@@ -31,7 +31,7 @@ def marks(residuals: ModelResiduals) -> ResidualTests:
 
 
 def mark(found: ResidualTests, name: str) -> ResidualTest:
-    return next(one for one in found.marks if one.name == name)
+    return next(one for one in found.tests if one.name == name)
 
 
 def plus_noise(residual: Residual) -> Residual:
@@ -102,9 +102,9 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     truth = [Run(run.name, run.rate_hz, run.measured_mps2, 0.99 * run.distance_m, run.speed_mps, run.track)
              for run in residuals.runs]
     driven = SimulatedRuns(truth).predict(residuals.car)
-    wrong = ModelResiduals([measuring(run, one) for run, one in zip(residuals.runs, driven, strict=True)], residuals.car,
-                   residuals.predictions, residuals.responses)
-    assert drift(aligned(wrong)).value == pytest.approx(0.01, rel=0.03)
+    measured = [measuring(run, one) for run, one in zip(residuals.runs, driven, strict=True)]
+    wrong = ModelResiduals(measured, residuals.car, residuals.predictions, residuals.responses)
+    assert drift(lags(measured, residuals.predictions)).value == pytest.approx(0.01, rel=0.03)
     found = marks(wrong)
     assert "runs ahead by 1 m in each 100 m" in mark(found, "drift").sentence
     assert found.found[0].name == "drift"

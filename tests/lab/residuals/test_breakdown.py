@@ -9,7 +9,7 @@ import pytest
 from logger.lab.residuals.breakdown import Part, breakdown, paired, short_names
 from logger.runs import Run
 
-from ..support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
+from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
 
 Array = npt.NDArray[np.float64]
 

@@ -10,13 +10,15 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
-from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
-from logger.lab.nuisance import Tolerance
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.unknown_road.diagnosis import Candidate, Found, diagnose_same_road
+from logger.lab.unknown_road.fisher_scoring import fitted as fit
+from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State
 from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
-from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State, trials
-from logger.lab.unknown_road.likelihood import fitted as fit
-from logger.lab.unknown_road.diagnosis import Bar, Candidate, Found, as_json, diagnose_same_road
+from logger.lab.unknown_road.screening import trials
+from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.profiles.track import Track
+from logger.report.same_road_text import as_json
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.runs import Run
 from logger.shipped import vehicle_file
@@ -192,16 +194,8 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
     stands = replace(CAR, sprung_mass_kg=1.05 * CAR.sprung_mass_kg, contact_patch_m=0.15)
     problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance(), stands)
     start = problem.start()
-    assert problem.nuisance.vehicle(problem.vehicle, start.logs) == stands
+    assert problem.prior.vehicle(problem.vehicle, start.logs) == stands
     assert problem.cost(start) == pytest.approx((np.log(1.05) / Tolerance().numbers) ** 2)
-
-
-def test_what_does_not_help_to_tell_each_drive_is_not_accepted() -> None:
-    bar = Bar(count=20, samples=1000, error=0.5)
-    helps = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.49, 1e-12, 500.0)
-    assert bar.passed(helps)
-    assert not bar.passed(replace(helps, error=0.51))
-    assert not bar.passed(replace(helps, fitted=False))
 
 
 def test_what_was_not_fitted_says_so() -> None:
