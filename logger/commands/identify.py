@@ -55,6 +55,8 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    from logger.runs import SKIP_S
+
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
                         help="folder with drive.csv and profile.csv, or a drive.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
@@ -83,8 +85,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "the profile does not contain, through the car); auto: the likeliest (default)")
     parser.add_argument("--low-pass", type=float, metavar="HZ", help="leave out what lies above, for example 20")
     parser.add_argument("--robust", action="store_true", help="let single wild readings count less (Huber's loss)")
-    parser.add_argument("--skip", type=float, default=2.0, metavar="S",
-                        help="beginning of each run that is left out [s] (default: 2)")
+    parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
+                        help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the vehicle with the fitted values")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
