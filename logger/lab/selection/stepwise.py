@@ -130,8 +130,11 @@ class Search:
 
     def accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
-        return (one.gain > max(least_gain(len(self.effects)), IMITATION * now.explanation)
-                and not one.chosen.at_an_end)
+        return self._is_evident(now, one.gain) and not one.chosen.at_an_end
+
+    def _is_evident(self, without: Baseline, gain: float) -> bool:
+        """Whether so much is gained over a model neither by chance nor by imitation."""
+        return gain > max(least_gain(len(self.effects)), IMITATION * without.explanation)
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted."""
@@ -180,7 +183,7 @@ class Search:
                 others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in others.items()}
             least = min(gains, key=lambda name: gains[name])
-            if len(names) == 1 or gains[least] > least_gain(len(self.effects)):
+            if len(names) == 1 or self._is_evident(others[least], gains[least]):
                 break
             now = others[least]
             names.remove(least)

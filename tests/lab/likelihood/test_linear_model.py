@@ -1,5 +1,5 @@
-"""A posterior beside a state: what is eliminated run by run is what the whole dense system says, the gradient is that of
-the objective, and the sizes of distance errors are those with the most evidence."""
+"""A posterior beside a state: what is eliminated run by run is what the whole dense system says, the gradient is that
+of the objective, and the sizes of distance errors are those with the most evidence."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize
-from scipy.stats import multivariate_normal
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
@@ -143,22 +142,24 @@ def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> Non
 
 def test_the_sizes_are_those_with_the_most_evidence() -> None:
     """Against the density of the whitened residual with all distance errors integrated out, as a matrix."""
-    posterior = drawn([], 3, ErrorSize(0.01, 0.015, 0.0003), lasts_s=7.0).posterior
+    posterior = drawn([], 3, ErrorSize(0.01, 0.02, 0.0003), lasts_s=6.0).posterior
     linear = LinearModel(posterior, posterior.start())
     white = linear.whitened(posterior.residuals(linear.state))
     slopes = [whitener(error.slopes(each)) for whitener, error, each in zip(
         linear.whiteners, posterior.record_errors, linear.state.predictions, strict=True)]
 
+    def minus_twice_log_density(residual: Array, slope: Array, precision: Array) -> float:
+        root = np.linalg.cholesky(np.eye(len(residual)) + slope.T @ np.linalg.solve(precision, slope))
+        return float(2 * np.log(np.diag(root)).sum() + (solve_triangular(root, residual, lower=True) ** 2).sum())
+
     def lack(logs: Array) -> float:
         size = ErrorSize.of(logs)
-        densities = [multivariate_normal.logpdf(residual, cov=np.eye(len(residual)) + slope.T @ np.linalg.solve(
-            error.precision(size), slope)) for residual, slope, error in zip(
-                white, slopes, posterior.record_errors, strict=True)]
-        return float(size.cost - 2 * sum(densities))
+        return size.cost + sum(minus_twice_log_density(residual, slope, error.precision(size))
+                               for residual, slope, error in zip(white, slopes, posterior.record_errors, strict=True))
 
     best = minimize(lack, linear.size.logs, method="Nelder-Mead", options={"maxfev": 60}).fun
     assert lack(linear.size.logs) < best + 1.0
-    assert lack(USUAL.logs) > best + 10.0
+    assert lack(USUAL.logs) > best + 5.0
 
 
 def test_numbers_that_are_held_do_nothing_and_leave_the_model_as_it_was() -> None:

@@ -1,5 +1,5 @@
-"""Whittle's likelihood: power in bands is what an independent estimate says, weights make noise of any colour white, and
-no level is believed below the share of the signal by which right simulations differ."""
+"""Whittle's likelihood: power in bands is what an independent estimate says, weights make noise of any colour white,
+and no level is believed below the share of the signal by which right simulations differ."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends(runs: S
     found = add(posterior_of(runs), [], [chosen(EFFECTS["wheel_lift"], {})])
     assert any(abs(one.written - one.found) > 2 * one.standard_error for one in found.numbers)  # it was held
     assert not found.helps and not any(one.biased for one in found.moved)
-    assert found.error_after == pytest.approx(found.error_refitted, rel=1e-3)
+    assert found.error_after == pytest.approx(found.error_refitted, rel=0.005)
 
 
 def test_effects_that_are_there_stay_and_are_fitted_too(runs: SimulatedRuns) -> None:

@@ -80,7 +80,8 @@ def test_each_choice_has_its_best_trial_and_the_most_promising_is_first(slight: 
 
 
 def test_what_changes_nothing_promises_nothing(slight: Baseline) -> None:
-    assert screened(slight, EFFECTS["wheel_lift"], STILL).gain == pytest.approx(0, abs=1e-6)  # no wheel lifts on this road
+    no_wheel_lifts_here = screened(slight, EFFECTS["wheel_lift"], STILL)
+    assert no_wheel_lifts_here.gain == pytest.approx(0, abs=1e-6)
 
 
 def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too() -> None:

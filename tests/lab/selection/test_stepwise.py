@@ -149,8 +149,9 @@ def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) 
 
 ALONE = tuple(name for name, one in EFFECTS.items() if one.obstacle(CAR, two_tracks=False) is None)
 STRONGER = {"progressive_spring": {"cubic_stiffness_n_per_m3": 1e7}, "payload": {"mass_kg": 250.0},
+            "tire_damping": {"tire_damping_n_s_per_m": 500.0},
             "tire_enveloping": {"contact_patch_m": 0.5 * CAR.contact_patch_m}, "bump_stop": {"clearance_m": 0.02}}
-ROUGHER = {"bump_stop": 2.0, "wheel_lift": 6.0}
+ROUGHER = {"progressive_spring": 2.0, "bump_stop": 2.0, "wheel_lift": 6.0}
 
 
 @pytest.mark.slow
