@@ -156,7 +156,7 @@ class Bench:
             seen = misalignment(posterior, nominal)
             base = refitted(posterior, nominal)
             tell(f"searching for {effect.name}")
-            tries = roughly_fitted(base.score, base, screened(base, effect, seen))
+            tries = roughly_fitted(base.score, base, screened(base, effect, [seen]))
         choices = {one.name for one in effect.parameters if one.choices} & set(values)
         said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
         best = max((refined(base.score, one) for one in said or tries), key=lambda one: one.gain)

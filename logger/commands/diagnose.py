@@ -1,13 +1,13 @@
-"""Which physical effect a vehicle's model lacks: every one that is known is tried, and judged on what no fit saw.
+"""Which physical effect a vehicle's model lacks: every one that is known is tried, the evidence decides.
 
 Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
 
   ridelog diagnose --vehicle mycar.yaml run1 run2
   ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html
 
-Errors are rms(measured - model) / rms(measured). A third of each run is kept from all fits, and errors are told of it.
-The car's numbers may be off by a few per cent (--tolerance) and the distances by a few centimetres: both are refitted
-first, so that no small mistake passes for an effect.
+Errors are rms(measured - model) / rms(measured), on stretches that no fit saw: three sets of them are held out in turn.
+The car's numbers may be off by a few per cent (--tolerance) and the distances by as much as the runs show: both are
+refitted first, so that no small mistake passes for an effect.
 """
 
 from __future__ import annotations

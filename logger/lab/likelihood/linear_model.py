@@ -148,25 +148,25 @@ class LinearModel:
         """Of each run, (n,) or (m, n) to (..., kept)."""
         return [whitener(one) for whitener, one in zip(self.whiteners, columns, strict=True)]
 
-    def eliminated(self, predictions: Sequence[Array]) -> Eliminated:
-        """Predictions (n,) per run, laid out with the record errors of the state."""
+    def eliminated(self, predictions: Sequence[Array], laid: Sequence[Array] | None = None) -> Eliminated:
+        """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
         from scipy.linalg import cho_solve
 
         residuals, record, squares = [], [], 0.0
-        for measured, prediction, whitener, root, precision, one in zip(
+        for measured, prediction, whitener, root, precision, one, here in zip(
                 self.posterior.measured, predictions, self.whiteners, self._roots, self._precisions, self._records,
-                strict=True):
+                self.state.record if laid is None else laid, strict=True):
             white = whitener(measured - prediction)
-            owed = one.white @ white - precision @ one.here
+            owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)
             residuals.append(white - step @ one.white)
-            record.append(one.here + step)
-            squares += float(white @ white + one.here @ precision @ one.here - owed @ step)
+            record.append(here + step)
+            squares += float(white @ white + here @ precision @ here - owed @ step)
         return Eliminated(residuals, record, squares)
 
-    def objective(self, predictions: Sequence[Array], logs: Array) -> float:
+    def objective(self, predictions: Sequence[Array], logs: Array, laid: Sequence[Array] | None = None) -> float:
         """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""
-        return self.eliminated(predictions).squares + self.prior.cost(logs)
+        return self.eliminated(predictions, laid).squares + self.prior.cost(logs)
 
     def information(self, logs: Array, own: Sequence[Array] | None = None) -> Array:
         """On the car's numbers and those of whitened columns (m, kept) per run: (p + m, p + m)."""
@@ -198,10 +198,6 @@ class LinearModel:
         mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
             self.white, self._taken, columns, taken, strict=True)), np.zeros(self.count))
         return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, taken, strict=True))
-
-    def state_of(self, state: State, record: list[Array], predictions: list[Array]) -> State:
-        """Another state beside this one."""
-        return State(state.effects, state.logs, record, self.size, predictions)
 
 
 def _log_determinant(root: Array) -> float:

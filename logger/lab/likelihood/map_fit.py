@@ -128,10 +128,12 @@ def _aligned_from(posterior: Posterior, state: State, worth: float) -> tuple[Sta
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A model beside a linear one: its predictions, and half of what is minimised."""
+    """A model beside a linear one: its predictions, laid out with these record errors, and half of what is
+    minimised."""
 
     effects: tuple[Chosen, ...]
     logs: Array
+    record: list[Array]
     predictions: list[Array]
     cost: float
 
@@ -141,38 +143,45 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], most: in
     distance errors to first order at each; at most so many."""
     own: list[Array] | None = None
     p = linear.count
+    known: tuple[Array, _Point, list[Array]] | None = None
+    realigns = any(state.effects[move.effect].effect.realigns for move in moves)
 
     def evaluate(x: Array) -> _Point:
         effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs
-        predictions = _predicted(linear, effects, logs)
-        return _Point(effects, logs, predictions, 0.5 * linear.objective(predictions, logs))
+        record = linear.state.record
+        if realigns and known is not None:
+            # What moves all of a run is made up for by its distance error: laid out without it, no step would be taken.
+            there, at, slopes = known
+            predictions = [one + (x - there)[p:] @ columns for one, columns in zip(at.predictions, slopes, strict=True)]
+            record = linear.eliminated(predictions, at.record).record
+        predictions = linear.posterior.predict(effects, logs, record)
+        return _Point(effects, logs, record, predictions, 0.5 * linear.objective(predictions, logs, record))
 
-    def normal_equations(_x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
-        nonlocal own
+    def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
+        nonlocal own, known
         if moves and fresh:
-            own = linear.whitened(effect_slopes(linear, at.effects, at.logs, moves, at.predictions))
-        residuals = linear.eliminated(at.predictions).residuals
+            slopes = effect_slopes(linear, at.effects, at.logs, moves, at.predictions, at.record)
+            own, known = linear.whitened(slopes), (x.copy(), at, slopes)
+        residuals = linear.eliminated(at.predictions, at.record).residuals
         return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
 
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: _SMALL_GAIN, most_rounds=most).at
-    record = linear.eliminated(best.predictions).record
+    record = linear.eliminated(best.predictions, best.record).record
     return State(best.effects, best.logs, record, linear.size, best.predictions)
 
 
-def _predicted(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
-    return linear.posterior.predict(effects, logs, linear.state.record)
-
-
 def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[Move],
-                  predictions: Sequence[Array]) -> list[Array]:
-    """What the effects' numbers do to predictions, on the scales of the parameters: (m, n) per run."""
+                  predictions: Sequence[Array], record: Sequence[Array] | None = None) -> list[Array]:
+    """What the effects' numbers do to predictions, on the scales of the parameters: (m, n) per run; laid out with the
+    record errors of the model, or with others."""
+    laid = linear.state.record if record is None else record
     here = coordinates_of(effects, moves)
     found = [np.empty((len(moves), len(one))) for one in predictions]
     for index, step in enumerate(steps_of(effects, moves)):
         there = here.copy()
         there[index] += step
-        shifted = _predicted(linear, moved(effects, moves, there), logs)
+        shifted = linear.posterior.predict(moved(effects, moves, there), logs, laid)
         for column, high, low in zip(found, shifted, predictions, strict=True):
             column[index] = (high - low) / step
     return found

@@ -22,8 +22,9 @@ Array = npt.NDArray[np.float64]
 # A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty alone, which
 # is two deviations of its own below the others by chance, from so many.
 _LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
-# Noise that is quieter than this share of the quietest band where the filter begins went through the filter.
-_FILTERED = 0.6
+# Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
+# over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).
+_FILTERED = 0.75
 # Where no fit was made, bands that hold so large a share and are equally loud are flat noise if next to nothing of it
 # is left behind the filter: what a car leaves falls towards the highest of them, and the sensor's own noise is
 # still there. Below so many hertz all bands are full of what the road does.

@@ -19,7 +19,7 @@ from logger.lab.likelihood.map_fit import MapFit, aligned
 from logger.lab.likelihood.noise_floor import gain_of_an_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import Run
-from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, Misalignment, Scale, chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved
 from logger.vehicle.named_parameters import read
 
@@ -28,6 +28,7 @@ Array = npt.NDArray[np.float64]
 # How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
 # next to nothing.
 _STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
+_OPTIMA = 2
 _WORTH_ALIGNING = 0.004
 """Of an alignment that only has to tell which start is likelier, a round that gains a smaller share is the last."""
 
@@ -138,7 +139,8 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves."""
+    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves,
+    and of a shape (a frequency, a knee) that has two optima both."""
 
     effect: Effect
     trials: tuple[Trial, ...]
@@ -149,28 +151,44 @@ class Screened:
         return self.trials[0].gain
 
 
-def screened(base: Baseline, effect: Effect, seen: Misalignment) -> Screened:
-    """Trials of an effect on a model."""
-    trials = effect.trials(seen)
+def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Screened:
+    """Trials of an effect on a model.
+
+    seen    ways in which the runs may be misaligned
+    """
+    trials: list[dict[str, float]] = []
+    for way in seen:
+        trials += [values for values in effect.trials(way) if values not in trials]
     prior = base.posterior.prior
     known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
     if known:  # where a fit has brought the car's own numbers is worth a trial
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     nominal = np.zeros_like(base.state.logs)
-    best: dict[tuple[float, ...], Trial] = {}
+    found: dict[tuple[float, ...], dict[float, Trial]] = {}
+    shape = next((one.name for one in effect.parameters if one.moves and one.null is None), "")
     for values in trials:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
         one = chosen(effect, values)
-        found = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
+        ways = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
         if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does
-            found.append(_as_it_is(base, one, nominal))
+            ways.append(_as_it_is(base, one, nominal))
         if not effect.reshapes and values is not trials[0]:
-            found.append(_aligned_anew(base, one, found[0]))
-        trial = max(found, key=lambda one: one.gain)
-        if choice not in best or trial.gain > best[choice].gain:
-            best[choice] = trial
-    return Screened(effect, tuple(sorted(best.values(), key=lambda trial: -trial.gain)))
+            ways.append(_aligned_anew(base, one, ways[0]))
+        trial = max(ways, key=lambda trial: trial.gain)
+        alike = found.setdefault(choice, {})
+        if (there := values.get(shape, 0.0)) not in alike or trial.gain > alike[there].gain:
+            alike[there] = trial
+    best = [one for alike in found.values() for one in _optima([alike[value] for value in sorted(alike)])[:_OPTIMA]]
+    return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
+
+
+def _optima(trials: Sequence[Trial]) -> list[Trial]:
+    """Those that promise more than their neighbours, the most promising first; of trials in the order of a shape."""
+    gains = [-np.inf, *(one.gain for one in trials), -np.inf]
+    found = [one for one, before, after in zip(trials, gains, gains[2:], strict=False)
+             if one.gain >= max(before, after)]
+    return sorted(found, key=lambda one: -one.gain)
 
 
 def _roughly(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
@@ -240,9 +258,22 @@ def _as_it_is(base: Baseline, one: Chosen, logs: Array) -> Trial:
 def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
     """A trial with the distance errors fitted anew from the distances as they were recorded: where positions are wrong,
     those that were fitted without it are worth nothing."""
-    posterior = base.posterior
-    start = aligned(posterior, posterior.at((*base.state.effects, one), base.state.logs), _WORTH_ALIGNING)
-    return replace(trial, one=one, gain=base.score - LinearModel(posterior, start).score, logs=start.logs, start=start)
+    posterior, state = base.posterior, base.state
+    effects = (*state.effects, one)
+    record = [error.through(error.moved_m(k) - _shift_m(one, error.run)) for error, k in zip(
+        posterior.record_errors, state.record, strict=True)]
+    starts = [posterior.at(effects, state.logs), posterior.at(effects, state.logs, record, state.size)]
+    models = [LinearModel(posterior, aligned(posterior, start, _WORTH_ALIGNING)) for start in starts]
+    best = min(models, key=lambda model: model.score)
+    return replace(trial, one=one, gain=base.score - best.score, logs=state.logs, start=best.state)
+
+
+def _shift_m(one: Chosen, run: Run) -> Array:
+    """By how much farther than recorded an effect that only misaligns a run lets the car be (n,) [m]."""
+    if isinstance(one.effect, DriveEffect):
+        return one.effect.driven(one.p, run.distance_m) - run.distance_m
+    delay_s = next((value for name, value in one.values.items() if name.endswith("_s")), 0.0)
+    return -delay_s * run.speed_mps
 
 
 def scaled_by(one: Chosen, strength: float) -> Chosen | None:
@@ -255,6 +286,15 @@ def scaled_by(one: Chosen, strength: float) -> Chosen | None:
         here = float(coordinates_of([one], [move])[0])
         return moved([one], [move], np.array([null + strength * (here - null)]))[0]
     return None
+
+
+def misalignment_of_record(base: Baseline) -> Misalignment:
+    """One factor and one time of all runs together that explain most of a model's distance errors."""
+    way, speed, moved_m = (np.concatenate(parts) for parts in zip(*(
+        (error.run.distance_m - error.run.distance_m[0], error.run.speed_mps, error.moved_m(k))
+        for error, k in zip(base.posterior.record_errors, base.state.record, strict=True)), strict=True))
+    (longer, earlier_s), *_ = np.linalg.lstsq(np.stack([way, speed], axis=1), moved_m, rcond=None)
+    return Misalignment(float(1 / (1 + longer)), float(-earlier_s))
 
 
 def misalignment(posterior: Posterior, state: State) -> Misalignment:

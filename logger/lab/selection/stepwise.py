@@ -13,11 +13,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
-from logger.lab.selection.screening import Baseline, Screened, as_recorded, screened
+from logger.lab.selection.screening import Baseline, Screened, as_recorded, misalignment_of_record, screened
 from logger.vehicle.effect import Effect, Misalignment
+from logger.vehicle.effect_parameters import moves_of
 
 Progress = Callable[[str], None]
 
@@ -26,6 +29,8 @@ MOST_EFFECTS = 4
 _MOST_FITTED, _MOST_REFINED = 6, 3
 _WORTH_FITTING, _WORTH_REFINING = 0.03, 0.25
 """Of the gain of the best one: an effect that promises less is not fitted, or not with slopes of its own."""
+_AS_GOOD = 0.9
+"""Fits of one effect from different starts that gain so much of what the best of them gains are all refined."""
 _WORTH_A_ROUND = 0.02
 """A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
 where much is still to be found."""
@@ -82,7 +87,7 @@ class Search:
             self.progress(f"round {len(steps) + 1}")
             tried = self.round(now, left)
             first = first if steps else tried
-            best = next((one for one in tried.fits if self.accepted(now, one)), None)
+            best = self._simplest(now, tried)
             if best is None:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
@@ -113,17 +118,22 @@ class Search:
             self.progress(f"fitting {len(worth)} of them")
             tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
             rough = _best_of_each(tries)
-            near = [one for one in rough[:_MOST_REFINED] if one.gain > _WORTH_REFINING * rough[0].gain]
+            best = {one.effect.name: one.gain for one in rough[:_MOST_REFINED]
+                    if one.gain > _WORTH_REFINING * rough[0].gain}
+            near = [one for one in tries if one.gain > _AS_GOOD * best.get(one.effect.name, np.inf)]
             self.progress(f"refining {len(near)} of them")
             fine = list(pool.map(lambda one: refined(now.score, one, _WORTH_A_ROUND * now.explanation), near))
-        fits = _best_of_each([*fine, *(one for one in rough if one not in near)])
+        # A fit that is much worse than the model without the effect went astray: its promise says more.
+        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in near)])
+                if one.gain > -least_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
         return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
 
     def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect]) -> list[Screened]:
         """Effects tried beside a model, the most promising first."""
+        seen = [self.seen, misalignment_of_record(base)] if base.state.size.is_unusual else [self.seen]
         found = []
-        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, self.seen), effects), 1):
+        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, seen), effects), 1):
             self.progress(f"screened {done} of {len(effects)} effects")
             found.append(one)
         return sorted(found, key=lambda one: -one.gain)
@@ -135,6 +145,12 @@ class Search:
     def _is_evident(self, without: Baseline, gain: float) -> bool:
         """Whether so much is gained over a model neither by chance nor by imitation."""
         return gain > max(least_gain(len(self.effects)), IMITATION * without.explanation)
+
+    def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
+        """Of those that are there and cannot be told from the likeliest, the one with the fewest numbers."""
+        there = [one for one in tried.fits if self.accepted(now, one)]
+        return min((one for one in there if one.gain > there[0].gain - CONFUSED),
+                   key=lambda one: len(moves_of([one.chosen])), default=None)
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted."""
@@ -158,7 +174,7 @@ class Search:
         gain = without.score - now.score
         tried = self.round(without, [one for one in self.effects
                                      if one.name == name or one.name not in now.state.names])
-        best = next((one for one in tried.fits if self.accepted(without, one)), None)
+        best = self._simplest(without, tried)
         if best is not None and best.gain > gain + CONFUSED:
             now, gain = self._refit(best), best.gain
             self._rivals.pop(name, None)
