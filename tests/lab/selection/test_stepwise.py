@@ -107,7 +107,7 @@ def test_of_two_that_explain_alike_the_one_with_fewer_numbers_is_taken() -> None
 
 def test_only_what_gains_more_than_noise_and_imitations_is_taken(offset_base: Baseline) -> None:
     sought = search(FEW)
-    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], STILL))[0]
+    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     enough = least_gain(len(FEW))
     nearly_all = replace(offset_base, explanation=enough)
     assert sought.accepted(nearly_all, replace(one, gain=enough + 0.1))
@@ -121,7 +121,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> 
     posterior = offset_base.posterior
     at_an_end = hidden("occupant", frequency_hz=EFFECTS["occupant"].parameters[1].high)
     state = posterior.at([at_an_end], offset_base.state.logs)
-    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], STILL))[0]
+    one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     model = refined(offset_base.score, one, rounds=1).found
     ended = replace(one, found=replace(model, linear=fit(posterior, state, model.numbers, rounds=0).linear), gain=1e9)
     assert at_an_end.at_an_end and ended.effect.name == "occupant"
