@@ -19,9 +19,9 @@ from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison
-    from logger.lab.fitting import Problem
-    from logger.lab.gained import Gained
-    from logger.lab.verdict import Verdict
+    from logger.lab.diagnosis import Diagnosis
+    from logger.lab.likelihood.posterior import Posterior
+    from logger.lab.selection.add_effect import AddedEffects
     from logger.runs import Array
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
@@ -33,7 +33,6 @@ _ALIKE, _NEAR = 0.8, 0.3
 _UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "thousandths of g": STANDARD_GRAVITY_MPS2 / 1000, "mm/s2": 0.001}
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
-_ROUNDS = 3
 
 Tell = Callable[[str], None]
 """Told what is under way."""
@@ -60,20 +59,18 @@ class Bench:
     files: Mapping[str, str]
     numbers: float
 
-    def problem(self, whole: bool, firm: bool) -> Problem:
-        """To search on (a third of the runs is kept to judge), or on the whole of the runs, finely simulated; holding
-        on to the car's numbers or not.
+    def posterior(self, searches: bool = False) -> Posterior:
+        """What the lab fits; simulated less finely where it ``searches``.
 
         Raises BadInput when the vehicle lacks what it needs.
         """
-        from logger.lab.fitting import Problem
-        from logger.lab.nuisance import Tolerance
+        from logger.lab.likelihood.posterior import Posterior
+        from logger.lab.likelihood.priors import Tolerance
         from logger.simulation.simulated_runs import SimulatedRuns
 
-        runs = self.runs if whole else SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ)
+        runs = SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ) if searches else self.runs
         model = self.model
-        return Problem(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), whole, model.vehicle,
-                       firm)
+        return Posterior(runs, model.given or model.vehicle, Tolerance(numbers=self.numbers), model.vehicle)
 
     def try_out(self, one: Chosen) -> None:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
@@ -102,24 +99,19 @@ class Bench:
     def compared(self) -> Comparison:
         """The model against the runs. BadInput when the vehicle lacks what it needs."""
         from logger.lab.compare import compare
-        from logger.lab.nuisance import Tolerance
+        from logger.lab.likelihood.priors import Tolerance
 
         with self._blamed():
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
                            Tolerance(numbers=self.numbers))
 
-    def diagnosed(self, tell: Tell = unsaid, left_out: frozenset[str] = frozenset()) -> Verdict:
+    def diagnosed(self, tell: Tell = unsaid, left_out: frozenset[str] = frozenset()) -> Diagnosis:
         """Which effects the model lacks, without some that are left out. BadInput as ``compared``."""
         from logger.lab.diagnosis import diagnose
-        from logger.lab.verdict import told
 
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
         with self._blamed():
-            recorded = self.problem(whole=False, firm=True)
-            found = diagnose(recorded, effects, self.model.effects, tell)
-            finely = recorded.entire()  # a search simulates less finely
-            said_error = finely.error(finely.start(self.model.effects))
-            return told(replace(found, baseline_error=said_error), effects, tell)
+            return diagnose(self.posterior(searches=True), effects, self.model.effects, tell)
 
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
         """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
@@ -150,50 +142,48 @@ class Bench:
 
     def searched(self, effect: Effect, values: Mapping[str, float], tell: Tell = unsaid) -> Chosen:
         """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
-        from logger.lab.candidates import best_choice, fitted, misalignment, screened, settled_further
         from logger.lab.diagnosis import refitted
+        from logger.lab.selection.candidate_fit import refined, roughly_fitted
+        from logger.lab.selection.screening import misalignment, screened
         from logger.vehicle.effect import chosen
 
         if set(values) >= {one.name for one in effect.parameters}:
             return chosen(effect, values)
         with self._blamed():
-            problem = self.problem(whole=False, firm=True)
+            posterior = self.posterior(searches=True)
             tell("refitting the car's own numbers")
-            nominal = problem.start(self.model.effects)
-            seen = misalignment(problem, nominal)
-            problem, base = refitted(problem, nominal)
+            nominal = posterior.start(self.model.effects)
+            seen = misalignment(posterior, nominal)
+            base = refitted(posterior, nominal)
             tell(f"searching for {effect.name}")
-            tries = fitted(problem, base, screened(problem, base, effect, seen))
+            tries = roughly_fitted(base.score, base, screened(base, effect, [seen]))
         choices = {one.name for one in effect.parameters if one.choices} & set(values)
-        said = [one for one in tries if all(one.state.effects[-1].values[name] == values[name] for name in choices)]
-        best = best_choice([settled_further(problem, base, one, _ROUNDS) for one in said or tries])
-        return chosen(effect, {**best.state.effects[-1].values, **values})
+        said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
+        best = max((refined(base.score, one) for one in said or tries), key=lambda one: one.gain)
+        return chosen(effect, {**best.chosen.values, **values})
 
-    def added(self, start: Chosen, starts: int, tell: Tell = unsaid) -> Gained:
-        """The effect fitted with the car's numbers on all of the runs, from the best of so many ``starts``."""
-        from logger.lab.addition import add
-        from logger.lab.gained import gained
+    def added(self, start: Chosen, candidates: int, tell: Tell = unsaid) -> AddedEffects:
+        """The effect fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
+        from logger.lab.selection.add_effect import add
 
         tell(f"fitting the car without and with {start.effect.name}")
-        problem = self.problem(whole=True, firm=True)
         with self._blamed():
-            found = add(problem, self.problem(whole=True, firm=False), self.model.effects, [self.filed(start)])
-            return gained(found, [start.effect.name], starts)
+            return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 
-    def model_with(self, found: Gained) -> Model:
+    def model_with(self, found: AddedEffects) -> Model:
         """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
         fit ended at numbers that no car has."""
         from logger.store.formats.effect_file import check_on
         from logger.store.formats.vehicle_file import Model, Step
 
-        for one in found.added.effects:
-            check_on(found.added.vehicle, one, two_tracks=True)
+        for one in found.effects:
+            check_on(found.vehicle, one, two_tracks=True)
         history = self.model.history
         if not history:
-            history = (Step("as it was given", found.added.error_before, found.floor),
-                       Step("numbers refitted", found.added.error_refitted, found.floor))
-        step = Step(f"added {' and '.join(found.names)}", found.added.error_after, found.floor)
-        return Model(found.added.vehicle, found.added.effects, (*history, step),
+            history = (Step("as it was given", found.error_before, found.noise_floor_error),
+                       Step("numbers refitted", found.error_refitted, found.noise_floor_error))
+        step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
+        return Model(found.vehicle, found.effects, (*history, step),
                      self.model.given or self.model.vehicle)
 
     @contextmanager

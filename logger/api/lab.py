@@ -64,7 +64,7 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     >>> found.refitted_error < found.error, found.missing
     (True, True)
     """
-    from logger.lab.compare import as_json
+    from logger.report.comparison_text import as_json
     from logger.report.lab_page import spectra
     from logger.report.lab_text import comparison_lines
 
@@ -73,7 +73,7 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     return Comparison(
         "\n".join(comparison_lines(found)), told, told["error"], told["refitted"]["error"],
         {one["run"]: one["error"] for one in told["runs"]}, told["missing"], tuple(told["evidence"]),
-        told["refitted"]["moves"], tuple(told["refitted"]["moved_far"]), spectra(found.refitted.beside))
+        told["refitted"]["moves"], tuple(told["refitted"]["moved_far"]), spectra(found.refitted.residuals))
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Diagnosis(CommandResult):
     """Which physical effects a model lacks.
 
     baseline_error       of the model as it stands
-    noise_floor_error    that the sensor's noise alone makes; None: not known
+    noise_floor_error    that the sensor's noise alone makes
     candidates           best first
     verdict              names of the effects that are missing, the most certain first; empty: none
     unexplained          whether something is left that no candidate explains
@@ -107,7 +107,7 @@ class Diagnosis(CommandResult):
     """
 
     baseline_error: float
-    noise_floor_error: float | None
+    noise_floor_error: float
     candidates: tuple[Candidate, ...]
     verdict: tuple[str, ...]
     unexplained: bool
@@ -140,7 +140,7 @@ def diagnose(
     >>> found.candidates[0].effect, round(found.candidates[0].parameters["gain"], 1)
     ('sensor_gain', 1.1)
     """
-    from logger.lab.verdict import as_json
+    from logger.report.diagnosis_text import as_json
     from logger.report.lab_text import diagnosis_lines
 
     bench = _bench(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose")
@@ -228,7 +228,7 @@ def add_effect(
     >>> [one.effect.name for one in found.model.effects]
     ['sensor_gain']
     """
-    from logger.lab.gained import as_json
+    from logger.report.add_effect_text import as_json
     from logger.report.lab_text import addition_lines
 
     values = dict(start or {})

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from logger.api.shown import Shown, table
 from logger.errors import BadInput
-from logger.lab.quantities import numbers_of, unit_of
 from logger.profiles.track import Track
+from logger.report.quantities import numbers_of, unit_of
 from logger.shipped import vehicle_names, vehicle_path
 from logger.store.formats import effect_file, vehicle_file
 from logger.vehicle.compose import Car, compose, with_effect

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog add-effect``."""
-    from logger.lab.gained import as_json
+    from logger.report.add_effect_text import as_json
     from logger.report.lab_text import addition_lines
     from logger.store.formats.vehicle_file import write_model
 

@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog compare``."""
     from logger.api.bench import bench_of, deviation_of
     from logger.api.run_checks import lab_runs
-    from logger.lab.compare import as_json
+    from logger.report.comparison_text import as_json
     from logger.report.lab_text import comparison_lines
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model

@@ -15,7 +15,7 @@ from logger.files import naming
 from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
-    from logger.lab.story import Story
+    from logger.lab.session import Story
 
 _INTRODUCTION = (
     "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on the one and briskly on the other, "
@@ -38,7 +38,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.bench import require_compiler
     from logger.demo.lab_drives import VEHICLE
-    from logger.lab.story import as_json as story_json
+    from logger.report.session_text import as_json as story_json
     from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
@@ -84,14 +84,14 @@ def unpack(out: Path) -> list[Path]:
 def _answer(story: Story) -> list[str]:
     """What the simulated car truly was, beside what was found."""
     from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
-    from logger.lab.quantities import numbers_of
+    from logger.report.quantities import numbers_of
 
     found = {one.effect.name: one for one in story.last.effects}
     rows = [("Number", "True", "Without", "With")]
     rows += [(one.name, f"{OFF.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
     told = ", ".join(f"{name} {value:.3g}" for name, value in EFFECT_VALUES.items())
-    mine = numbers_of(story.rounds[-1].gained.new[-1]) if EFFECT in found else "nothing of the kind"
+    mine = numbers_of(story.rounds[-1].addition.new[-1]) if EFFECT in found else "nothing of the kind"
     return ["", "=== The answer ===", "", paragraphs([
         f"The drives were simulated. The car had {EFFECT}, {told}; found: {mine}. Its numbers differed from its "
         "file, in per cent:"]), "", *columns(rows)]

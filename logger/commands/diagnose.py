@@ -1,13 +1,13 @@
-"""Which physical effect a vehicle's model lacks: every one that is known is tried, and judged on what no fit saw.
+"""Which physical effect a vehicle's model lacks: every one that is known is tried, the evidence decides.
 
 Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
 
   ridelog diagnose --vehicle mycar.yaml run1 run2
   ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html
 
-Errors are rms(measured - model) / rms(measured). A third of each run is kept from all fits, and errors are told of it.
-The car's numbers may be off by a few per cent (--tolerance) and the distances by a few centimetres: both are refitted
-first, so that no small mistake passes for an effect.
+Errors are rms(measured - model) / rms(measured), on stretches that no fit saw: three sets of them are held out in turn.
+The car's numbers may be off by a few per cent (--tolerance) and the distances by as much as the runs show: both are
+refitted first, so that no small mistake passes for an effect.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from logger.report.text_layout import paragraphs
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
-    from logger.lab.verdict import Verdict
+    from logger.lab.diagnosis import Diagnosis
 
 _SHOWN = 8
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose``."""
-    from logger.lab.verdict import as_json
+    from logger.report.diagnosis_text import as_json
     from logger.report.lab_text import diagnosis_lines
 
     if args.same_road:
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Verdict:
+def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Diagnosis:
     """The diagnosis of a model, without some effects, with its progress on the screen."""
     with progress() as tell:
         return given.diagnosed(tell, left_out)
@@ -80,17 +80,17 @@ def _compared(given: Bench) -> str:
             f"{len(given.effects)} effects are known.")
 
 
-def _next(args: argparse.Namespace, given: Bench, found: Verdict) -> str:
+def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
     """What to do now; a command in one piece, so that it can be copied."""
     if found.missing:
         one = found.missing[0]
         name = given.files.get(one.effect.name, one.effect.name)
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
-    if found.diagnosis.strained and not found.diagnosis.left_over:
-        names = ", ".join(found.diagnosis.strained)
+    if found.conflicts and not found.left_over:
+        names = ", ".join(found.conflicts)
         return paragraphs([f"Next: see whether {names} of the vehicle's file can be right."])
-    if found.diagnosis.unexplained:
+    if found.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where what is left sits."])
     return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."

@@ -18,7 +18,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
-    from logger.lab.unmeasured_diagnosis import Found
+    from logger.lab.unknown_road.diagnosis import Found
     from logger.runs import Run
     from logger.store.formats.drive_file import Drive
 
@@ -28,9 +28,10 @@ _SHOWN = 8
 def run_same_road(args: argparse.Namespace) -> int:
     """Carry out ``ridelog diagnose --same-road``."""
     from logger.api.bench import deviation_of, known_effects
-    from logger.lab.nuisance import Tolerance
-    from logger.lab.unmeasured import NotOneRoad, SameRoad
-    from logger.lab.unmeasured_diagnosis import as_json, diagnose_same_road
+    from logger.lab.likelihood.priors import Tolerance
+    from logger.lab.unknown_road.diagnosis import diagnose_same_road
+    from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
+    from logger.report.same_road_text import as_json
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
 
@@ -81,8 +82,8 @@ def _drives(folders: Sequence[Path]) -> list[Run]:
 
 def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
     """What a person reads."""
-    from logger.lab.quantities import chance, numbers_of
-    from logger.lab.unmeasured_diagnosis import cannot_tell, summary
+    from logger.report.quantities import chance, numbers_of
+    from logger.report.same_road_text import cannot_tell, summary
 
     rows = [("Effect", "Error", "Chance", "Numbers")]
     rows += [(one.one.effect.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),

@@ -27,8 +27,8 @@ from logger.report.text_layout import paragraphs
 if TYPE_CHECKING:
     from logger.api.bench import Bench
     from logger.lab.compare import Comparison
-    from logger.lab.story import Round, Story
-    from logger.lab.verdict import Verdict
+    from logger.lab.diagnosis import Diagnosis
+    from logger.lab.session import Round, Story
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen
 
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
-    from logger.lab.story import as_json
+    from logger.report.session_text import as_json
 
     given = bench(args, searches="ridelog lab")
     asks = not (args.yes or args.json) and sys.stdin.isatty()
@@ -67,8 +67,9 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
 
     explained    what to tell of compare, diagnose, add and again, beside what they find
     """
-    from logger.lab.story import Story, ending
+    from logger.lab.session import Story
     from logger.report.lab_text import addition_lines, diagnosis_lines
+    from logger.report.session_text import ending
     from logger.report.story_page import page
 
     why = explained or {}
@@ -81,16 +82,16 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
     tell(_chapter("Compare", why.get("compare")))
     first = _compared(given)
     tell(_comparison_lines(first))
-    verdicts: list[Verdict] = []
+    diagnoses: list[Diagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
     going = True
     while going and len(rounds) < _MOST_ROUNDS:
         going = False
         tell(_chapter("Diagnose", why.get("diagnose")))
-        verdicts.append(diagnosed(given, frozenset(refused)))
-        tell(diagnosis_lines(verdicts[-1], _SHOWN))
-        for one in verdicts[-1].missing:
+        diagnoses.append(diagnosed(given, frozenset(refused)))
+        tell(diagnosis_lines(diagnoses[-1], _SHOWN))
+        for one in diagnoses[-1].missing:
             if len(rounds) == _MOST_ROUNDS:
                 break
             wanted = ask(given, one.effect.name)
@@ -101,14 +102,14 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
             same = wanted == one.effect.name
             made, model = _round(given, one if same else _searched(given, wanted), out, len(rounds) + 1)
             rounds.append(made)
-            tell([*addition_lines(rounds[-1].gained), "", f"Vehicle: {rounds[-1].file}"])
+            tell([*addition_lines(rounds[-1].addition), "", f"Vehicle: {rounds[-1].file}"])
             tell(_chapter("Compare again", why.get("again")))
             tell(_comparison_lines(rounds[-1].comparison))
             given = replace(given, model=model)
             if not same:  # what is missing beside another effect is to be found anew
                 going = True
                 break
-    story = Story(first, tuple(verdicts), tuple(rounds), tuple(refused))
+    story = Story(first, tuple(diagnoses), tuple(rounds), tuple(refused))
     write_text(out / STORY, page(story))
     tell(_chapter("The end", why.get("end")))
     tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
@@ -117,15 +118,15 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, s
 
 def _round(given: Bench, start: Chosen, out: Path, number: int) -> tuple[Round, Model]:
     """Add an effect, write the vehicle and compare it; the model with it."""
-    from logger.lab.story import Round
+    from logger.lab.session import Round
     from logger.store.formats.vehicle_file import write_model
 
     with progress() as tell:
-        gained = given.added(start, len(start.effect.trials()), tell)
-    model = given.model_with(gained)
+        addition = given.added(start, len(start.effect.trials()), tell)
+    model = given.model_with(addition)
     file = _vehicle_file(out, number)
     write_model(file, model)
-    return Round(gained, _compared(replace(given, model=model)), str(file)), model
+    return Round(addition, _compared(replace(given, model=model)), str(file)), model
 
 
 def _vehicle_file(out: Path, number: int) -> Path:
@@ -147,7 +148,7 @@ def _compared(given: Bench) -> Comparison:
 
 
 def take(_given: Bench, name: str) -> str:
-    """Whatever the verdict is."""
+    """Whatever is missing."""
     return name
 
 
@@ -200,7 +201,7 @@ def _chapter(title: str, explained: str | None) -> list[str]:
 
 
 def _comparison_lines(found: Comparison) -> list[str]:
-    from logger.lab.compare import conclusion, evidence, headline
+    from logger.report.comparison_text import conclusion, evidence, headline
 
     return [paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
             paragraphs([conclusion(found).partition(" Next: ")[0]])]

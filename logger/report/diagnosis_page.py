@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from logger.chart_data import Curves, Line
 from logger.lab.diagnosis import Diagnosis
-from logger.lab.unexplained import Shape
-from logger.lab.verdict import Verdict, floor_where_judged, looks_like, summary, table, untested
+from logger.lab.residuals.unexplained import Shape
 from logger.report.charts import Steps, chart, steps_figure
+from logger.report.diagnosis_text import JUDGED_ON, looks_like, summary, table, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html
 from logger.report.lab_page import forces_section, spectra_section
@@ -16,36 +16,35 @@ from logger.report.lab_page import forces_section, spectra_section
 _LEAST_SHARE = 0.01
 
 
-def page(found: Verdict, vehicle: str) -> Html:
+def page(found: Diagnosis, vehicle: str) -> Html:
     """The diagnosis as one HTML document."""
     title = f"{vehicle}: which effect is missing"
-    runs = found.diagnosis.problem.runs.runs
     return document(title, [
-        heading(title, ", ".join(run.name for run in runs)),
+        heading(title, ", ".join(found.runs)),
         _tiles(found), paragraphs(summary(found)), shape_sections(found),
-        section("How the error fell", _steps(found.diagnosis)), section("All candidates", _candidates(found)),
+        section("How the error fell", _steps(found)), section("All candidates", _candidates(found)),
         section("What these runs cannot tell", bullets(untested(found))),
         section("Where this is from", bullets(sources(found))),
     ])
 
 
-def sources(found: Verdict) -> list[str]:
+def sources(found: Diagnosis) -> list[str]:
     """What to cite for the effects that are missing."""
     return [f"{one.effect.name}: {one.effect.source}" for one in found.missing]
 
 
-def shape_sections(found: Verdict) -> Html:
+def shape_sections(found: Diagnosis) -> Html:
     """What no candidate explains: sentences and pictures; nothing where nothing is unexplained."""
     if found.shape is None:
         return EMPTY
     return (section("What no effect explains", bullets(looks_like(found)))
-            + section("Where it sits", _where(found.shape)) + spectra_section(found.shape.beside)
+            + section("Where it sits", _where(found.shape)) + spectra_section(found.shape.residuals)
             + _forces(found.shape))
 
 
 def _forces(shape: Shape) -> Html:
     """The missing force; a sentence where no force in the suspensions would do."""
-    forces = shape.marks.forces
+    forces = shape.tests.forces
     if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
         return section("The missing force", paragraphs([
             "No force in the suspensions that goes with their speed or travel would explain it: it comes from "
@@ -53,45 +52,42 @@ def _forces(shape: Shape) -> Html:
     return forces_section(forces)
 
 
-def _tiles(found: Verdict) -> Html:
-    diagnosis = found.diagnosis
-    floor, missing = diagnosis.noise_floor_error, len(diagnosis.verdict)
+def _tiles(found: Diagnosis) -> Html:
+    missing = len(found.verdict)
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
     return tiles([
-        ("Error of the model as it stands", f"{diagnosis.baseline_error:.3f}", "as recorded"),
-        ("With what is missing" if missing else "With its numbers refitted",
-         f"{diagnosis.problem.error(diagnosis.after):.3f}", "refitted"),
-        ("The sensor's noise alone", "not known" if floor is None else f"{floor:.3f}", ""),
-        ("Missing", unknown if diagnosis.unexplained else count, ""),
+        ("Error of the model as it stands", f"{found.baseline_error:.3f}", "as recorded"),
+        ("With what is missing" if missing else "With its numbers refitted", f"{found.final_error:.3f}", "refitted"),
+        ("The sensor's noise alone", f"{found.noise_floor_error:.3f}", ""),
+        ("Missing", unknown if found.unexplained else count, ""),
     ])
 
 
-def _steps(diagnosis: Diagnosis) -> Html:
-    drawn = falling(f"Error on {diagnosis.judged_on}", [(step.words, step.error) for step in diagnosis.steps],
-                    floor_where_judged(diagnosis))
-    rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(diagnosis.steps)]
+def _steps(found: Diagnosis) -> Html:
+    drawn = falling(f"Error on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
+                    found.noise_floor_error)
+    rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(found.steps)]
     return drawn + grid(("Step", "Model", "Error"), rows, words=(0, 1))
 
 
-def falling(title: str, steps: Sequence[tuple[str, float]], floor: float | None) -> Html:
+def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Html:
     """The error of each step as a falling curve, down to the noise."""
-    return steps_figure(Steps(title, "error", tuple(steps), None if floor is None else (floor, "noise alone")))
+    return steps_figure(Steps(title, "error", tuple(steps), (floor, "noise alone")))
 
 
-def _candidates(found: Verdict) -> Html:
+def _candidates(found: Diagnosis) -> Html:
     return (grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
-            + hint("Each tried alone on the model of its round, those of the verdict first, then the least likely to "
-                   f"be chance. The error is on {found.diagnosis.judged_on}; the chance holds for all candidates "
-                   "together."))
+            + hint("Each tried alone on the model of its round, those that are missing first, then the least likely to "
+                   f"be chance. The error is on {JUDGED_ON}; the chance holds for all candidates together."))
 
 
 def _where(shape: Shape) -> Html:
     """By frequency, and along the way."""
     rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_told(2))
             for part in shape.where.frequency]
-    drawn = grid(("Band", "Hz", "Share of what is left", "Error"), rows)
-    if shape.turns is not None and shape.turns.found:
-        drawn += chart(Curves(f"What repeats along the way, in {shape.turns.run}", "times per metre",
-                                "power over its mean", (Line("what is left", shape.turns.per_m, shape.turns.power),)))
+    drawn = grid(("Band", "Hz", "Share of the residual", "Error"), rows)
+    if shape.line is not None and shape.line.found:
+        drawn += chart(Curves(f"What repeats along the way, in {shape.line.run}", "times per metre",
+                                "power over its mean", (Line("residual", shape.line.per_m, shape.line.power),)))
     return drawn

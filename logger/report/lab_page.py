@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.chart_data import Curves, Line
-from logger.lab.beside import Beside, Part, frequencies, paired, segments, short_names
-from logger.lab.compare import Comparison, Standing, conclusion, evidence, headline
-from logger.lab.force_map import Curve, ForceMap
-from logger.lab.marks import worst_places
+from logger.lab.compare import Comparison, Standing
+from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, paired, segments, short_names
+from logger.lab.residuals.force_state_map import Curve, ForceMap
+from logger.lab.residuals.residual_tests import worst_places
 from logger.report.charts import chart
+from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 
@@ -30,53 +31,53 @@ _WORST = 8
 
 def page(found: Comparison) -> Html:
     """The comparison as one HTML document."""
-    beside = found.refitted.beside
+    residuals = found.refitted.residuals
     title = f"{found.vehicle}: model against measurement"
     return document(title, [
-        heading(title, ", ".join(run.name for run in beside.runs)), _tiles(found), paragraphs(headline(found)),
+        heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found), paragraphs(headline(found)),
         section("After the refit", bullets(evidence(found)) + paragraphs([conclusion(found)])),
-        _worst_place(found.refitted), spectra_section(beside), _tables(found), _places(found.refitted),
-        forces_section(found.marks.forces), _alignment(found), _marks(found), _numbers(found),
+        _worst_place(found.refitted), spectra_section(residuals), _tables(found), _places(found.refitted),
+        forces_section(found.tests.forces), _alignment(found), _tests(found), _numbers(found),
     ])
 
 
 def _tiles(found: Comparison) -> Html:
-    beside = found.plain.beside
+    residuals = found.plain.residuals
     return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
                   ("Error after the refit", f"{found.refitted.error:.3f}", ""),
-                  ("Marks found", f"{len(found.marks_found)}", f"of {len(found.marks.marks)}"),
-                  ("Runs", f"{len(beside.runs)}", f"{sum(map(len, beside.left)) / beside.rate_hz:.0f} s")])
+                  ("ResidualTests found", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
+                  ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.left)) / residuals.rate_hz:.0f} s")])
 
 
 # --- pictures ---
 
 
 def _worst_place(standing: Standing) -> Html:
-    beside, worst = standing.beside, worst_places(standing.where, 1)[0]
-    index = next(i for i, run in enumerate(beside.runs) if run.name == worst.name)
-    run, left = beside.runs[index], beside.left[index]
+    residuals, worst = standing.residuals, worst_places(standing.where, 1)[0]
+    index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
+    run, left = residuals.runs[index], residuals.left[index]
     at_m = run.distance_m[run.first:]
     inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
     middle = int(inside[np.abs(left[inside]).argmax()])
-    reach = round(_AROUND_S * beside.rate_hz)
+    reach = round(_AROUND_S * residuals.rate_hz)
     part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(left)))[part] / beside.rate_hz
+    time_s = (run.first + np.arange(len(left)))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
-        ("measured", beside.measured), ("what is left", beside.left), ("model", beside.model)))
-    title = f"{short_names(beside.runs)[run.name]}, around {at_m[middle]:.0f} m"
+        ("measured", residuals.measured), ("what is left", residuals.left), ("model", residuals.model)))
+    title = f"{short_names(residuals.runs)[run.name]}, around {at_m[middle]:.0f} m"
     return section("The worst place", chart(Curves(title, "time in the run [s]", "acceleration [m/s2]", lines)))
 
 
-def spectra_section(beside: Beside) -> Html:
+def spectra_section(residuals: ModelResiduals) -> Html:
     """What was measured, what the model says and what is left, by frequency."""
-    return section("By frequency", concatenated(map(chart, spectra(beside))))
+    return section("By frequency", concatenated(map(chart, spectra(residuals))))
 
 
-def spectra(beside: Beside) -> tuple[Curves, Curves]:
+def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     """The charts of it: of the body, and of the wheels and above."""
-    f_hz = frequencies(beside)
-    density = [np.mean(np.abs(segments(beside, one)) ** 2, axis=0) / f_hz[1]
-               for one in (beside.measured, beside.left, beside.model)]
+    f_hz = frequencies(residuals)
+    density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
+               for one in (residuals.measured, residuals.left, residuals.model)]
 
     def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
@@ -88,8 +89,8 @@ def spectra(beside: Beside) -> tuple[Curves, Curves]:
 
 
 def _places(standing: Standing) -> Html:
-    lines, names = [], short_names(standing.beside.runs)
-    for run in standing.beside.runs[:_MOST_RUNS]:
+    lines, names = [], short_names(standing.residuals.runs)
+    for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
@@ -116,7 +117,7 @@ def forces_section(forces: ForceMap) -> Html:
 
 
 def _alignment(found: Comparison) -> Html:
-    windows, runs = found.marks.alignment, found.plain.beside.runs
+    windows, runs = found.tests.alignment, found.plain.residuals.runs
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
@@ -158,11 +159,12 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
     return section(title, html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
 
 
-def _marks(found: Comparison) -> Html:
-    rows = [(mark.name, _measured(mark.value, mark.unit), _measured(mark.standard_error), _chance(mark.p_value),
-             "found" if mark in found.marks_found else "") for mark in found.marks.marks]
-    return section("All marks", grid(("Mark", "Value", "Standard error", "Chance in noise", ""), rows, words=(0, 4))
-                   + hint("A mark is found when it is improbable in noise and large enough to matter."))
+def _tests(found: Comparison) -> Html:
+    rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error), _chance(test.p_value),
+             "found" if test in found.tests_found else "") for test in found.tests.tests]
+    return section("All tests of the residual", grid(("Test", "Value", "Standard error", "Chance in noise", ""), rows,
+                                                                words=(0, 4))
+                   + hint("A test is found when it is improbable in noise and large enough to matter."))
 
 
 def _numbers(found: Comparison) -> Html:

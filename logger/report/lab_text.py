@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from logger.lab.beside import Part, paired, short_names
-from logger.lab.compare import Comparison, conclusion, evidence, headline
-from logger.lab.gained import MOVED_HEADS, MOVED_HINT, Gained, bias, errors, judgement, moved_rows
-from logger.lab.marks import worst_places
-from logger.lab.verdict import Verdict, looks_like, summary, table, untested
+from logger.lab.compare import Comparison
+from logger.lab.diagnosis import Diagnosis
+from logger.lab.residuals.breakdown import Part, paired, short_names
+from logger.lab.residuals.residual_tests import worst_places
+from logger.lab.selection.add_effect import AddedEffects
+from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
+from logger.report.comparison_text import conclusion, evidence, headline
+from logger.report.diagnosis_text import looks_like, summary, table, untested
 from logger.report.text_layout import columns, paragraphs
 
 _PLACES = 5
@@ -14,10 +17,10 @@ _PLACES = 5
 
 def comparison_lines(found: Comparison) -> list[str]:
     """What a person reads of a comparison."""
-    beside = found.plain.beside
-    seconds = sum(map(len, beside.left)) / beside.rate_hz
+    residuals = found.plain.residuals
+    seconds = sum(map(len, residuals.left)) / residuals.rate_hz
     return [
-        f"{found.vehicle} on {len(beside.runs)} run{'s' * (len(beside.runs) != 1)}, {seconds:.0f} s", "",
+        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
         paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
         paragraphs([conclusion(found)]), "",
         *_tables(found),
@@ -34,7 +37,7 @@ def _tables(found: Comparison) -> list[str]:
     ):
         lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))]
     lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
-    names = short_names(found.plain.beside.runs)
+    names = short_names(found.plain.residuals.runs)
     lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]
     return lines
 
@@ -50,13 +53,13 @@ def _place(part: Part, run: str) -> str:
     return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_told(3):>8}"
 
 
-def diagnosis_lines(found: Verdict, most: int | None) -> list[str]:
+def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:
     """What a person reads of a diagnosis."""
     shown = [paragraphs(summary(found))]
     if described := looks_like(found):
         shown += ["", "What it looks like:", paragraphs(described, "- ")]
     rows = [("Effect", "Error", "Chance", "Numbers"), *table(found, most)]
-    more = len(found.diagnosis.candidates) - len(rows) + 1
+    more = len(found.candidates) - len(rows) + 1
     shown += ["", "Each tried by itself, those of the verdict first, then the least likely to be chance:",
               *columns(rows)]
     if more > 0:
@@ -66,7 +69,7 @@ def diagnosis_lines(found: Verdict, most: int | None) -> list[str]:
     return shown
 
 
-def addition_lines(found: Gained) -> list[str]:
+def addition_lines(found: AddedEffects) -> list[str]:
     """What a person reads of an effect that was added."""
     rows = [(f"Error {which}:" if which else "", f"{error:.4f}", what) for which, error, what in errors(found)]
     return [

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.lab.beside import Beside, frequencies, segments, short_names
-from logger.lab.compare import evidence, headline
-from logger.lab.gained import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
-from logger.lab.marks import worst_places
-from logger.lab.story import Round, Story, ending
-from logger.lab.verdict import summary, untested
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments, short_names
+from logger.lab.residuals.residual_tests import worst_places
+from logger.lab.session import Round, Story
+from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
 from logger.report.charts import chart
+from logger.report.comparison_text import evidence, headline
 from logger.report.diagnosis_page import falling, shape_sections
+from logger.report.diagnosis_text import summary, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
+from logger.report.session_text import ending
 
 STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")
@@ -26,13 +27,13 @@ _QUIET_DB = -80.0
 def page(story: Story) -> Html:
     """The story as one HTML document."""
     title = f"{story.first.vehicle}: from the first comparison to the last effect"
-    runs = story.first.plain.beside.runs
-    last = story.verdicts[-1]
+    runs = story.first.plain.residuals.runs
+    last = story.diagnoses[-1]
     return document(title, [
         heading(title, ", ".join(run.name for run in runs)),
         _tiles(story), paragraphs(ending(story)), section("How the error fell", _steps(story)),
         section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
-        section("What was missing", concatenated(paragraphs(summary(one)) for one in story.verdicts)),
+        section("What was missing", concatenated(paragraphs(summary(one)) for one in story.diagnoses)),
         *map(_added, story.rounds),
         section("Before and after", _spectra(story) + _place(story)) if story.rounds else "",
         section("What the car's numbers had been taken for", _moved(story)),
@@ -48,7 +49,7 @@ def _tiles(story: Story) -> Html:
     return tiles([
         ("Error as the file says", f"{story.steps[0][1]:.3f}", "as recorded"),
         ("Error at last", f"{story.steps[-1][1]:.3f}", "refitted"),
-        ("The sensor's noise alone", "not known" if story.floor is None else f"{story.floor:.3f}", ""),
+        ("The sensor's noise alone", f"{story.floor:.3f}", ""),
         ("Effects added", f"{len(story.added)}", ""),
     ])
 
@@ -60,10 +61,11 @@ def _steps(story: Story) -> Html:
 
 
 def _added(one: Round) -> Html:
-    effects = [f"It leaves: {new.effect.signature}." for new in one.gained.new]
-    rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.gained)]
-    return section(f"Added: {' and '.join(one.gained.names)}", paragraphs(
-        [*judgement(one.gained), *effects, f"Written to {one.file}."]) + grid(("Error", "", "of"), rows, words=(0, 2)))
+    effects = [f"It leaves: {new.effect.signature}." for new in one.addition.new]
+    rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.addition)]
+    said = paragraphs([*judgement(one.addition), *effects, f"Written to {one.file}."])
+    return section(f"Added: {' and '.join(one.addition.names)}",
+                   said + grid(("Error", "", "of"), rows, words=(0, 2)))
 
 
 def _moved(story: Story) -> Html:
@@ -74,12 +76,13 @@ def _moved(story: Story) -> Html:
 
 def _spectra(story: Story) -> Html:
     """What was left before and after, by frequency."""
-    before, after = story.first.refitted.beside, story.last.refitted.beside
+    before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)
     kept = (f_hz > 0) & (f_hz <= _HIGHEST_OF_RATE * before.rate_hz)
 
-    def line(name: str, beside: Beside, measured: bool) -> Line:
-        power = np.mean(np.abs(segments(beside, beside.measured if measured else beside.left)) ** 2, axis=0) / f_hz[1]
+    def line(name: str, residuals: ModelResiduals, measured: bool) -> Line:
+        signals = residuals.measured if measured else residuals.left
+        power = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / f_hz[1]
         return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
 
     return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", (
@@ -90,17 +93,17 @@ def _place(story: Story) -> Html:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
     worst = worst_places(before.where, 1)[0]
-    beside = before.beside
-    index = next(i for i, run in enumerate(beside.runs) if run.name == worst.name)
-    run, left = beside.runs[index], beside.left[index]
+    residuals = before.residuals
+    index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
+    run, left = residuals.runs[index], residuals.left[index]
     at_m = run.distance_m[run.first:]
     inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
     middle = int(inside[np.abs(left[inside]).argmax()])
-    reach = round(_AROUND_S * beside.rate_hz)
+    reach = round(_AROUND_S * residuals.rate_hz)
     part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(left)))[part] / beside.rate_hz
-    name = short_names(beside.runs)[run.name]
-    lines = (Line("measured", time_s, beside.measured[index][part]),
-             Line("left at first", time_s, left[part]), Line("left at last", time_s, after.beside.left[index][part]))
+    time_s = (run.first + np.arange(len(left)))[part] / residuals.rate_hz
+    name = short_names(residuals.runs)[run.name]
+    lines = (Line("measured", time_s, residuals.measured[index][part]),
+             Line("left at first", time_s, left[part]), Line("left at last", time_s, after.residuals.left[index][part]))
     return chart(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
                           "acceleration [m/s2]", lines))

@@ -76,20 +76,6 @@ def steps_of(effects: Sequence[Chosen], moves: Sequence[Move], log_step: float =
     return np.array(steps)
 
 
-def steps_apart(one: Chosen, other: Chosen) -> float:
-    """How far the numbers of an effect are apart at two sets of values, at most, in steps of their differences;
-    infinitely far where another choice was made."""
-    choices = [parameter.name for parameter in one.effect.parameters if parameter.choices]
-    if any(one.values[name] != other.values[name] for name in choices):
-        return np.inf
-    moves = moves_of([one])
-    here, there = (coordinates_of([each], moves) for each in (one, other))
-    return float(np.max(np.abs(there - here) / np.abs(steps_of([one], moves)), initial=0.0))
-
-
-# --- by name: ``dry_friction.friction_force_n`` ---
-
-
 def move_named(effects: Sequence[Chosen], name: str) -> Move | None:
     """The number of that name; None for one that is of none of these effects.
 

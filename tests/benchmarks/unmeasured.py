@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from logger.lab.nuisance import Tolerance
-from logger.lab.unmeasured import SameRoad
-from logger.lab.unmeasured_diagnosis import Found, diagnose_same_road
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.unknown_road.diagnosis import Found, diagnose_same_road
+from logger.lab.unknown_road.likelihood import SameRoad
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.store.formats.drive_file import read_drive

@@ -92,12 +92,13 @@ def test_drives_without_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, c
     assert told["candidates"][0]["parameters"]["friction_force_n"] == pytest.approx(80.0, rel=0.02)
 
 
-def test_short_runs_say_that_nothing_was_kept_from_the_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                                                            ) -> None:
+def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                                          ) -> None:
     assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["unseen_noise_floor_error"] is None
-    assert told["judged_on"].startswith("all samples")
+    assert told["unseen_noise_floor_error"] == told["noise_floor_error"]
+    assert told["judged_on"] == "stretches that no fit saw"
+    assert told["steps"][-1]["error"] == pytest.approx(told["noise_floor_error"], rel=0.1)
 
 
 def test_something_that_no_candidate_explains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -52,7 +52,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.fixture(autouse=True)
 def no_fits(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("compare.compare", "diagnosis.diagnose", "candidates.screened", "addition.add"):
+    for name in ("compare.compare", "diagnosis.diagnose", "selection.screening.screened", "selection.add_effect.add"):
         monkeypatch.setattr(f"logger.lab.{name}", None)
 
 
@@ -222,7 +222,7 @@ def test_a_car_that_was_refitted_is_judged_by_what_was_given(
         asked.extend((vehicle.sprung_mass_kg, stands.sprung_mass_kg))
         raise ValueError("enough")
 
-    monkeypatch.setattr("logger.lab.unmeasured.SameRoad", same_road)
+    monkeypatch.setattr("logger.lab.unknown_road.likelihood.SameRoad", same_road)
     car = Path(car_with(tmp_path, ""))
     car.write_text(car.read_text("utf-8") + "given: {sprung_mass_kg: 800}\n", "utf-8")
     with pytest.raises(BadInput, match="enough"):

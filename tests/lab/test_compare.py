@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.compare import Comparison, as_json, compare, conclusion, evidence, headline
+from logger.lab.compare import Comparison, compare
+from logger.report.comparison_text import as_json, conclusion, evidence, headline
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -42,7 +43,7 @@ def lacking() -> Comparison:
 
 def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
     """Everything that is left after the refit is the noise, and nothing is said to be missing."""
-    measured = np.concatenate(mistaken.plain.beside.measured)
+    measured = np.concatenate(mistaken.plain.residuals.measured)
     floor = NOISE_MPS2 / float(np.sqrt(np.mean(measured**2)))
     assert mistaken.plain.error > 1.2 * floor
     assert mistaken.refitted.error == pytest.approx(floor, rel=0.03)
@@ -55,25 +56,25 @@ def test_small_mistakes_are_not_physics(mistaken: Comparison) -> None:
 
 def test_missing_friction_is_physics(lacking: Comparison) -> None:
     assert lacking.missing
-    names = [mark.name for mark in lacking.marks.found]
+    names = [test.name for test in lacking.tests.found]
     assert "force by rate" in names and "direction" not in names
     assert "ridelog diagnose" in conclusion(lacking)
     assert f"error {lacking.plain.error:.3f}" in headline(lacking)[0]
 
 
 def test_the_effect_in_the_model_leaves_noise() -> None:
-    beside = beside_with(recorded_by([FRICTION], NOISE_MPS2), 5, lasts_s=12.0)
+    residuals = beside_with(recorded_by([FRICTION], NOISE_MPS2), 5, lasts_s=12.0)
     name, values = FRICTION
-    found = compare(runs_of(beside), CAR, [chosen(shipped_effects()[name], values)])
+    found = compare(runs_of(residuals), CAR, [chosen(shipped_effects()[name], values)])
     assert not found.missing
     assert found.moves["dry_friction.friction_force_n"] == pytest.approx(0.0, abs=0.1)
 
 
 def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Comparison) -> None:
-    beside = lacking.plain.beside
+    residuals = lacking.plain.residuals
     left = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
-                           zip(beside.runs, beside.predictions, strict=True)])
-    measured = np.concatenate([run.measured_mps2[200:] for run in beside.runs])
+                           zip(residuals.runs, residuals.predictions, strict=True)])
+    measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])
     told = as_json(lacking)
     assert told["error"] == pytest.approx(np.sqrt(np.mean(left**2) / np.mean(measured**2)))
     assert sum(run["samples"] for run in told["runs"]) == len(left)

@@ -1,58 +1,171 @@
-"""What a diagnosis says of effects that it cannot try, of what is left above the noise, and of runs too long."""
+"""A diagnosis names what is missing and nothing where nothing is; what it cannot explain or try, it says."""
 
-from types import SimpleNamespace
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from logger.lab import diagnosis, wandering
-from logger.lab.fitting import Problem
-from logger.lab.noise import UNEXPLAINED, Noise
-from logger.lab.nuisance import Tolerance
-from logger.lab.stretches import Cells
-from logger.profiles.track import Track
+from logger.lab.diagnosis import CONFLICT_SIGMA, HAS_IT, Diagnosis, diagnose, obstacles_of
+from logger.lab.likelihood.noise_floor import UNEXPLAINED
+from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.formats.effect_file import shipped_effects
-from logger.vehicle.effect import chosen
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.named_parameters import changed, read
 
-from ..support.lab.runs_with_residual import CAR, a_run
+from ..support.lab.runs_with_residual import CAR, measuring
+from ..support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
 
-EFFECTS = shipped_effects()
-
-
-def problem() -> Problem:
-    return Problem(SimulatedRuns([a_run("run", 10.0, 20.0, 1)], 500.0), CAR, Tolerance())
+FEW = ("sensor_gain", "sensor_offset", "time_offset", "tire_damping")
+SPRINGS = ("front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m")
 
 
-def test_effects_that_cannot_be_tried_are_named_with_the_reason() -> None:
-    present = [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})]
-    found = diagnosis._obstacles(problem(), EFFECTS, present)
-    assert found == {"sensor_gain": "the model has it", "roll": EFFECTS["roll"].obstacle(CAR, False)}
+def diagnosed(runs: SimulatedRuns, names: Sequence[str] = FEW, present: Sequence[Chosen] = ()) -> Diagnosis:
+    return diagnose(posterior_of(runs), {name: EFFECTS[name] for name in names}, present)
 
 
-def excess_of(lasts_s: list[float], above: float, seed: int) -> float:
-    """Of runs that are left with noise, so many times as loud as the sensor's (1 m/s2)."""
-    rng = np.random.default_rng(seed)
-    cells = [Cells(above**2 * rng.chisquare(2 * 1.75 * one, 21) / (2 * 1.75 * one), np.full(21, 2 * 1.75 * one))
-             for one in lasts_s]
-    left = SimpleNamespace(cells=lambda state, fitted: cells)
-    return diagnosis._excess(left, None, Noise(1.0, 0.0))  # type: ignore[arg-type]
+@pytest.fixture(scope="module")
+def flawless() -> SimulatedRuns:
+    return secret_runs(seed=2)
 
 
-def test_noise_of_many_short_runs_is_no_excess() -> None:
-    found = [excess_of([3.0] * 12, 1.0, seed) for seed in range(500)]
-    assert sum(one > UNEXPLAINED for one in found) <= 3  # one in a thousand
-    assert sum(one == UNEXPLAINED for one in found) > 50  # louder than that, and no more than by chance
+@pytest.fixture(scope="module")
+def offset() -> Diagnosis:
+    return diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)]), (*FEW, "roll"))
 
 
-def test_an_excess_is_that_of_the_run_where_it_is_most() -> None:
-    assert all(excess_of([40.0, 60.0], 1.3, seed) == pytest.approx(0.3, abs=0.06) for seed in range(100))
-    assert all(0.2 < excess_of([3.0] * 6, 1.5, seed) < 0.9 for seed in range(100))
+def nothing_is_missing(found: Diagnosis) -> bool:
+    return not found.verdict and not found.unexplained and found.shape is None
 
 
-def test_runs_too_long_to_be_followed_are_named() -> None:
-    assert wandering.too_long(problem()) == []
-    zeros = np.zeros(60_000)
-    long = Run("long", 100.0, zeros, np.arange(60_000) * 0.1, zeros + 10.0, Track(1.0, np.zeros(3)))
-    assert "too long" in wandering.too_long(Problem(SimulatedRuns([long], 500.0), CAR, Tolerance()))[0]
+# --- what lacks no physics ---
+
+
+def test_a_car_as_its_file_says_lacks_nothing(flawless: SimulatedRuns) -> None:
+    found = diagnosed(flawless)
+    assert nothing_is_missing(found) and not found.conflicts and not found.missing
+    assert found.final_error == pytest.approx(found.noise_floor_error, rel=0.05)
+    assert found.noise.deviation_mps2 == pytest.approx(NOISE_MPS2, rel=0.05)
+    assert all(one.p_value > FALSE_ALARM for one in found.candidates)
+
+
+def test_a_recorder_that_averages_and_is_a_little_weak_lacks_no_physics() -> None:
+    rng = np.random.default_rng(3)
+
+    def weak(run: Run) -> np.ndarray:
+        f_hz = np.fft.rfftfreq(run.count, 1 / run.rate_hz)
+        passed = np.fft.irfft(np.fft.rfft(run.measured_mps2) * 0.992 * np.sinc(f_hz / run.rate_hz), run.count)
+        return np.asarray(passed + rng.normal(0, NOISE_MPS2, run.count))
+
+    runs = [measuring(run, weak(run)) for run in secret_runs(noise_mps2=0.0).runs]
+    assert nothing_is_missing(diagnosed(SimulatedRuns(runs, 500.0)))
+
+
+def test_a_clock_that_runs_a_little_fast_lacks_no_physics(flawless: SimulatedRuns) -> None:
+    fast = SimulatedRuns([replace(one, distance_m=1.0008 * one.distance_m) for one in flawless.runs], 500.0)
+    found = diagnosed(fast, (*FEW, "speed_scale"))
+    assert set(found.verdict) <= {"speed_scale"} and not found.unexplained
+    assert found.final_error < found.baseline_error
+
+
+def test_numbers_within_their_tolerance_lack_no_physics() -> None:
+    rng = np.random.default_rng(5)
+    numbers = (*SPRINGS, "sprung_mass_kg", "front.suspension_damping_n_s_per_m", "rear.tire_stiffness_n_per_m")
+    car = changed(CAR, {name: read(CAR, name) * float(np.exp(0.025 * rng.normal())) for name in numbers})
+    assert nothing_is_missing(diagnosed(secret_runs(car=car)))
+
+
+# --- what lacks some ---
+
+
+def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: Diagnosis) -> None:
+    assert offset.verdict == ("sensor_offset",) and not offset.unexplained
+    (one,) = offset.missing
+    error = one.standard_errors["offset_m"]
+    assert 0 < error < 0.03 and one.values["offset_m"] == pytest.approx(0.4, abs=4 * error)
+    best = offset.candidate("sensor_offset")
+    assert best is offset.candidates[0] and best.values == one.values
+    assert best.p_value == probability_by_chance(best.gain, 4) and best.p_value < 1e-9
+    assert best.confused_with == ()
+
+
+def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: Diagnosis) -> None:
+    words = [step.words for step in offset.steps]
+    assert words == ["the vehicle as its file says", "its numbers refitted", "with sensor_offset"]
+    before, refitted, after = (step.error for step in offset.steps)
+    assert before == pytest.approx(offset.baseline_error, rel=1e-4)  # which is simulated finely
+    assert before > refitted > 2 * after
+    assert offset.final_error <= after == offset.candidate("sensor_offset").error
+    assert after == pytest.approx(offset.noise_floor_error, rel=0.06)
+
+
+def test_all_others_are_told_of_the_least_probable_by_chance_first(offset: Diagnosis) -> None:
+    _, *others = offset.candidates
+    assert {one.effect.name for one in others} == {*FEW} - {"sensor_offset"}
+    assert [one.p_value for one in others] == sorted(one.p_value for one in others)
+    best = offset.candidate("sensor_offset")
+    assert all(one.error > 2 * best.error and one.held_out_gain < best.held_out_gain for one in others)
+
+
+def test_an_effect_that_is_there_is_refitted_and_not_tried() -> None:
+    present = [hidden("sensor_offset", offset_m=0.3)]
+    found = diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)]), FEW, present)
+    assert nothing_is_missing(found) and found.obstacles == {"sensor_offset": HAS_IT} and found.not_tried == {}
+    (one,) = found.effects
+    assert one.values["offset_m"] == pytest.approx(0.4, abs=0.04) and one.standard_errors.keys() == {"offset_m"}
+    assert found.baseline_error > 1.1 * found.final_error
+
+
+def test_one_effect_is_enough_to_ask_for() -> None:
+    found = diagnosed(secret_runs([hidden("sensor_gain", gain=1.2)]), ["sensor_gain"])
+    assert found.verdict == ("sensor_gain",) and not found.unexplained
+
+
+def test_none_can_be_asked_for_too(flawless: SimulatedRuns) -> None:
+    found = diagnosed(flawless, [])
+    assert nothing_is_missing(found) and found.candidates == () and found.undetectable == ()
+
+
+# --- what is not explained ---
+
+
+def test_what_only_another_car_would_explain_is_unexplained() -> None:
+    stiff = changed(CAR, {name: 1.35 * read(CAR, name) for name in SPRINGS})
+    found = diagnosed(secret_runs(car=stiff), ("sensor_gain", "sensor_mount_resonance"))
+    assert found.verdict == () and found.unexplained
+    assert {*SPRINGS} <= found.conflicts.keys()
+    assert all(abs(np.log1p(share)) > CONFLICT_SIGMA * 0.02 for share in found.conflicts.values())
+    assert all(0.15 < found.conflicts[name] < 0.40 for name in SPRINGS)
+    assert not found.left_over and found.shape is None
+
+
+def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named() -> None:
+    found = diagnosed(secret_runs([hidden("dry_friction", friction_force_n=200.0)]), ("tire_damping", "sensor_gain"))
+    assert found.verdict == () and found.left_over and found.unexplained
+    assert found.excess > UNEXPLAINED and found.shape is not None
+    assert min(one.p_value for one in found.candidates) < FALSE_ALARM  # more than noise, and yet nothing
+
+
+def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: Diagnosis) -> None:
+    why = EFFECTS["roll"].obstacle(CAR, False)
+    assert why is not None
+    found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
+    assert found == {"sensor_gain": HAS_IT, "roll": why}
+    assert offset.not_tried == {"roll": why} and "roll" in offset.catalogue
+
+
+def test_effects_that_the_runs_would_hide_are_told_of(flawless: SimulatedRuns) -> None:
+    found = diagnosed(flawless, (*FEW, "wheel_lift"))
+    hidden_ones = {one.effect.name: one.deviations for one in found.undetectable}
+    assert hidden_ones["wheel_lift"] < 0.1 and "sensor_offset" not in hidden_ones
+    assert not {*hidden_ones} & {*found.verdict}
+
+
+def test_progress_is_told(flawless: SimulatedRuns) -> None:
+    told: list[str] = []
+    diagnose(posterior_of(flawless), {"sensor_gain": EFFECTS["sensor_gain"]}, progress=told.append)
+    assert told[0] == "refitting the car's own numbers" and "round 1" in told
+    assert told[-1] == "what these runs could not show"

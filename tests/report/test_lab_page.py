@@ -8,7 +8,8 @@ from html.parser import HTMLParser
 
 import pytest
 
-from logger.lab.compare import Comparison, compare, evidence, headline
+from logger.lab.compare import Comparison, compare
+from logger.report.comparison_text import evidence, headline
 from logger.report.lab_page import page
 
 from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs_of
@@ -16,8 +17,8 @@ from ..support.lab.runs_with_residual import CAR, beside_with, recorded_by, runs
 
 @pytest.fixture(scope="module")
 def found() -> Comparison:
-    beside = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": 1.6})], 0.02), lasts_s=14.0)
-    return compare(runs_of(beside), replace(CAR, name="<b>mine</b> & yours"))
+    residuals = beside_with(recorded_by([("damper_asymmetry", {"rebound_to_bump_ratio": 1.6})], 0.02), lasts_s=14.0)
+    return compare(runs_of(residuals), replace(CAR, name="<b>mine</b> & yours"))
 
 
 class _Seen(HTMLParser):

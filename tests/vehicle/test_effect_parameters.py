@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from logger.store.formats.effect_file import shipped_effects
-from logger.vehicle.effect import chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, free_number, move_named, moved, moves_of, slope_of
+from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.effect_parameters import (
+    Move,
+    coordinates_of,
+    free_number,
+    move_named,
+    moved,
+    moves_of,
+    slope_of,
+    steps_of,
+)
 
 EFFECTS = shipped_effects()
 USUAL = [chosen(effect, effect.usual) for effect in EFFECTS.values()]
@@ -47,3 +59,23 @@ def test_a_strength_that_is_large_may_be_known_as_roughly_as_a_size() -> None:
     friction = free_number([chosen(EFFECTS["dry_friction"], {"friction_force_n": 60.0})], Move(0, 0))
     assert friction.weakest_at(10.0) * friction.unit == pytest.approx(30.0)
     assert friction.weakest_at(600.0) * friction.unit == pytest.approx(300.0)
+
+
+def own(name: str, start: float, low: float, high: float, trials: tuple[float, ...]) -> Parameter:
+    return Parameter(name, start, low, high, low, Scale.LINEAR, trials, "of an own effect")
+
+
+def test_numbers_that_begin_at_nothing_are_stepped_and_those_that_cannot_move_are_not() -> None:
+    class Own(SensorEffect):
+        name = "own"
+        parameters = (own("mass_kg", 0.0, 0.0, 100.0, (20.0,)), own("width_m", 0.0, 0.0, 3.0, (0.0,)),
+                      own("fixed_hz", 5.0, 5.0, 5.0, (5.0,)))
+
+        def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+            return np.ones_like(s)
+
+    effects = [chosen(Own(), {"mass_kg": 0.0, "width_m": 0.0, "fixed_hz": 5.0})]
+    moves = moves_of(effects)
+    assert [move.parameter for move in moves] == [0, 1]
+    assert steps_of(effects, moves) == pytest.approx([0.02 * 0.1 * 20, 0.02 * 0.1 * 3])
+    assert effects[0].at_an_end and not chosen(Own(), {"mass_kg": 1.0, "width_m": 1.0, "fixed_hz": 5.0}).at_an_end

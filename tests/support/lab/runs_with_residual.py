@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.beside import Beside
+from logger.lab.residuals.breakdown import ModelResiduals
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file
@@ -42,11 +42,11 @@ def a_run(name: str, speed_mps: float, lasts_s: float, seed: int, swing: float =
 
 
 @cache
-def _driven(lasts_s: float) -> tuple[SimulatedRuns, tuple[Array, ...], Beside]:
+def _driven(lasts_s: float) -> tuple[SimulatedRuns, tuple[Array, ...], ModelResiduals]:
     runs = SimulatedRuns([a_run(f"runs/run{i + 1}", speed, lasts_s, i) for i, speed in enumerate(SPEEDS_MPS)])
     car = compose(CAR)
     predictions = tuple(runs.predict(car))
-    return runs, predictions, Beside(runs.runs, car, predictions, runs.respond(car))
+    return runs, predictions, ModelResiduals(runs.runs, car, predictions, runs.respond(car))
 
 
 def measuring(run: Run, measured: Array) -> Run:
@@ -54,17 +54,17 @@ def measuring(run: Run, measured: Array) -> Run:
     return Run(run.name, run.rate_hz, measured, run.distance_m, run.speed_mps, run.track)
 
 
-def beside_with(residual: Residual, seed: int = 0, lasts_s: float = 40.0) -> Beside:
+def beside_with(residual: Residual, seed: int = 0, lasts_s: float = 40.0) -> ModelResiduals:
     """The model of the car beside measurements that differ from it by what ``residual`` gives for each run."""
     runs, predictions, nothing = _driven(lasts_s)
     rng = np.random.default_rng(seed)
     measured = [measuring(run, one + residual(run, one, rng)) for run, one in zip(runs.runs, predictions, strict=True)]
-    return Beside(measured, nothing.car, predictions, nothing.responses)
+    return ModelResiduals(measured, nothing.car, predictions, nothing.responses)
 
 
-def runs_of(beside: Beside) -> SimulatedRuns:
+def runs_of(residuals: ModelResiduals) -> SimulatedRuns:
     """The runs of a comparison, to predict."""
-    return SimulatedRuns(list(beside.runs))
+    return SimulatedRuns(list(residuals.runs))
 
 
 def recorded_by(effects: Sequence[tuple[str, dict[str, float]]], noise_mps2: float) -> Residual:

@@ -1,0 +1,199 @@
+"""The error of a run's distance, as a Gaussian process, and of its recorder.
+
+Problem: one recorder's distance is right to millimetres after a minute, another integrates a speed that is off by some
+centimetres a second, now more and now less. Solution: the error begins with a start, grows with a factor, and walks at
+random in between; what of the distance is rougher than any car drives is the recorder's as well. How large each of the
+first three is, the evidence of the runs says: the likelihood with the error integrated out (D. J. C. MacKay, Neural
+Computation 4, 1992), under a prior around what a good recorder does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from functools import cached_property
+from math import comb
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.priors import Tolerance
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+_SLOWEST_MPS = 0.5
+_KNOT_S, _MOST_KNOTS = 0.25, 480
+"""Knots lie so far apart; a run that would have more has them farther apart."""
+_SMOOTH_S = 1.0
+"""No car's speed changes by more than a cubic curve within so short a time."""
+_RECORDER = 2
+_UNUSUAL = 3.0  # standard deviations
+
+
+@dataclass(frozen=True)
+class ErrorSize:
+    """Standard deviations of a distance error: where a run begins [m], of the walk after one second, growing with the
+    root of the time [m], and of the factor, as a share."""
+
+    start_m: float = 0.004
+    walk_m: float = 0.004
+    scale: float = 0.0003
+
+    @property
+    def logs(self) -> Array:
+        """(3,) natural logarithms."""
+        return np.log(astuple(self))
+
+    @staticmethod
+    def of(logs: Array) -> ErrorSize:
+        """The reverse."""
+        return ErrorSize(*map(float, np.exp(logs)))
+
+    @property
+    def is_unusual(self) -> bool:
+        """Whether starts or factors are much farther off than a good recorder's: a late clock or a wrong speed may be
+        the cause."""
+        return max(self.start_m / USUAL.start_m, self.scale / USUAL.scale) > _UNUSUAL
+
+    @property
+    def cost(self) -> float:
+        """Minus twice the log of the prior density, without its constant."""
+        return float((((self.logs - USUAL.logs) / _LOG_DEVIATIONS) ** 2).sum())
+
+
+USUAL = ErrorSize()
+"""Of a good recorder."""
+# Priors of the logarithms of the three sizes. A walk of centimetres is common; a start or a factor that is ten times
+# as far off as usual is a late clock or a wrong wheel radius, which are effects.
+_LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
+
+
+@dataclass(frozen=True, eq=False)
+class RecordError:
+    """How the record of one run may be off, by numbers k: those of its distance (knots, the factor, the share of its
+    roughness), then two of its recorder (gain, droop).
+
+    basis    (n, k - 2) of the distance [m]
+    """
+
+    run: Run
+    basis: Array
+    tolerance: Tolerance
+
+    @staticmethod
+    def of(run: Run, tolerance: Tolerance) -> RecordError:
+        """That of a run."""
+        time_s = np.arange(run.count) / run.rate_hz
+        knots = min(max(2, round(time_s[-1] / _KNOT_S) + 1), _MOST_KNOTS)
+        place = time_s / time_s[-1] * (knots - 1)
+        hats = np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(knots)))
+        return RecordError(run, np.column_stack([hats, run.distance_m - run.distance_m[0], -_roughness(run)]),
+                           tolerance)
+
+    @property
+    def count(self) -> int:
+        """How many numbers there are."""
+        return self.basis.shape[1] + _RECORDER
+
+    @property
+    def knots(self) -> int:
+        """How many of them, the first ones, are of knots."""
+        return self.basis.shape[1] - 2
+
+    @property
+    def _knot_s(self) -> float:
+        return (self.run.count - 1) / self.run.rate_hz / (self.knots - 1)
+
+    def precision(self, size: ErrorSize) -> Array:
+        """Inverse covariance of k (k, k)."""
+        found = self._steps / (size.walk_m**2 * self._knot_s)
+        diagonal = np.einsum("ii->i", found)
+        diagonal[0] += size.start_m**-2
+        diagonal[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
+        return found
+
+    @cached_property
+    def _steps(self) -> Array:
+        """The walk's precision (k, k) if each of its steps had a deviation of one."""
+        found = np.zeros((self.count, self.count))
+        steps = np.diff(np.eye(self.knots), axis=0)
+        found[: self.knots, : self.knots] = steps.T @ steps
+        return found
+
+    def log_determinant(self, size: ErrorSize) -> float:
+        """Of the precision."""
+        walk = -(self.knots - 1) * np.log(size.walk_m**2 * self._knot_s)
+        return float(walk - 2 * np.log([size.start_m, size.scale, self.tolerance.gain, self.tolerance.droop]).sum())
+
+    def moved_m(self, k: Array) -> Array:
+        """By how much the car was farther than its distance signal said (n,)."""
+        samples = np.arange(self.run.count)
+        at = np.linspace(0, self.run.count - 1, self.knots)
+        return np.asarray(np.interp(samples, at, k[: self.knots]) + self.basis[:, -2:] @ k[self.knots : -_RECORDER])
+
+    def without_trend(self, k: Array) -> Array:
+        """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
+        moved, way = self.moved_m(k), self.run.distance_m - self.run.distance_m[0]
+        trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
+        found = self.through(moved - trend)
+        found[self.knots + 1 :] = k[self.knots + 1 :]
+        return found
+
+    def through(self, moved_m: Array) -> Array:
+        """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""
+        at = np.linspace(0, self.run.count - 1, self.knots)
+        return np.concatenate([np.interp(at, np.arange(self.run.count), moved_m), np.zeros(2 + _RECORDER)])
+
+    def recorded(self, prediction: Array, k: Array) -> Array:
+        """A prediction (n,) as such a recorder has it."""
+        rise = rate_of_change(prediction, self.run.rate_hz)
+        return np.asarray(prediction + k[-_RECORDER:] @ _by_recorder(prediction, rise, self.run))
+
+    def slopes(self, prediction: Array) -> Array:
+        """What each of k does to a prediction (n,): (k, n) [m/s2 per unit]."""
+        rise = rate_of_change(prediction, self.run.rate_hz)
+        by_place = rise / np.maximum(self.run.speed_mps, _SLOWEST_MPS)
+        return np.vstack([self.basis.T * by_place, _by_recorder(prediction, rise, self.run)])
+
+
+def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:
+    """By how much a distance is off at most (numbers (k,) per run), if that is more than a good recorder's is; else 0
+    [m]."""
+    found = 0.0
+    for one, k in zip(errors, record, strict=True):
+        run = one.run
+        usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * run.count / run.rate_hz
+                          + (USUAL.scale * np.ptp(run.distance_m)) ** 2)
+        off_m = float(np.abs(one.moved_m(k)).max())
+        found = max(found, off_m if off_m > _UNUSUAL * usual_m else 0.0)
+    return found
+
+
+def _roughness(run: Run) -> Array:
+    """What of a run's distance (n,) no car drives [m]."""
+    from scipy.signal import savgol_filter
+
+    size = min(round(_SMOOTH_S * run.rate_hz), run.count - 1) // 2 * 2 + 1
+    return np.asarray(run.distance_m - savgol_filter(run.distance_m, size, 3)) if size > 3 else np.zeros(run.count)
+
+
+def _by_recorder(prediction: Array, rise: Array, run: Run) -> Array:
+    """What the recorder's numbers do to a prediction (n,) that changes at these rates (n,): (2, n)."""
+    return np.stack([prediction, rate_of_change(rise, run.rate_hz) / (2 * np.pi * run.rate_hz) ** 2])
+
+
+def rate_of_change(samples: Array, rate_hz: float) -> Array:
+    """The derivative of evenly spaced samples (n,), right to 0.03 % up to a third of their rate: central differences of
+    order 48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be half of it at
+    30 Hz."""
+    half = len(_DIFFERENCES)
+    past_ends = np.pad(samples, half, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(past_ends, [*_DIFFERENCES[::-1], 0.0, *-_DIFFERENCES], mode="valid") * rate_hz)
+
+
+_HALF_ORDER = 24
+_DIFFERENCES = np.array([
+    (-1.0) ** (k + 1) * comb(2 * _HALF_ORDER, _HALF_ORDER - k) / (k * comb(2 * _HALF_ORDER, _HALF_ORDER))
+    for k in range(1, _HALF_ORDER + 1)
+])

@@ -1,0 +1,205 @@
+"""A posterior beside one of its states: normal equations, with the record's errors integrated out.
+
+Problem: some hundred numbers of each run's distance error are unknown beside a dozen of the car and a few of the
+effects. Solution: beside a state all of them act to first order, and those of one run's record touch that run alone.
+They are eliminated run by run (Schur complement), so that fits and tests of effects see small matrices only; and the
+sizes of the distance errors are those with the most evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.distance_error import ErrorSize, RecordError
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.vehicle.effect_parameters import moves_of
+
+Array = npt.NDArray[np.float64]
+
+_SIZE_STEP, _LEAST_SIZE_STEP = 0.8, 0.1  # of the logarithms of sizes
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """The record error of one run beside a state: its whitened slopes (k, kept), their products (k, k), how they pull
+    at its numbers (k,), and these."""
+
+    error: RecordError
+    white: Array
+    gram: Array
+    pull: Array
+    here: Array
+
+    def root(self, size: ErrorSize) -> Array:
+        """Cholesky's factor of the information (k, k), lower."""
+        return np.asarray(np.linalg.cholesky(self.gram + self.error.precision(size)), float)
+
+    def lack(self, size: ErrorSize) -> float:
+        """Minus twice the log of the evidence for a size, without its constant."""
+        from scipy.linalg import solve_triangular
+
+        precision, root = self.error.precision(size), self.root(size)
+        grown = solve_triangular(root, self.pull - precision @ self.here, lower=True)
+        return float(_log_determinant(root) - self.error.log_determinant(size)
+                     + self.here @ precision @ self.here - grown @ grown)
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Predictions beside a state with the most likely record errors: whitened residuals (kept,) per run, the numbers of
+    the record errors (k,) per run, and the squares of both."""
+
+    residuals: list[Array]
+    record: list[Array]
+    squares: float
+
+
+class LinearModel:
+    """A posterior beside a state.
+
+    numbers      slopes by the car's numbers (p, n) per run, taken near the state; None: these stay where they are
+    size         of the distance errors, by evidence
+    whiteners    by the levels under the state's residuals
+    """
+
+    def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
+        self.posterior, self.prior, self.numbers = posterior, posterior.prior, numbers
+        residuals = posterior.residuals(state)
+        self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
+        self._records = []
+        for error, whitener, prediction, residual, here in zip(
+                posterior.record_errors, self.whiteners, state.predictions, residuals, state.record, strict=True):
+            white = whitener(error.slopes(prediction))
+            self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
+        self.size = self._likeliest_size(state.size)
+        self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
+        self._precisions = [one.error.precision(self.size) for one in self._records]
+        self._roots = [one.root(self.size) for one in self._records]
+        count = len(posterior.prior.names) if numbers is not None else 0
+        self.white = [whitener(one) for whitener, one in zip(self.whiteners, numbers, strict=True)] if (
+            numbers is not None) else [np.empty((0, one.white.shape[1])) for one in self._records]
+        self._taken = self.taken(self.white)
+        self.count = count
+
+    def holding(self, names: Sequence[str]) -> LinearModel:
+        """The same with some of the car's numbers held where they are."""
+        away = [self.prior.names.index(name) for name in names if name in self.prior.names]
+        if not away or self.numbers is None:
+            return self
+        found = copy(self)
+        found.numbers = [one.copy() for one in self.numbers]
+        found.white = [one.copy() for one in self.white]
+        found._taken = [one.copy() for one in self._taken]
+        for number, white, taken in zip(found.numbers, found.white, found._taken, strict=True):
+            number[away], white[away], taken[:, away] = 0.0, 0.0, 0.0
+        return found
+
+    def without_wall(self) -> LinearModel:
+        """The same with a normal prior of the car's numbers, as far as they may go."""
+        found = copy(self)
+        found.prior = self.prior.without_wall()
+        return found
+
+    def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
+        """Coordinate by coordinate, in steps of its logarithm that become smaller."""
+        def lack(logs: Array) -> float:
+            found = ErrorSize.of(logs)
+            return sum(one.lack(found) for one in self._records) + found.cost
+
+        here = size.logs
+        least, step = lack(here), _SIZE_STEP
+        while step > _LEAST_SIZE_STEP:
+            before = least
+            for index in (1, 0, 2):
+                for way in (step, -step):
+                    there = here.copy()
+                    there[index] += way
+                    if (now := lack(there)) < least:
+                        here, least = there, now
+                        break
+            if least > before - 1.0:
+                step *= 0.4
+        return ErrorSize.of(here)
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log of the model's evidence at its state, without its constant: Laplace's approximation for
+        the record's errors, G. Schwarz's (Annals of Statistics 6, 1978) for the numbers of effects."""
+        posterior, state = self.posterior, self.state
+        occam = sum(_log_determinant(root) - one.error.log_determinant(self.size)
+                    for root, one in zip(self._roots, self._records, strict=True))
+        return (posterior.deviance(state) + posterior.cost(state) + occam
+                + len(moves_of(state.effects)) * float(np.log(posterior.freedom)))
+
+    def taken(self, white: Sequence[Array]) -> list[Array]:
+        """What the record's errors take of whitened columns (m, kept) per run: (k, m), to be multiplied with each
+        other."""
+        from scipy.linalg import solve_triangular
+
+        return [solve_triangular(root, one.white @ columns.T, lower=True)
+                for root, one, columns in zip(self._roots, self._records, white, strict=True)]
+
+    def whitened(self, columns: Sequence[Array]) -> list[Array]:
+        """Of each run, (n,) or (m, n) to (..., kept)."""
+        return [whitener(one) for whitener, one in zip(self.whiteners, columns, strict=True)]
+
+    def eliminated(self, predictions: Sequence[Array], laid: Sequence[Array] | None = None) -> Eliminated:
+        """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
+        from scipy.linalg import cho_solve
+
+        residuals, record, squares = [], [], 0.0
+        for measured, prediction, whitener, root, precision, one, here in zip(
+                self.posterior.measured, predictions, self.whiteners, self._roots, self._precisions, self._records,
+                self.state.record if laid is None else laid, strict=True):
+            white = whitener(measured - prediction)
+            owed = one.white @ white - precision @ here
+            step = cho_solve((root, True), owed)
+            residuals.append(white - step @ one.white)
+            record.append(here + step)
+            squares += float(white @ white + here @ precision @ here - owed @ step)
+        return Eliminated(residuals, record, squares)
+
+    def objective(self, predictions: Sequence[Array], logs: Array, laid: Sequence[Array] | None = None) -> float:
+        """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""
+        return self.eliminated(predictions, laid).squares + self.prior.cost(logs)
+
+    def information(self, logs: Array, own: Sequence[Array] | None = None) -> Array:
+        """On the car's numbers and those of whitened columns (m, kept) per run: (p + m, p + m)."""
+        p = self.count
+        found = sum(white @ white.T - taken.T @ taken for white, taken in zip(self.white, self._taken, strict=True))
+        found = np.asarray(found) + (np.diag(self.prior.curvature(logs)) if p else 0.0)
+        if own is None:
+            return found
+        taken_by_own = self.taken(own)
+        mixed = sum((one @ white.T - mine.T @ taken for one, mine, white, taken in zip(
+            own, taken_by_own, self.white, self._taken, strict=True)), np.zeros((len(own[0]), p)))
+        alone = sum((one @ one.T - mine.T @ mine for one, mine in zip(own, taken_by_own, strict=True)),
+                    np.zeros((len(own[0]), len(own[0]))))
+        return np.block([[found, mixed.T], [mixed, alone]])
+
+    def gradient(self, residuals: Sequence[Array], logs: Array, own: Sequence[Array] | None = None) -> Array:
+        """Which way the same numbers fit better (p + m,), by whitened residuals (kept,) per run."""
+        found = sum((white @ one for white, one in zip(self.white, residuals, strict=True)), np.zeros(self.count))
+        found = found - (self.prior.gradient(logs) if self.count else 0.0)
+        if own is None:
+            return found
+        pulled = sum((columns @ one for columns, one in zip(own, residuals, strict=True)), np.zeros(len(own[0])))
+        return np.concatenate([found, pulled])
+
+    def mixed(self, own: Sequence[Array]) -> tuple[Array, float]:
+        """Products of one whitened column (kept,) per run with those of the car's numbers (p,), and with itself."""
+        columns = [one[None] for one in own]
+        taken = self.taken(columns)
+        mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
+            self.white, self._taken, columns, taken, strict=True)), np.zeros(self.count))
+        return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, taken, strict=True))
+
+
+def _log_determinant(root: Array) -> float:
+    """Of a matrix with this factor."""
+    return 2 * float(np.log(np.diag(root)).sum())

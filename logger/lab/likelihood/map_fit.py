@@ -1,0 +1,193 @@
+"""Maximum a posteriori fits: the car's numbers, the effects' numbers and the distance errors together.
+
+Problem: twenty candidates are to be fitted in full, each together with a dozen numbers of the car and some hundred of
+the distance errors, in seconds. Solution: what the numbers of the car and the distance errors do to a prediction hardly
+depends on the candidate, so it is computed once for a model and kept while candidates are tried (``LinearModel``). Only
+the effect's own slopes are taken anew in each of Levenberg and Marquardt's steps, and every step is judged by a true
+prediction. Then the road is laid out anew where the distances are now, and weights and slopes follow the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.fitting.levenberg_marquardt import minimise
+from logger.lab.likelihood.lag import followed_m
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
+
+Array = npt.NDArray[np.float64]
+
+CONVERGED = 2.0
+"""A round of a fit that gains less than this in minus twice a log-likelihood is its last."""
+_ROUNDS, _STEPS, _ALIGNING_ROUNDS = 6, 5, 40
+_WORTH_ALIGNING = 0.02
+_SMALL_GAIN = 0.15
+# Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
+_STEP_IN_DEVIATIONS = 5.0
+_NEAR_M = 0.02
+"""A model that lies no farther off than this, a quarter of the shortest wave at walking pace, is aligned to the same
+places."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapFit:
+    """A fitted model, beside which it is linear.
+
+    numbers    slopes by the car's numbers (p, n) per run, taken near it
+    """
+
+    linear: LinearModel
+    numbers: list[Array]
+
+    @property
+    def posterior(self) -> Posterior:
+        """Of which it is the most likely state."""
+        return self.linear.posterior
+
+    @property
+    def state(self) -> State:
+        """The model, laid out."""
+        return self.linear.state
+
+
+def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, rounds: int = _ROUNDS,
+        worth: float = 0.0) -> MapFit:
+    """A model fitted in full from a state, which is laid out.
+
+    numbers    slopes by the car's numbers taken near the state; None: they are taken now
+    worth      what a round has to gain to be worth another one, if that is more than ``CONVERGED``
+    """
+    fresh = numbers is None
+    numbers = posterior.number_slopes(state, posterior.prior.steps) if numbers is None else numbers
+    moves = moves_of(state.effects)
+    best = now = LinearModel(posterior, state, numbers)
+    least = best.score
+    enough = max(CONVERGED, worth)
+    for done in range(1, rounds + 1):
+        trial = minimised(now, now.state, moves, _STEPS)
+        now = laid_out(posterior, trial, numbers, least)
+        gained = least - now.score
+        if gained > 0:
+            best, least = now, now.score
+        if done == rounds or (gained < enough and fresh):
+            break
+        if gained < enough or done == 1:
+            fresh, numbers = True, posterior.number_slopes(best.state, _fine_steps(best))
+            now = best = LinearModel(posterior, best.state, numbers)
+    return MapFit(best, numbers)
+
+
+def laid_out(posterior: Posterior, state: State, numbers: list[Array] | None, least: float) -> LinearModel:
+    """A state that was fitted to first order, laid out where its distances are; aligned anew where that is not as good
+    as the least score so far, because they are far from where they were."""
+    found = LinearModel(posterior, posterior.at(state.effects, state.logs, state.record, state.size), numbers)
+    if found.score < least:
+        return found
+    there, _ = _aligned_from(posterior, found.state, _WORTH_ALIGNING)
+    return LinearModel(posterior, there, numbers)
+
+
+def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> State:
+    """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
+    road from there, whichever is likelier."""
+    best, least = _aligned_from(posterior, state, worth)
+    for _ in range(2):
+        farther_m = [followed_m(run, one) for run, one in zip(posterior.runs.runs, best.predictions, strict=True)]
+        if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
+            break
+        record = [error.through(error.moved_m(k) + more) for error, k, more in zip(
+            posterior.record_errors, best.record, farther_m, strict=True)]
+        there, score = _aligned_from(posterior, posterior.at(state.effects, state.logs, record, best.size), worth)
+        if score > least - CONVERGED:
+            break
+        best, least = there, score
+    return best
+
+
+def _aligned_from(posterior: Posterior, state: State, worth: float) -> tuple[State, float]:
+    now = LinearModel(posterior, state)
+    best, least = now.state, now.score
+    first = least
+    for _ in range(_ALIGNING_ROUNDS):
+        found = now.eliminated(now.state.predictions)
+        now = LinearModel(posterior, posterior.at(state.effects, state.logs, found.record, now.size))
+        gained = least - now.score
+        if gained > 0:
+            best, least = now.state, now.score
+        if gained < max(CONVERGED, worth * (first - least)):
+            break
+    return best, least
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """A model beside a linear one: its predictions, laid out with these record errors, and half of what is
+    minimised."""
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    record: list[Array]
+    predictions: list[Array]
+    cost: float
+
+
+def minimised(linear: LinearModel, state: State, moves: Sequence[Move], most: int) -> State:
+    """Levenberg and Marquardt's steps on the car's numbers and those of the effects that move, with the most likely
+    distance errors to first order at each; at most so many."""
+    own: list[Array] | None = None
+    p = linear.count
+    known: tuple[Array, _Point, list[Array]] | None = None
+    realigns = any(state.effects[move.effect].effect.realigns for move in moves)
+
+    def evaluate(x: Array) -> _Point:
+        effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs
+        record = linear.state.record
+        if realigns and known is not None:
+            # What moves all of a run is made up for by its distance error: laid out without it, no step would be taken.
+            there, at, slopes = known
+            predictions = [one + (x - there)[p:] @ columns for one, columns in zip(at.predictions, slopes, strict=True)]
+            record = linear.eliminated(predictions, at.record).record
+        predictions = linear.posterior.predict(effects, logs, record)
+        return _Point(effects, logs, record, predictions, 0.5 * linear.objective(predictions, logs, record))
+
+    def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
+        nonlocal own, known
+        if moves and fresh:
+            slopes = effect_slopes(linear, at.effects, at.logs, moves, at.predictions, at.record)
+            own, known = linear.whitened(slopes), (x.copy(), at, slopes)
+        residuals = linear.eliminated(at.predictions, at.record).residuals
+        return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
+
+    start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
+    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: _SMALL_GAIN, most_rounds=most).at
+    record = linear.eliminated(best.predictions, best.record).record
+    return State(best.effects, best.logs, record, linear.size, best.predictions)
+
+
+def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[Move],
+                  predictions: Sequence[Array], record: Sequence[Array] | None = None) -> list[Array]:
+    """What the effects' numbers do to predictions, on the scales of the parameters: (m, n) per run; laid out with the
+    record errors of the model, or with others."""
+    laid = linear.state.record if record is None else record
+    here = coordinates_of(effects, moves)
+    found = [np.empty((len(moves), len(one))) for one in predictions]
+    for index, step in enumerate(steps_of(effects, moves)):
+        there = here.copy()
+        there[index] += step
+        shifted = linear.posterior.predict(moved(effects, moves, there), logs, laid)
+        for column, high, low in zip(found, shifted, predictions, strict=True):
+            column[index] = (high - low) / step
+    return found
+
+
+def _fine_steps(linear: LinearModel) -> Array:
+    """Of the logarithms of the car's numbers (p,), by how well they are known."""
+    sizes = np.sqrt(np.diag(linear.information(linear.state.logs)))
+    return np.minimum(linear.posterior.prior.steps, _STEP_IN_DEVIATIONS / sizes)

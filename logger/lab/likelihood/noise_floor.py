@@ -1,0 +1,106 @@
+"""The noise of the sensors, which is not given, from the residuals of a model; and the error that it alone makes.
+
+Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
+moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
+well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more, the
+quietest first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+
+Array = npt.NDArray[np.float64]
+
+# A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty alone, which
+# is two deviations of its own below the others by chance, from so many.
+_LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
+# Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
+# over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).
+_FILTERED = 0.75
+# Where no fit was made, bands that hold so large a share and are equally loud are flat noise if next to nothing of it
+# is left behind the filter: what a car leaves falls towards the highest of them, and the sensor's own noise is
+# still there. Below so many hertz all bands are full of what the road does.
+_FLAT, _DEAF, _MOVED_HZ = 0.22, 0.01, 30.0
+UNEXPLAINED = 0.10
+"""A residual above the noise by this share of it, or more, is unexplained."""
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of the sensors: its deviation, and how certain that is [m/s2]."""
+
+    deviation_mps2: float
+    standard_error_mps2: float
+
+
+def noise_of(posterior: Posterior, state: State) -> Noise:
+    """The sensor's noise under the residuals of a fitted state."""
+    return sensor_noise(posterior.bands, posterior.residuals(state), DISCREPANCY * posterior.size_mps2)
+
+
+def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
+    """The sensor's noise under residuals (n,), per run; no less than ``least_mps2``.
+
+    fitted    a fit left them, so that where little is left it is noise; else bands have to be as loud as each other to
+              be taken for noise that was filtered, and none but the highest frequencies tell of noise that was not
+    """
+    quiet = [one.quiet(residual) for one, residual in zip(bands, residuals, strict=True)]
+    freedom = sum(n for _, n in quiet)
+    power = sum(level * n for level, n in quiet) / freedom
+    highest = power, freedom
+    powers = [one.power(residual) for one, residual in zip(bands, residuals, strict=True)]
+    places = range(min(map(len, powers)))
+    freedoms = [sum(float(one.freedom[place]) for one in bands) for place in places]
+    levels = [sum(float(one.freedom[place] * own[place]) for one, own in zip(bands, powers, strict=True))
+              / freedoms[place] for place in places]
+    by_level = sorted(zip(levels, freedoms, strict=True))
+    louder = _LOUDER
+    if power < _FILTERED * by_level[0][0]:
+        (power, freedom), *by_level = by_level
+        louder = _LOUDER_THAN_QUIETEST
+    for level, n in by_level:
+        if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
+            break
+        power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
+    flat = freedom > _FLAT * sum(freedoms) and all(one.edges_hz[-1] > _MOVED_HZ for one in bands)
+    if not fitted and not (flat and highest[0] < _DEAF * power):
+        power, freedom = highest
+    power = max(power, least_mps2**2)
+    return Noise(float(np.sqrt(power)), float(np.sqrt(power / (2 * freedom))))
+
+
+def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
+    """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
+    least 0. Bands that are quiet make up for those that are not."""
+    noise = ((1 + UNEXPLAINED) * noise_of(posterior, state).deviation_mps2) ** 2
+    return max(0.0, sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise, one.floor)))
+                        for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True)))
+
+
+def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> float:
+    """By what share the residual is above the noise, and above what two right simulations differ by, in the run where
+    it is most. A run so short that noise alone may do the same with this probability counts only as far as asks for no
+    explanation."""
+    from scipy.special import gammainccinv
+
+    found = []
+    for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True):
+        freedom = float(one.freedom.sum())
+        expected = one.freedom @ (noise.deviation_mps2**2 + one.floor)
+        above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
+        by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / len(posterior.bands)) / (freedom / 2))) - 1
+        found.append(above if above > by_chance else min(above, UNEXPLAINED))
+    return max(found)
+
+
+def floor_error(posterior: Posterior, noise: Noise) -> float:
+    """rms(noise) / rms(measured) over all samples that count."""
+    return noise.deviation_mps2 / posterior.size_mps2

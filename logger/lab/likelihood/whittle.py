@@ -1,0 +1,111 @@
+"""The likelihood of a run's residuals, whose level is free in each band of frequency.
+
+Problem: the noise that a model leaves differs between runs and between frequencies, and no model of a car is exact.
+Solution: residual power is measured by Welch's method in bands. With a free level in each, minus twice the logarithm of
+the likelihood is the sum of n ln P over the bands (P. Whittle 1953, concentrated), n = 2 B T being the degrees of
+freedom of bandwidth B in the time T. No level is below the discrepancy between two right simulations of a car, which is
+a share of what was measured in the same band.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+DISCREPANCY = 0.003
+"""By what share of the signal in a band two right simulations of one car differ: measured between this simulation and
+one by Newton's laws in fine steps, of cars with dry friction, which differ most."""
+_BLOCK_S = 3.0
+_HIGHEST_OF_RATE = 0.37
+_TINY = 1e-12  # [m2/s4]
+_ROUNDED = 1e-3  # samples: a rate is read off times that were rounded
+# Ends of the bands at 100 samples a second [Hz].
+_EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
+             30.0, 33.5, 37.0)
+# Of the highest frequencies, where a car leaves nothing and the recorder's filter even less.
+_QUIET_OF_RATE = (0.465, 0.5)
+
+
+class Bands:
+    """The bands of one run.
+
+    edges_hz    their ends (b + 1,) [Hz]
+    freedom     degrees of freedom of each (b,)
+    floor       the least level of each (b,) [m2/s4], as white noise of that level would have in all
+    """
+
+    def __init__(self, run: Run) -> None:
+        rate = run.rate_hz
+        self.rate_hz, self.first, self.count = rate, run.first, run.count
+        kept = run.count - run.first
+        size = min(int(_BLOCK_S * rate + _ROUNDED), kept)
+        self._size = size
+        taper = np.hanning(size + 1)[:-1]
+        self._taper = taper / np.sqrt((taper**2).mean())
+        starts = np.ceil(np.arange(0, kept, 0.5 * _BLOCK_S * rate) - _ROUNDED).astype(int)
+        self._starts = starts[starts <= kept - size]
+        f_hz = np.fft.rfftfreq(size, 1 / rate)
+        edges = np.array([one for one in _EDGES_HZ if one < _HIGHEST_OF_RATE * rate - 0.5] + [_HIGHEST_OF_RATE * rate])
+        self.edges_hz = edges
+        self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
+        self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
+        self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept
+        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2), _TINY)
+
+    def power(self, residual: Array) -> Array:
+        """Mean power (b,) of a residual (n,), whole, as if it were white [m2/s4]."""
+        spectrum = self._spectrum(residual)
+        return np.array([spectrum[one].mean() for one in self._members])
+
+    def levels(self, residual: Array) -> Array:
+        """The most likely levels (b,) under a residual (n,)."""
+        return np.maximum(self.power(residual), self.floor)
+
+    def deviance(self, residual: Array) -> float:
+        """Minus twice the log-likelihood of a residual (n,), without its constant."""
+        power = self.power(residual)
+        level = np.maximum(power, self.floor)
+        return float(self.freedom @ (np.log(level) + power / level - 1))
+
+    def quiet(self, residual: Array) -> tuple[float, float]:
+        """Mean power of a residual where nothing but the sensor's noise is, as if it were white, and its freedom."""
+        freedom = 2 * len(self._quiet) / self._size * (self.count - self.first)
+        return float(self._spectrum(residual)[self._quiet].mean()), freedom
+
+    def whitener(self, residual: Array) -> Whitener:
+        """Weights by the levels under a residual (n,)."""
+        return Whitener(self, self.levels(residual))
+
+    def _spectrum(self, residual: Array) -> Array:
+        """Mean power per frequency, scaled so that white noise has its variance at each."""
+        blocks = np.lib.stride_tricks.sliding_window_view(residual[self.first:], self._size)[self._starts]
+        return np.asarray((np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2).mean(axis=0) / self._size)
+
+
+class Whitener:
+    """Weighs each band of one run by its level."""
+
+    def __init__(self, bands: Bands, levels: Array) -> None:
+        self._first, self._count = bands.first, bands.count - bands.first
+        f_hz = np.fft.rfftfreq(self._count, 1 / bands.rate_hz)
+        edges = bands.edges_hz
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        level = np.exp(np.interp(f_hz, middle, np.log(levels)))
+        self._gain = np.where((f_hz >= edges[0]) & (f_hz < edges[-1]), 1 / np.sqrt(level), 0.0)
+
+    def __call__(self, samples: Array) -> Array:
+        """(n,) or (columns, n), whole, to the samples that count (..., kept), in units of the noise."""
+        part = samples[..., self._first:]
+        return np.asarray(np.fft.irfft(np.fft.rfft(part, axis=-1) * self._gain, self._count, axis=-1))
+
+
+def deviance(bands: Sequence[Bands], residuals: Sequence[Array]) -> float:
+    """Of several runs together."""
+    return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))

@@ -1,0 +1,4 @@
+"""What the residuals of a model look like: where their power sits, and tests that know no effect.
+
+Reading order: breakdown, road_coherence, force_state_map, spectral_lines, residual_tests; unexplained.
+"""

@@ -1,0 +1,266 @@
+"""The residuals of a model, and where their power sits.
+
+Problem: one number says that a model fails, not where. Solution: ``ModelResiduals`` holds runs, what a car would have
+recorded in them, and how it moved; ``breakdown`` shares the power of the residuals out over the bands of the car's own
+vibrations, over speed, over how strongly the road moves the car, and over the places of each road. Shares are of the
+power of measured - model over all samples that count, so that each list of shares adds up to 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.runs import Run
+from logger.vehicle.compose import Car, Response
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.simulate import PASS_OF_RATE
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+SEGMENT_S = 2.56
+"""Spectra are means over segments so long, of which each overlaps half of the next."""
+BLOCK_S = 1.0
+"""Blocks so long count as independent, and are what speed and excitation are asked of."""
+BAND_NAMES = ("below body bounce", "body bounce", "between", "wheel hop", "above wheel hop", "far above wheel hop",
+              "beyond the recorder's filter")
+_BODY_SPREAD, _HOP_SPREAD = 1.35, 1.3
+_LEVELS = 4
+_SPEED_BINS = 6
+_PLACE_S = 0.6
+_STEPS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+
+
+@dataclass(frozen=True)
+class Band:
+    """Frequencies from ``from_hz`` up to ``to_hz``, as people call them."""
+
+    name: str
+    from_hz: float
+    to_hz: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the data: its share of the power left out, and its error (rms left / rms measured, in it; NaN where
+    nothing was measured).
+
+    low, high    its ends, in the unit of the list it stands in
+    left_mps2    rms of what is left in it
+    samples      in it; of a band all
+    name         of a band, or of the run that a place is in; else empty
+    """
+
+    low: float
+    high: float
+    error: float
+    share: float
+    left_mps2: float
+    samples: int
+    name: str = ""
+
+    def error_told(self, digits: int) -> str:
+        """The error with so many digits behind the point; a dash where there is none."""
+        return f"{self.error:.{digits}f}" if np.isfinite(self.error) else "-"
+
+
+@dataclass(frozen=True)
+class Breakdown:
+    """Where what is left sits: by frequency [Hz], speed [m/s], rms of the model's acceleration [m/s2], place [m]."""
+
+    frequency: tuple[Part, ...]
+    speed: tuple[Part, ...]
+    amplitude: tuple[Part, ...]
+    place: tuple[Part, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelResiduals:
+    """Runs and what a car would have recorded in them.
+
+    predictions    (n,) per run, whole
+    responses      how the car moved, per run
+    """
+
+    runs: Sequence[Run]
+    car: Car
+    predictions: Sequence[Array]
+    responses: Sequence[Response]
+
+    @property
+    def rate_hz(self) -> float:
+        """The same in all runs."""
+        return self.runs[0].rate_hz
+
+    @cached_property
+    def left(self) -> list[Array]:
+        """measured - model, the samples that count, per run [m/s2]."""
+        return [(run.measured_mps2 - one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
+
+    @cached_property
+    def measured(self) -> list[Array]:
+        """The samples that count, per run [m/s2]."""
+        return [run.measured_mps2[run.first:] for run in self.runs]
+
+    @cached_property
+    def model(self) -> list[Array]:
+        """The samples that count, per run [m/s2]."""
+        return [one[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
+
+    def kept(self, of: Callable[[Run], Array]) -> list[Array]:
+        """Something of each run, the samples that count."""
+        return [of(run)[run.first:] for run in self.runs]
+
+    @cached_property
+    def bands(self) -> tuple[Band, ...]:
+        """Body and wheels of this car, and what lies below, between and above, up to half the sample rate."""
+        structure = structure_of(self.car.vehicle)
+        own_hz = undamped_frequencies_hz(structure)
+        body_hz, wheels_hz = own_hz[: -len(structure.wheels)], own_hz[-len(structure.wheels):]
+        between = np.sqrt(body_hz[-1] * wheels_hz[0])
+        top, above = self.rate_hz / 2, wheels_hz[-1] * _HOP_SPREAD
+        kept = max(PASS_OF_RATE * self.rate_hz, above)
+        ends = [0.0, body_hz[0] / _BODY_SPREAD, min(body_hz[-1] * _BODY_SPREAD, between),
+                max(wheels_hz[0] / _HOP_SPREAD, between), above, np.sqrt(above * kept), kept, top]
+        rounded = [round(float(min(end, top)), 2) for end in ends]
+        return tuple(Band(name, low, high) for name, (low, high) in zip(BAND_NAMES, pairwise(rounded), strict=True)
+                     if high > low)
+
+
+def breakdown(residuals: ModelResiduals) -> Breakdown:
+    """Where what is left sits."""
+    return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
+
+
+def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
+    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
+    numbers; others by their ends. None where there is no such part."""
+    known = {one.name or (one.low, one.high): one for one in before}
+    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
+
+
+# --- tools that the residual tests share ---
+
+
+def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray[np.complex128]:
+    """Spectra of all segments of some signals [(n,), ...]: (segments, frequencies), scaled to mean powers.
+
+    Segments are tapered (Hann). They are as long as the longest run at most; a run shorter than one gives none.
+    """
+    size = segment_size(residuals)
+    taper = np.hanning(size + 1)[:-1]
+    taper = taper / np.sqrt((taper**2).sum() * size)
+    blocks = [np.lib.stride_tricks.sliding_window_view(one, size)[:: max(1, size // 2)]
+              for one in signals if len(one) >= size]
+    spectra = np.fft.rfft(np.concatenate(blocks) * taper, axis=1)
+    spectra[:, 1:] *= np.sqrt(2.0)
+    return np.asarray(spectra)
+
+
+def segment_size(residuals: ModelResiduals) -> int:
+    """Samples in a segment, an even number."""
+    longest = max(map(len, residuals.left))
+    return min(round(SEGMENT_S * residuals.rate_hz), longest) // 2 * 2
+
+
+def frequencies(residuals: ModelResiduals) -> Array:
+    """Of the spectra of ``segments`` [Hz]."""
+    return np.asarray(np.fft.rfftfreq(segment_size(residuals), 1 / residuals.rate_hz))
+
+
+def block_means(residuals: ModelResiduals, signals: Sequence[Array], seconds: float = BLOCK_S) -> Array:
+    """Means over blocks of so many seconds, all runs one after the other (b,); what is over at an end is left out."""
+    size = max(2, round(seconds * residuals.rate_hz))
+    return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
+
+
+def running_rms(signal: Array, samples: int) -> Array:
+    """Root-mean-square around each sample (n,)."""
+    width = min(samples, len(signal))
+    mean: Array = np.convolve(signal**2, np.full(width, 1 / width), mode="same").astype(np.float64)
+    return np.asarray(np.sqrt(np.maximum(mean, 0.0)))
+
+
+def short_names(runs: Sequence[Run]) -> dict[str, str]:
+    """What to call runs in a sentence, by name: the last folder of each, or all of the name where those are alike."""
+    last = {run.name: run.name.rstrip("/").rpartition("/")[2] for run in runs}
+    return last if len(set(last.values())) == len(runs) else {run.name: run.name for run in runs}
+
+
+def place_length_m(runs: Sequence[Run]) -> float:
+    """How long the places are, into which the roads are cut: about what a car drives in half a second."""
+    usual = float(np.median(np.concatenate([run.speed_mps[run.first:] for run in runs])))
+    return next((step for step in _STEPS_M if step >= _PLACE_S * usual), _STEPS_M[-1])
+
+
+# --- the four lists ---
+
+
+def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
+    left, measured = (np.mean(np.abs(segments(residuals, one)) ** 2, axis=0)
+                      for one in (residuals.left, residuals.measured))
+    f_hz, whole = frequencies(residuals), float(left.sum())
+    found = []
+    for band in residuals.bands:
+        inside = (f_hz >= band.from_hz) & ((f_hz < band.to_hz) | (band is residuals.bands[-1]))
+        part, of = float(left[inside].sum()), float(measured[inside].sum())
+        found.append(Part(band.from_hz, band.to_hz, _ratio(part, of), part / whole if whole > 0 else 0.0,
+                          float(np.sqrt(part)), sum(map(len, residuals.left)), band.name))
+    return tuple(found)
+
+
+def _by_speed(residuals: ModelResiduals) -> tuple[Part, ...]:
+    speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
+    low, high = float(speed.min()), float(speed.max())
+    step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= _SPEED_BINS), 50.0)
+    edges = np.arange(np.floor(low / step), np.floor(high / step) + 2) * step
+    return _binned(residuals, speed, edges)
+
+
+def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
+    size = round(BLOCK_S * residuals.rate_hz)
+    level = np.concatenate([running_rms(one, size) for one in residuals.model])
+    edges = np.unique(np.quantile(level, np.linspace(0, 1, _LEVELS + 1)))
+    if len(edges) == 1:  # a model that does not move
+        edges = np.array([edges[0], edges[0] + 1e-9])
+    edges[-1] = np.nextafter(edges[-1], np.inf)
+    return _binned(residuals, level, edges)
+
+
+def _by_place(residuals: ModelResiduals) -> tuple[Part, ...]:
+    length = place_length_m(residuals.runs)
+    whole = sum(float(one @ one) for one in residuals.left)
+    found: list[Part] = []
+    for run, left, measured in zip(residuals.runs, residuals.left, residuals.measured, strict=True):
+        at = run.distance_m[run.first:]
+        edges = np.arange(np.floor(at.min() / length), np.floor(at.max() / length) + 2) * length
+        found += _parts(at, edges, left, measured, whole, run.name)
+    return tuple(found)
+
+
+def _binned(residuals: ModelResiduals, values: Array, edges: Array) -> tuple[Part, ...]:
+    left, measured = np.concatenate(residuals.left), np.concatenate(residuals.measured)
+    return tuple(_parts(values, edges, left, measured, float(left @ left)))
+
+
+def _parts(values: Array, edges: Array, left: Array, measured: Array, whole: float, name: str = "") -> list[Part]:
+    """Bins [edge, next edge) that hold samples."""
+    index = np.searchsorted(edges, values, side="right") - 1
+    bins = len(edges) - 1
+    count = np.bincount(index, minlength=bins)
+    power, of = (np.bincount(index, one**2, minlength=bins) for one in (left, measured))
+    return [Part(float(edges[i]), float(edges[i + 1]), _ratio(power[i], of[i]),
+                 float(power[i] / whole) if whole > 0 else 0.0, float(np.sqrt(power[i] / count[i])), int(count[i]),
+                 name)
+            for i in np.flatnonzero(count)]
+
+
+def _ratio(power: float, of: float) -> float:
+    return float(np.sqrt(power / of)) if of > 0 else float("nan")

@@ -1,0 +1,223 @@
+"""The missing force: which force in the suspensions, by their rate and travel, would leave this residual.
+
+Problem: one accelerometer on the body, and a force that is missing somewhere below it changes the motion that makes it.
+Solution: a small force that the model lacks passes through the model's own transfer from a suspension to the sensor. So
+the forces of hat functions, of rate and of travel as the model has them, are sent through that transfer, and the
+residual is the sum of what arrives: a regression, whose coefficients are the missing force at the knots (the
+force-state map of S. F. Masri and T. K. Caughey 1979, by output error). What another linear spring or damper, another
+gain or a small shift in time would do is left out of it, as a few per cent of those are never physics. Both sides pass
+the residual's own autoregressive whitening first, so that coloured noise does not feign evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.residual_whiteness import autocorrelation
+from logger.lab.residuals.breakdown import ModelResiduals
+from logger.vehicle.passage import smooth_length
+from logger.vehicle.stepping import force_input
+
+Array = npt.NDArray[np.float64]
+Shape = Callable[[Array, Array], Array]
+
+# Knots, in units of the r.m.s. of what they are of.
+_KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])
+_USED = tuple(int(index) for index in np.flatnonzero(_KNOTS))
+_ORDER = 12
+_HIGHEST_OF_RATE = 0.4
+_RANK = 1e-9
+_NOTHING = 1e-100
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A missing force by one coordinate: knots (k,), force and its standard error [N] in each suspension.
+
+    What a linear law would do is taken out of it. p_value: of a force so large by chance; share: of the power left
+    """
+
+    at: Array
+    force_n: Array
+    error_n: Array
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term: its coefficient with its standard error, how probable one so large would be by chance, and the share of
+    the power left that it explains."""
+
+    value: float
+    error: float
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class ForceMap:
+    """The missing force.
+
+    by_rate [m/s], by_travel [m]
+    asymmetry     coefficient of |rate|: what extension has more than compression [N s/m]
+    progression   coefficient of rate |rate| [N s2/m2]: above 0 the damper stiffens with speed, below it yields
+    hardening     coefficient of travel^3 [N/m3]
+    """
+
+    by_rate: Curve
+    by_travel: Curve
+    asymmetry: Term
+    progression: Term
+    hardening: Term
+
+
+def force_map(residuals: ModelResiduals) -> ForceMap:
+    """The force that is missing in the suspensions, the same law in each."""
+    rate_rms, travel_rms = (float(np.sqrt(np.mean(np.concatenate([getattr(one, name).ravel() for one in
+                            residuals.responses]) ** 2))) or 1.0 for name in ("rate_mps", "travel_m"))
+    rate_knots, travel_knots = _KNOTS * rate_rms, _KNOTS * travel_rms
+    regression = _Regression(residuals)
+    return ForceMap(
+        _curve(regression, residuals, rate_knots, [_hat(rate_knots, index, of_rate=True) for index in _USED]),
+        _curve(regression, residuals, travel_knots, [_hat(travel_knots, index, of_rate=False) for index in _USED]),
+        regression.term(_through(residuals, [lambda _, rate: np.abs(rate)])),
+        regression.term(_through(residuals, [lambda _, rate: rate * np.abs(rate)])),
+        regression.term(_through(residuals, [lambda travel, _: travel**3])))
+
+
+def whitening(left: Sequence[Array]) -> Array:
+    """Filter (p + 1,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white."""
+    if autocorrelation(left, 0).passed:
+        return np.ones(1)
+    count = sum(map(len, left))
+    lags = np.array([sum(float(one[: len(one) - lag] @ one[lag:]) for one in left) / count
+                     for lag in range(_ORDER + 1)])
+    lags[0] *= 1 + 1e-6
+    table = lags[np.abs(np.arange(_ORDER)[:, None] - np.arange(_ORDER))]
+    return np.concatenate([[1.0], -np.linalg.solve(table, lags[1:])])
+
+
+class _Regression:
+    """The residual, and what is never physics, whitened."""
+
+    def __init__(self, residuals: ModelResiduals) -> None:
+        self._filter = whitening(residuals.left)
+        wheels = range(residuals.responses[0].rate_mps.shape[1])
+        linear = [_through(residuals, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
+        rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
+        nuisance = [np.column_stack([*(one[index] for one in linear), model, rate])
+                    for index, (model, rate) in enumerate(zip(residuals.model, rates, strict=True))]
+        self._plain, self._white = (_Without(np.concatenate(left), np.concatenate(columns)) for left, columns in (
+            (residuals.left, nuisance), (self._whitened(residuals.left), self._whitened(nuisance))))
+
+    def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
+        """Coefficients (k,), their covariance (k, k), the p-value of all together, and the share that they explain."""
+        from scipy.stats import f
+
+        coefficients, covariance, rank, power, left = self._white.fit(np.concatenate(self._whitened(columns)))
+        freedom = self._white.freedom - rank
+        if rank == 0 or not left > 0:
+            return coefficients, covariance, float("nan"), 0.0
+        variance = left / freedom
+        p_value = float(f.sf((power - left) / rank / variance, rank, freedom))
+        _, _, rank, power, left = self._plain.fit(np.concatenate(columns))
+        share = 1 - left / power * self._plain.freedom / (self._plain.freedom - rank) if power > 0 else 0.0
+        return coefficients, covariance * variance, p_value, max(share, 0.0)
+
+    def term(self, columns: Sequence[Array]) -> Term:
+        """Of one column."""
+        coefficients, covariance, p_value, share = self.fitted(columns)
+        return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
+
+    def _whitened(self, signals: Sequence[Array]) -> list[Array]:
+        order = len(self._filter) - 1
+        return [sum((weight * one[order - lag : len(one) - lag] for lag, weight in enumerate(self._filter)),
+                    np.zeros_like(one[order:])) for one in signals]
+
+
+class _Without:
+    """A target (n,) and columns without what other columns (n, m) explain."""
+
+    def __init__(self, target: Array, others: Array) -> None:
+        scaled = others / np.maximum(np.sqrt((others**2).sum(axis=0)), 1e-300)
+        left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+        self._basis = left[:, values > _RANK * values[0]]
+        self._target = self._removed(target)
+        self.freedom = len(target) - self._basis.shape[1]
+
+    def _removed(self, values: Array) -> Array:
+        return np.asarray(values - self._basis @ (self._basis.T @ values))
+
+    def fit(self, columns: Array) -> tuple[Array, Array, int, float, float]:
+        """Coefficients (k,), (X'X)^-1, the rank, and the squares of the target before and after."""
+        size = np.sqrt((columns**2).sum(axis=0))
+        size = np.where(size > _NOTHING, size, 1.0)
+        gram = self._removed(columns / size)
+        product = gram.T @ gram
+        values, vectors = np.linalg.eigh(product)
+        kept = values > 1e-7
+        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+        coefficients = inverse @ (gram.T @ self._target)
+        before = float(self._target @ self._target)
+        after = before - float(coefficients @ product @ coefficients)
+        return coefficients / size, inverse / np.outer(size, size), int(kept.sum()), before, after
+
+
+def _curve(regression: _Regression, residuals: ModelResiduals, knots: Array, shapes: Sequence[Shape]) -> Curve:
+    used = list(_USED)
+    coefficients, covariance, p_value, share = regression.fitted(_through(residuals, shapes))
+    # What a straight line through 0 would do is not told apart from a spring or damper a little off: it is taken out,
+    # the middle counting as it is driven.
+    weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
+    line = knots[used]
+    straight = np.eye(len(used)) - np.outer(line, weight * line) / float(weight @ line**2)
+    force, errors = np.zeros_like(knots), np.zeros_like(knots)
+    force[used] = straight @ coefficients
+    errors[used] = np.sqrt(np.maximum(np.diag(straight @ covariance @ straight.T), 0.0))
+    return Curve(knots, force, errors, p_value, share)
+
+
+def _through(residuals: ModelResiduals, shapes: Sequence[Shape]) -> list[Array]:
+    """What forces of these shapes in the suspensions leave at the sensor: (n, k) per run, the samples that count."""
+    structure = residuals.car.structure
+    n, w = len(structure.mass), len(structure.wheels)
+    a, _ = structure.state_space()
+    push = force_input(structure)[:, :w]
+    found = []
+    for run, response in zip(residuals.runs, residuals.responses, strict=True):
+        length = smooth_length(run.count + round(4 * run.rate_hz))
+        f_hz = np.fft.rfftfreq(length, 1 / run.rate_hz)
+        kept = np.flatnonzero(f_hz < _HIGHEST_OF_RATE * run.rate_hz)
+        s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
+        states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
+        transfer = (np.einsum("n,fnw->fw", residuals.car.row @ a[n:], states) + residuals.car.row @ push[n:])
+        transfer *= residuals.car.factor(s)[:, None]
+        columns = []
+        for shape in shapes:
+            force = np.fft.rfft(shape(response.travel_m, response.rate_mps), length, axis=0)
+            arriving = np.zeros(len(f_hz), dtype=np.complex128)
+            arriving[kept] = (force[kept] * transfer).sum(axis=1)
+            columns.append(np.fft.irfft(arriving, length)[run.first : run.count])
+        found.append(np.stack(columns, axis=1))
+    return found
+
+
+def _straight(wheel: int, of_rate: bool) -> Shape:
+    """A linear damper or spring of one wheel alone."""
+    def shape(travel: Array, rate: Array) -> Array:
+        return (rate if of_rate else travel) * np.eye(rate.shape[1])[wheel]
+
+    return shape
+
+
+def _hat(knots: Array, index: int, of_rate: bool) -> Shape:
+    """1 at one knot, 0 at its neighbours, straight between; beyond the outermost knots it stays."""
+    def shape(travel: Array, rate: Array) -> Array:
+        return np.interp(rate if of_rate else travel, knots, np.eye(len(knots))[index])
+
+    return shape

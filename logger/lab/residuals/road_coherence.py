@@ -1,0 +1,92 @@
+"""How much of what is left the road has caused: the multiple coherence of residual and road.
+
+Problem: noise leaves a residual as well as missing physics does; only the second follows the road. Solution: in
+segments of each run the spectrum of the residual is fitted by those of the road's slope under the front and the rear
+wheels, frequency by frequency (J. S. Bendat and A. G. Piersol, Random Data, 2010, chapter 7). Without any connection
+the share that q inputs explain of n segments is Beta(q, n - q) at every frequency, so that -ln(1 - share) has a mean
+and a variance from polygamma functions; sums over frequencies are taken as gamma distributed with their mean and
+variance. Neighbouring frequencies of tapered segments tell the same: every other one counts for the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+# Segments that overlap by half, with a Hann taper, are worth so much of their number (P. D. Welch 1967).
+_WORTH = 0.947
+_EVERY = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Coherence:
+    """By frequency (f,): the share of the residual's power that follows the road, without what chance would explain.
+
+    raw        before that correction
+    inputs     q
+    segments   n, as many as independent ones
+    power      of the residual [m2/s4 in each frequency]
+    """
+
+    f_hz: Array
+    share: Array
+    raw: Array
+    inputs: int
+    segments: float
+    power: Array
+
+    def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
+        """Between two frequencies: the share of the power left, and how probable it would be by chance."""
+        from scipy.special import digamma, polygamma
+        from scipy.stats import gamma
+
+        inside = np.flatnonzero((self.f_hz >= low_hz) & (self.f_hz < high_hz) & (self.f_hz > 0))
+        power = float(self.power[inside].sum())
+        q, n = self.inputs, self.segments
+        if not power > 0 or n <= q + 1:
+            return 0.0, float("nan")
+        share = float((self.share[inside] * self.power[inside]).sum() / power)
+        tested = self.raw[inside[::_EVERY]]
+        statistic = -float(np.log1p(-np.minimum(tested, 1 - 1e-12)).sum())
+        mean = len(tested) * float(digamma(n) - digamma(n - q))
+        variance = len(tested) * float(polygamma(1, n - q) - polygamma(1, n))
+        return max(share, 0.0), float(gamma.sf(statistic, mean**2 / variance, scale=variance / mean))
+
+
+def with_road(residuals: ModelResiduals) -> Coherence:
+    """Of the residual and the road under the wheels that the car has."""
+    inputs = [_slopes(residuals, behind_m) for behind_m in np.unique(residuals.car.structure.behind_m)]
+    return _coherence(residuals, inputs)
+
+
+def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
+    """How fast the road rises under a wheel, tracks averaged, the samples that count, per run [m/s]."""
+    def of(run: Run) -> Array:
+        height = run.track.averaged(run.distance_m - behind_m, residuals.car.structure.contact_patch_m)
+        return np.gradient(height.reshape(run.count, -1).mean(axis=1), 1 / run.rate_hz)
+
+    return residuals.kept(of)
+
+
+def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> Coherence:
+    left = segments(residuals, residuals.left)
+    roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
+    count = len(left)
+    power = np.mean(np.abs(left) ** 2, axis=0)
+    own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
+    cross = np.einsum("sfi,sf->fi", roads.conj(), left) / count
+    gain = np.einsum("fij,fj->fi", np.linalg.pinv(own, rcond=1e-6, hermitian=True), cross)
+    found = np.einsum("fi,fi->f", cross.conj(), gain).real
+    raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)
+    q, n = len(inputs), _WORTH * count
+    chance = q / n
+    share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
+    return Coherence(frequencies(residuals), share, raw, q, n, power)

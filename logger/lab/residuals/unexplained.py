@@ -1,0 +1,135 @@
+"""What is left when no candidate explains it: not named, but described.
+
+Problem: something is missing, and nothing on the list is it. Solution: what the best model leaves is read as a
+comparison reads it (which force in the suspensions, at which frequencies, following what), and once more along the way
+instead of along the time: what a wheel does once in a turn repeats every so many metres, whatever the speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown, short_names
+from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
+from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
+
+Array = npt.NDArray[np.float64]
+
+_SLOWEST_MPS = 1.0
+_FROM_PER_M, _TO_PER_M = 0.3, 2.2
+_WHEEL_M = (0.22, 0.5)
+# A tone in time that slips by a cycle along the way is no line there any more; a line is so many ordinates wide.
+_CYCLE, _LINE, _OTHER_SPEED = 1.0, 2.0, 0.05
+
+
+@dataclass(frozen=True)
+class SpatialLine:
+    """What repeats along the way in the run where that is clearest: how often [1/m], and the speed that it mostly had;
+    how probable by chance, which is certain where runs at other speeds do not have it; and the powers (n,) at all wave
+    numbers (n,) [1/m] over their mean.
+
+    steady    the speed hardly changed, so that it may as well repeat in time
+    """
+
+    run: str
+    at_per_m: float
+    speed_mps: float
+    p_value: float
+    per_m: Array
+    power: Array
+    steady: bool
+
+    @property
+    def width_per_m(self) -> float:
+        """How near two wave numbers are that are one."""
+        return _LINE * float(self.per_m[1] - self.per_m[0])
+
+    @property
+    def found(self) -> bool:
+        """Whether it is no chance."""
+        return self.p_value < DOUBT
+
+    @property
+    def sentence(self) -> str:
+        """What it says when it is found."""
+        if self.steady:
+            at_hz = self.at_per_m * self.speed_mps
+            return (f"It repeats every {1 / self.at_per_m:.2f} m of the way or {at_hz:.1f} times a second: at a steady "
+                    f"speed that is the same (clearest in {self.run}). A drive at another speed would tell.")
+        radius_m = 1 / (2 * np.pi * self.at_per_m)
+        wheel = (f" A wheel of {radius_m:.2f} m radius turns so often: look at its balance and roundness."
+                 if _WHEEL_M[0] < radius_m < _WHEEL_M[1] else "")
+        return (f"It repeats every {1 / self.at_per_m:.2f} m of the way, whatever the speed (clearest in {self.run})."
+                f"{wheel}")
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run tells)."""
+
+    residuals: ModelResiduals
+    where: Breakdown
+    tests: ResidualTests
+    line: SpatialLine | None
+
+
+def shape_of(posterior: Posterior, state: State) -> Shape:
+    """The shape of the residuals of a fitted model."""
+    runs, car = posterior.runs, posterior.car(state.effects, state.logs)
+    responses = runs.respond(car, posterior.moved_m(state.record))
+    residuals = ModelResiduals(runs.runs, car, state.predictions, responses)
+    as_recorded = ModelResiduals(runs.runs, car, runs.predict(car), responses)
+    where = breakdown(residuals)
+    return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
+
+
+def sentences(shape: Shape) -> list[str]:
+    """What it looks like."""
+    turns = [shape.line.sentence] if shape.line is not None and shape.line.found else []
+    found = turns + [test.sentence for test in shape.tests.found]
+    return found or ["No test says more: it is spread over all frequencies, speeds and places."]
+
+
+def spatial_line_of(residuals: ModelResiduals) -> SpatialLine | None:
+    """What repeats along the way: as for a tone in time, which it is told from where the speed changes or where another
+    run, at another speed, has it too."""
+    found = []
+    names = short_names(residuals.runs)
+    for run, left in zip(residuals.runs, residuals.left, strict=True):
+        speed = run.speed_mps[run.first:]
+        if speed.min() < _SLOWEST_MPS or run.distance_m[-1] <= run.distance_m[run.first]:
+            continue
+        way = np.maximum.accumulate(run.distance_m[run.first:])
+        step_m = float(np.median(speed)) / run.rate_hz
+        along = np.interp(np.arange(way[0], way[-1], step_m), way, left)
+        per_m = np.fft.rfftfreq(len(along), step_m)
+        asked = (per_m > _FROM_PER_M) & (per_m < _TO_PER_M)
+        power = periodogram(along)
+        stands_out = loudest(power, asked)
+        if stands_out is None or asked.sum() < NEIGHBOURS:
+            continue
+        at_per_m = float(per_m[stands_out[0]])
+        usual_mps = float(np.median(speed))
+        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < _CYCLE
+        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
+                           power[asked] / float(power[asked].mean()), steady))
+    best = min(found, key=lambda one: one.p_value, default=None)
+    if best is None:
+        return None
+    best = replace(best, p_value=min(1.0, best.p_value * len(found)))
+    others = [one for one in found if abs(one.speed_mps / best.speed_mps - 1) > _OTHER_SPEED]
+    if not best.steady or not others:
+        return best
+    again = any(abs(one.at_per_m - best.at_per_m) < max(one.width_per_m, best.width_per_m) and one.found
+                for one in others)
+    return replace(best, steady=False) if again else replace(best, p_value=1.0)
+
+
+def _slips(way_m: Array, rate_hz: float) -> float:
+    """How much earlier or later than at a steady speed a car was along its way, from most to most [s]."""
+    time_s = np.arange(len(way_m)) / rate_hz
+    return float(np.ptp(time_s - np.polyval(np.polyfit(way_m, time_s, 1), way_m)))

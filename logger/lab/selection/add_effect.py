@@ -1,0 +1,160 @@
+"""A model with effects added: fitted on all that there is, with what is known of every number.
+
+Problem: whoever adds an effect wants its numbers with their errors, and wants to see what else changed: a missing
+effect biases the car's own numbers, and adding it removes the bias; and a fit always gains a little when it gets one
+more number. Solution: the car is fitted with and without the effect on all of the runs, each number comes with its
+standard error from the information matrix, and the gain in evidence says how often noise would do as much. What is
+written holds on to the numbers that were given; what is compared side by side does not, on either side, so that nothing
+but the effect makes the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.distance_error import unusual_m
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import MapFit, aligned, fit
+from logger.lab.likelihood.noise_floor import floor_error, noise_of
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.vehicle.effect import Chosen
+from logger.vehicle.named_parameters import read
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+BIASED = 2.0
+"""A number that an effect moves by more standard errors than this had been biased by its absence."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the car: as it was given, refitted without the added effects, and with them, as far off as the runs
+    ask for; with standard errors, which include how far off it may have been.
+
+    shift      from the one to the other, in standard errors of the last
+    written    with the effects, held near what was given: what the vehicle has then
+    """
+
+    name: str
+    nominal: float
+    without: float
+    without_standard_error: float
+    found: float
+    standard_error: float
+    written: float
+
+    @property
+    def shift(self) -> float:
+        """From without to with, in standard errors of the last."""
+        return (self.found - self.without) / self.standard_error if self.standard_error > 0 else 0.0
+
+    @property
+    def biased(self) -> bool:
+        """Whether the missing effects had biased it."""
+        return abs(self.shift) > BIASED
+
+
+@dataclass(frozen=True, eq=False)
+class AddedEffects:
+    """A vehicle with effects added.
+
+    vehicle             with its numbers refitted
+    effects             all, with values and standard errors
+    names               of those that were added
+    numbers             of the car
+    error_before        of the vehicle and effects as they were
+    error_refitted      of those with their numbers refitted and the distance errors taken out
+    error_after         of the model with the effects, fitted in the same way
+    error_as_written    of that model on the distances as recorded: what a comparison with it begins at
+    noise_floor_error   the error that the sensor's noise makes
+    p_value             how often, at most, noise alone would gain as much
+    distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
+    """
+
+    vehicle: Vehicle
+    effects: tuple[Chosen, ...]
+    names: tuple[str, ...]
+    numbers: tuple[Number, ...]
+    error_before: float
+    error_refitted: float
+    error_after: float
+    error_as_written: float
+    noise_floor_error: float
+    p_value: float
+    distance_error_m: float
+
+    @property
+    def helps(self) -> bool:
+        """Whether the effects gain more than noise would."""
+        return self.p_value < FALSE_ALARM
+
+    @property
+    def new(self) -> tuple[Chosen, ...]:
+        """The effects that were added."""
+        return tuple(one for one in self.effects if one.effect.name in self.names)
+
+    @property
+    def moved(self) -> list[Number]:
+        """The car's numbers, those that the effects moved most first."""
+        return moved_between(self, self)
+
+
+def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
+    """The car's numbers without the effects that ``first`` added, and with all that ``last`` has; those that moved most
+    first."""
+    found = [Number(one.name, one.nominal, one.without, one.without_standard_error, now.found, now.standard_error,
+                    now.written)
+             for one, now in zip(first.numbers, last.numbers, strict=True)]
+    return sorted(found, key=lambda one: -abs(one.shift))
+
+
+def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen], candidates: int = 1) -> AddedEffects:
+    """Fit the vehicle, with the effects that are present, without and with those that are added; the values that these
+    have are where the fit begins, and were chosen among so many candidates.
+
+    ValueError where the vehicle lacks what an effect needs.
+    """
+    before = fit(posterior, aligned(posterior, posterior.start(present)))
+    after = _with(posterior, before, (*before.state.effects, *added), (*present, *added))
+    loose = posterior.without_wall()
+    (bent, spread_before), (freed, spread_after) = (_freed(loose, one) for one in (before, after))
+    prior, nominal = posterior.prior, posterior.vehicle
+    vehicle, without, found = (prior.vehicle(nominal, logs) for logs in (
+        after.state.logs, bent.state.logs, freed.state.logs))
+    numbers = tuple(
+        Number(name, read(nominal, name), read(without, name), read(without, name) * float(was), read(found, name),
+               read(found, name) * float(now), read(vehicle, name))
+        for name, was, now in zip(prior.names, spread_before, spread_after, strict=True)
+    )
+    effects, _ = standard_errors(after)
+    state = after.state
+    return AddedEffects(
+        vehicle, effects, tuple(one.effect.name for one in added), numbers,
+        error_before=posterior.error(posterior.start(present)), error_refitted=posterior.error(before.state),
+        error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
+        noise_floor_error=floor_error(posterior, noise_of(posterior, state)),
+        p_value=probability_by_chance(before.linear.score - after.linear.score, candidates),
+        distance_error_m=unusual_m(posterior.record_errors, state.record))
+
+
+def _with(posterior: Posterior, before: MapFit, beside: tuple[Chosen, ...], anew: tuple[Chosen, ...]) -> MapFit:
+    """The model with more effects. A car that was refitted without what is missing may be bent too far, or lie too
+    wrong, to begin with."""
+    state = before.state
+    starts = [LinearModel(posterior, aligned(posterior, one)) for one in (
+        posterior.at(beside, state.logs, state.record, state.size), posterior.start(anew))]
+    return fit(posterior, min(starts, key=lambda one: one.score).state)
+
+
+def _freed(loose: Posterior, found: MapFit) -> tuple[MapFit, Array]:
+    """The model fitted without holding on to the car's numbers, and standard errors of their logarithms (p,)."""
+    if found.posterior.prior.at_the_wall(found.state.logs):
+        found = fit(loose, found.state, found.numbers)
+    return found, standard_errors(found)[1]

@@ -1,0 +1,337 @@
+"""Effects tried on a model without a fit: would this one explain the residuals, and with which numbers?
+
+Problem: most effects do nothing at their null and something quite different at each of their values, so that a slope at
+zero strength says little about them (a shape such as a knee or a frequency has no meaning there). Solution: each is
+simulated at a few trial values; what the car's own numbers and the distance errors could do as well is projected out
+(a score test), and the trial that explains most, at the strength at which it does, is where a fit begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import MapFit, aligned
+from logger.lab.likelihood.noise_floor import gain_of_an_explanation
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.runs import Run
+from logger.vehicle.effect import Chosen, DriveEffect, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect_parameters import Move, coordinates_of, moved
+from logger.vehicle.named_parameters import read
+
+Array = npt.NDArray[np.float64]
+
+# How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
+# next to nothing.
+_STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
+_OPTIMA = 2
+_WORTH_ALIGNING = 0.004
+"""Of an alignment that only has to tell which start is likelier, a round that gains a smaller share is the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Quadratic:
+    """A fitted model to second order, under a prior of the car's numbers.
+
+    residuals      whitened (kept,) per run
+    covariance     (p, p) of the car's numbers
+    newton_step    (p,) the way to where these fit best
+    objective      squares of the residuals there, and the cost of what is off
+    """
+
+    linear: LinearModel
+    residuals: list[Array]
+    covariance: Array
+    newton_step: Array
+    objective: float
+
+    @staticmethod
+    def of(linear: LinearModel) -> _Quadratic:
+        """Of a model beside its state."""
+        state = linear.state
+        here = linear.eliminated(state.predictions)
+        covariance = np.asarray(np.linalg.inv(linear.information(state.logs)), float)
+        gradient = linear.gradient(here.residuals, state.logs)
+        step = covariance @ gradient
+        return _Quadratic(linear, here.residuals, covariance, step,
+                          here.squares + linear.prior.cost(state.logs) - float(gradient @ step))
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A fitted model that effects are tried on.
+
+    found          the fit
+    score          minus twice the log of its evidence
+    explanation    what a full explanation of the residuals would gain
+    rough          predictions of a rough simulation, for comparing with others
+    quadratics     under the prior, and, where its wall holds a number, without the wall: a car that is bent to the wall
+                   hides what effects do
+    """
+
+    found: MapFit
+    score: float
+    explanation: float
+    rough: list[Array]
+    quadratics: tuple[_Quadratic, ...]
+
+    @staticmethod
+    def of(found: MapFit) -> Baseline:
+        """From a fit."""
+        linear, state = found.linear, found.state
+        quadratics = [_Quadratic.of(linear)]
+        if linear.prior.at_the_wall(state.logs):
+            quadratics.append(_Quadratic.of(linear.without_wall()))
+        return Baseline(found, linear.score, gain_of_an_explanation(found.posterior, state),
+                        _roughly(linear, state.effects, state.logs), tuple(quadratics))
+
+    @property
+    def posterior(self) -> Posterior:
+        """That which was fitted."""
+        return self.found.posterior
+
+    @property
+    def linear(self) -> LinearModel:
+        """The model beside its state."""
+        return self.found.linear
+
+    @property
+    def state(self) -> State:
+        """The model."""
+        return self.found.state
+
+    def gain(self, objective: float, logs: Array, linear: LinearModel) -> float:
+        """By how much an objective is below this model's own; it was found under the prior of ``linear``, at these
+        numbers of the car (p,)."""
+        wall = self.posterior.prior.cost(logs) - linear.prior.cost(logs)
+        return self.quadratics[0].objective - objective - wall
+
+
+def as_recorded(base: Baseline) -> Baseline:
+    """The model in the nominal car, with starts and factors of the distances as they were recorded."""
+    posterior, state = base.posterior, base.state
+    record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
+    there = posterior.at(state.effects, np.zeros_like(state.logs), record)
+    numbers = posterior.number_slopes(there, posterior.prior.steps)
+    return Baseline.of(MapFit(LinearModel(posterior, there, numbers), numbers))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect at one set of values, and what it would do.
+
+    gain      by how much minus twice the log of the evidence would fall, its numbers not counted
+    logs      (p,) where the car's numbers are then
+    change    what it does to the predictions at its values (n,), per run [m/s2]
+    start     where a fit begins, if the runs lie elsewhere with it; None: beside the baseline
+    """
+
+    one: Chosen
+    gain: float
+    logs: Array
+    change: list[Array]
+    start: State | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Trials of an effect where fits may begin, the most promising first: the best of each choice that no fit moves,
+    and of a shape (a frequency, a knee) that has two optima both."""
+
+    effect: Effect
+    trials: tuple[Trial, ...]
+
+    @property
+    def gain(self) -> float:
+        """Of the most promising one."""
+        return self.trials[0].gain
+
+
+def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Screened:
+    """Trials of an effect on a model.
+
+    seen    ways in which the runs may be misaligned
+    """
+    trials: list[dict[str, float]] = []
+    for way in seen:
+        trials += [values for values in effect.trials(way) if values not in trials]
+    prior = base.posterior.prior
+    known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
+    if known:  # where a fit has brought the car's own numbers is worth a trial
+        car = prior.vehicle(base.posterior.vehicle, base.state.logs)
+        trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
+    nominal = np.zeros_like(base.state.logs)
+    found: dict[tuple[float, ...], dict[float, Trial]] = {}
+    shape = next((one.name for one in effect.parameters if one.moves and one.null is None), "")
+    for values in trials:
+        choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
+        one = chosen(effect, values)
+        ways = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
+        if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does
+            ways.append(_as_it_is(base, one, nominal))
+        if not effect.reshapes and values is not trials[0]:
+            ways.append(_aligned_anew(base, one, ways[0]))
+        trial = max(ways, key=lambda trial: trial.gain)
+        alike = found.setdefault(choice, {})
+        if (there := values.get(shape, 0.0)) not in alike or trial.gain > alike[there].gain:
+            alike[there] = trial
+    best = [one for alike in found.values() for one in _optima([alike[value] for value in sorted(alike)])[:_OPTIMA]]
+    return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
+
+
+def _optima(trials: Sequence[Trial]) -> list[Trial]:
+    """Those that promise more than their neighbours, the most promising first; of trials in the order of a shape."""
+    gains = [-np.inf, *(one.gain for one in trials), -np.inf]
+    found = [one for one, before, after in zip(trials, gains, gains[2:], strict=False)
+             if one.gain >= max(before, after)]
+    return sorted(found, key=lambda one: -one.gain)
+
+
+def _roughly(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
+    return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
+
+
+def _scaled(base: Baseline, one: Chosen) -> list[Trial]:
+    """A trial at the strength at which it explains most, under each prior."""
+    there = _roughly(base.linear, (*base.state.effects, one), base.state.logs)
+    change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    return [_trial(base, quadratic, one, change) for quadratic in base.quadratics]
+
+
+def _trial(base: Baseline, quadratic: _Quadratic, one: Chosen, change: list[Array]) -> Trial:
+    linear = quadratic.linear
+    white = linear.whitened(change)
+    here = base.state.logs + quadratic.newton_step
+    mixed, own = linear.mixed(white)
+    absorbed = quadratic.covariance @ mixed
+    along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
+             - float(mixed @ quadratic.newton_step))
+    own -= float(mixed @ absorbed)
+
+    def at(share: float, values: Chosen) -> Trial:
+        logs = here - share * absorbed
+        objective = quadratic.objective - 2 * share * along + share**2 * own
+        return Trial(values, base.gain(objective, logs, linear), logs, change)
+
+    if not own > 0:
+        return Trial(one, 0.0, here, change)
+    strongest = _STRONGEST_IF_IT_REALIGNS if one.effect.realigns else _STRONGEST
+    strength = float(np.clip(along / own, -strongest if one.effect.realigns else _WEAKEST, strongest))
+    scaled = scaled_by(one, strength)
+    if scaled is None:
+        return at(1.0, one)
+    if not any(parameter.scale is Scale.RECIPROCAL for parameter in one.effect.parameters):
+        return at(strength, scaled)
+    # A resonance that is half as strong lies elsewhere, and may do something else altogether.
+    return max((_as_predicted(base, linear, trial) for trial in (at(strength, scaled), at(1.0, one))),
+               key=lambda trial: trial.gain)
+
+
+def _as_predicted(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
+    """The same with the gain that it truly has, the car's numbers counted to first order: sensors are tried on one body
+    then."""
+    state = base.state
+    there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
+    step = trial.logs - state.logs
+    moved_there = [one + step @ columns for one, columns in zip(there, base.found.numbers, strict=True)]
+    return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
+
+
+def _as_it_is(base: Baseline, one: Chosen, logs: Array) -> Trial:
+    """A trial as it is, in a car with these numbers (p,), which then take one step of Newton's; those that the effect
+    sets are held at their nominal values."""
+    linear = base.quadratics[-1].linear.holding(one.effect.replaces)
+    logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, logs)
+    there = _roughly(linear, (*base.state.effects, one), logs)
+    found = linear.eliminated(there)
+    pull = linear.gradient(found.residuals, logs)
+    step = np.linalg.solve(linear.information(logs), pull)
+    change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    objective = found.squares + linear.prior.cost(logs) - float(pull @ step)
+    return Trial(one, base.gain(objective, logs + step, linear), logs + step, change)
+
+
+def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
+    """A trial with the distance errors fitted anew from the distances as they were recorded: where positions are wrong,
+    those that were fitted without it are worth nothing."""
+    posterior, state = base.posterior, base.state
+    effects = (*state.effects, one)
+    record = [error.through(error.moved_m(k) - _shift_m(one, error.run)) for error, k in zip(
+        posterior.record_errors, state.record, strict=True)]
+    starts = [posterior.at(effects, state.logs), posterior.at(effects, state.logs, record, state.size)]
+    models = [LinearModel(posterior, aligned(posterior, start, _WORTH_ALIGNING)) for start in starts]
+    best = min(models, key=lambda model: model.score)
+    return replace(trial, one=one, gain=base.score - best.score, logs=state.logs, start=best.state)
+
+
+def _shift_m(one: Chosen, run: Run) -> Array:
+    """By how much farther than recorded an effect that only misaligns a run lets the car be (n,) [m]."""
+    if isinstance(one.effect, DriveEffect):
+        return one.effect.driven(one.p, run.distance_m) - run.distance_m
+    delay_s = next((value for name, value in one.values.items() if name.endswith("_s")), 0.0)
+    return -delay_s * run.speed_mps
+
+
+def scaled_by(one: Chosen, strength: float) -> Chosen | None:
+    """The effect at a share of its strength: of the way from its null to where it stands; None if it has no null."""
+    for place, parameter in enumerate(one.effect.parameters):
+        if parameter.null is None or not parameter.moves:
+            continue
+        move = Move(0, place)
+        null = 0.0 if np.isinf(parameter.null) else parameter.coordinate(parameter.null)
+        here = float(coordinates_of([one], [move])[0])
+        return moved([one], [move], np.array([null + strength * (here - null)]))[0]
+    return None
+
+
+def misalignment_of_record(base: Baseline) -> Misalignment:
+    """One factor and one time of all runs together that explain most of a model's distance errors."""
+    way, speed, moved_m = (np.concatenate(parts) for parts in zip(*(
+        (error.run.distance_m - error.run.distance_m[0], error.run.speed_mps, error.moved_m(k))
+        for error, k in zip(base.posterior.record_errors, base.state.record, strict=True)), strict=True))
+    (longer, earlier_s), *_ = np.linalg.lstsq(np.stack([way, speed], axis=1), moved_m, rcond=None)
+    return Misalignment(float(1 / (1 + longer)), float(-earlier_s))
+
+
+def misalignment(posterior: Posterior, state: State) -> Misalignment:
+    """How the runs would have to be moved against the model to fit it best: all of them by one factor of their
+    distance, or by one time. Both are looked for in the slow part of the motion, whose waves are long."""
+    pairs: list[tuple[Run, Array, Array]] = []
+    for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
+        size = max(1, round(_SMOOTH_S * run.rate_hz))
+        hat = np.hanning(size + 2)[1:-1]
+        slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, predicted)]
+        pairs.append((run, slow[0], slow[1]))
+
+    def alike(scale: float, delay_s: float) -> float:
+        """Products of the measurement and the model, moved, over what they are at most."""
+        both = of = 0.0
+        for run, measured, predicted in pairs:
+            time_s = np.arange(run.count) / run.rate_hz
+            rising = np.maximum.accumulate(run.distance_m) + 1e-9 * time_s
+            at_s = np.interp(run.distance_m / scale, rising, time_s) - delay_s
+            moved_mps2 = np.interp(at_s, time_s, predicted)[run.first:]
+            kept = measured[run.first:]
+            both += float(kept @ moved_mps2)
+            of += float(np.sqrt((kept @ kept) * (moved_mps2 @ moved_mps2)))
+        return both / of if of > 0 else 0.0
+
+    still = alike(1.0, 0.0)
+    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), _WIDEST, _SCALE_STEP)
+    delay_s = _scanned(lambda off: alike(1.0, off), _LATEST_S, _DELAY_STEP_S)
+    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0)
+
+
+_SMOOTH_S = 0.2
+_WIDEST, _SCALE_STEP, _LATEST_S, _DELAY_STEP_S = 0.08, 5e-4, 1.5, 0.02
+
+
+def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:
+    """Where something is largest between -reach and reach, looked for in steps and then in tenths of a step."""
+    count = round(reach / step)
+    middle = max((step * k for k in range(-count, count + 1)), key=alike)
+    return max((middle + 0.1 * step * k for k in range(-10, 11)), key=alike)

@@ -1,0 +1,219 @@
+"""The search for effects that a model lacks: add, swap, drop, while the evidence gains.
+
+Problem: something differs, and twenty effects, alone or together, might be why; or none of them; or nothing. Solution:
+every effect is screened beside the model, the promising ones are fitted, and the one with the most evidence is added if
+noise alone would hardly gain as much in so many trials and imitations do not. Then each of the others is taken out:
+whatever gains most in its place stays, or nothing. The next round begins on that model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
+from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
+from logger.lab.selection.screening import Baseline, Screened, as_recorded, misalignment_of_record, screened
+from logger.vehicle.effect import Effect, Misalignment
+from logger.vehicle.effect_parameters import moves_of
+
+Progress = Callable[[str], None]
+
+MOST_EFFECTS = 4
+"""No more than so many are looked for."""
+_MOST_FITTED, _MOST_REFINED = 6, 3
+_WORTH_FITTING, _WORTH_REFINING = 0.03, 0.25
+"""Of the gain of the best one: an effect that promises less is not fitted, or not with slopes of its own."""
+_AS_GOOD = 0.9
+"""Fits of one effect from different starts that gain so much of what the best of them gains are all refined."""
+_WORTH_A_ROUND = 0.02
+"""A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
+where much is still to be found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """All effects tried on a model: those that were fitted, best first, and what the others promised."""
+
+    fits: tuple[CandidateFit, ...]
+    promises: tuple[Screened, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What the search came to.
+
+    before     the model without effects that it lacks
+    now        with those that were chosen
+    gains      what each of these gains beside the others, by name, the most first
+    rivals     effects that explain as well in the place of each, by name
+    first      the first round
+    steps      names of the effects that were added, with the model as it was then
+    """
+
+    before: Baseline
+    now: Baseline
+    gains: dict[str, float]
+    rivals: dict[str, tuple[str, ...]]
+    first: Round
+    steps: tuple[tuple[str, Baseline], ...]
+
+
+@dataclass(eq=False)
+class Search:
+    """A search among effects, on models that have ``present`` others before them."""
+
+    effects: Sequence[Effect]
+    present: int
+    seen: Misalignment
+    progress: Progress = lambda words: None
+    workers: int = 2
+    _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def run(self, before: Baseline) -> Selection:
+        """From a model without effects that it lacks."""
+        now = before
+        steps: list[tuple[str, Baseline]] = []
+        first = Round((), ())
+        while len(now.state.effects) - self.present < MOST_EFFECTS:
+            left = [one for one in self.effects if one.name not in now.state.names]
+            if not left:
+                break
+            self.progress(f"round {len(steps) + 1}")
+            tried = self.round(now, left)
+            first = first if steps else tried
+            best = self._simplest(now, tried)
+            if best is None:
+                break
+            self.progress(f"{best.effect.name} is missing; fitting the car with it")
+            self._rivals[best.effect.name] = self._alike(best.gain, best.effect.name, tried)
+            now = self._refit(best)
+            earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
+            steps.append((best.effect.name, now))
+            for name in earlier:
+                now, _ = self._reconsidered(now, name)
+        now, gains = self._needed(before, now)
+        rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
+        return Selection(before, now, gains, rivals, first, tuple(steps))
+
+    def left_out(self, found: Selection, name: str) -> Selection:
+        """The same without one of the effects that were chosen."""
+        now, gains = self._needed(found.before, self.without(found.now, name))
+        return replace(found, now=now, gains=gains)
+
+    def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
+        """Every effect tried on a model; and beside its runs as they were recorded, where it lies far from there: what
+        an effect does may have been taken for a start or a factor of the distance."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            promises = self._screened(pool, now, effects)
+            worth = [(now, one) for one in _worth_fitting(promises)]
+            if now.state.size.is_unusual:
+                there = as_recorded(now)
+                worth += [(there, one) for one in _worth_fitting(self._screened(pool, there, effects))]
+            self.progress(f"fitting {len(worth)} of them")
+            tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
+            rough = _best_of_each(tries)
+            best = {one.effect.name: one.gain for one in rough[:_MOST_REFINED]
+                    if one.gain > _WORTH_REFINING * rough[0].gain}
+            near = [one for one in tries if one.gain > _AS_GOOD * best.get(one.effect.name, np.inf)]
+            self.progress(f"refining {len(near)} of them")
+            fine = list(pool.map(lambda one: refined(now.score, one, _WORTH_A_ROUND * now.explanation), near))
+        # A fit that is much worse than the model without the effect went astray: its promise says more.
+        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in near)])
+                if one.gain > -least_gain(len(self.effects))]
+        fitted = {one.effect.name for one in fits}
+        return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
+
+    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect]) -> list[Screened]:
+        """Effects tried beside a model, the most promising first."""
+        seen = [self.seen, misalignment_of_record(base)] if base.state.size.is_unusual else [self.seen]
+        found = []
+        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, seen), effects), 1):
+            self.progress(f"screened {done} of {len(effects)} effects")
+            found.append(one)
+        return sorted(found, key=lambda one: -one.gain)
+
+    def accepted(self, now: Baseline, one: CandidateFit) -> bool:
+        """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
+        return self._is_evident(now, one.gain) and not one.chosen.at_an_end
+
+    def _is_evident(self, without: Baseline, gain: float) -> bool:
+        """Whether so much is gained over a model neither by chance nor by imitation."""
+        return gain > max(least_gain(len(self.effects)), IMITATION * without.explanation)
+
+    def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
+        """Of those that are there and cannot be told from the likeliest, the one with the fewest numbers."""
+        there = [one for one in tried.fits if self.accepted(now, one)]
+        return min((one for one in there if one.gain > there[0].gain - CONFUSED),
+                   key=lambda one: len(moves_of([one.chosen])), default=None)
+
+    def without(self, now: Baseline, name: str) -> Baseline:
+        """A model without one of its effects, fitted."""
+        rest = tuple(one for one in now.state.effects if one.effect.name != name)
+        away = next(one for one in now.state.effects if one.effect.name == name)
+        posterior = now.posterior
+        if away.effect.realigns:
+            return Baseline.of(fit(posterior, aligned(posterior, posterior.at(rest, now.state.logs))))
+        start = posterior.at(rest, now.state.logs, now.state.record, now.state.size)
+        return Baseline.of(fit(posterior, start, now.found.numbers, worth=_WORTH_A_ROUND * now.explanation))
+
+    def _refit(self, one: CandidateFit) -> Baseline:
+        posterior = one.found.posterior
+        return Baseline.of(fit(posterior, aligned(posterior, one.found.state), one.found.numbers))
+
+    def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
+        """The model with whatever gains most in the place of an effect, which may be the same effect elsewhere; and
+        what it gains."""
+        self.progress(f"is {name} still what it was?")
+        without = self.without(now, name)
+        gain = without.score - now.score
+        tried = self.round(without, [one for one in self.effects
+                                     if one.name == name or one.name not in now.state.names])
+        best = self._simplest(without, tried)
+        if best is not None and best.gain > gain + CONFUSED:
+            now, gain = self._refit(best), best.gain
+            self._rivals.pop(name, None)
+            name = best.effect.name
+        self._rivals[name] = self._alike(gain, name, tried)
+        return now, gain
+
+    def _alike(self, gain: float, name: str, tried: Round) -> tuple[str, ...]:
+        """Effects that explain as well as one that gains so much."""
+        return tuple(one.effect.name for one in tried.fits
+                     if one.effect.name != name and abs(one.gain - gain) < CONFUSED and not one.chosen.at_an_end)
+
+    def _needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
+        """The model without effects that are not needed beside the others, and what each of these gains."""
+        names = list(now.state.names[self.present:])
+        if len(names) == 1:
+            return now, {names[0]: before.score - now.score}
+        gains: dict[str, float] = {}
+        while names:
+            self.progress(f"are all of {', '.join(names)} needed?")
+            with ThreadPoolExecutor(self.workers) as pool:
+                others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
+            gains = {name: other.score - now.score for name, other in others.items()}
+            least = min(gains, key=lambda name: gains[name])
+            if len(names) == 1 or self._is_evident(others[least], gains[least]):
+                break
+            now = others[least]
+            names.remove(least)
+        return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
+
+
+def _worth_fitting(promises: Sequence[Screened]) -> list[Screened]:
+    """Those that promise enough, of some that are sorted by what they promise."""
+    return [one for one in promises[:_MOST_FITTED] if one.gain > _WORTH_FITTING * promises[0].gain]
+
+
+def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Of every effect the fit that is best, best first."""
+    found: dict[str, CandidateFit] = {}
+    for one in sorted(fits, key=lambda one: -one.gain):
+        found.setdefault(one.effect.name, one)
+    return list(found.values())

@@ -1,0 +1,68 @@
+"""The whole loop as one record: from the first comparison of a model to the last effect that was added to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from logger.lab.compare import Comparison
+from logger.lab.diagnosis import Diagnosis
+from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """Effects that were added, what that brought, the comparison with them, and the vehicle file that was written."""
+
+    addition: AddedEffects
+    comparison: Comparison
+    file: str
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """What was done, in order.
+
+    first       of the vehicle as it was given
+    diagnoses   at least one
+    refused     effects that a diagnosis found missing and the user did not want
+    """
+
+    first: Comparison
+    diagnoses: tuple[Diagnosis, ...]
+    rounds: tuple[Round, ...]
+    refused: tuple[str, ...]
+
+    @property
+    def last(self) -> Comparison:
+        """Of the vehicle that it ends with."""
+        return self.rounds[-1].comparison if self.rounds else self.first
+
+    @property
+    def added(self) -> list[str]:
+        """Names of the effects that were added, in order."""
+        return [name for one in self.rounds for name in one.addition.names]
+
+    @property
+    def left(self) -> list[str]:
+        """Names of the effects that were found missing last and neither added nor refused: the rounds were used up."""
+        missing = [one.effect.name for one in self.diagnoses[-1].missing]
+        return [name for name in missing if name not in self.added and name not in self.refused]
+
+    @property
+    def floor(self) -> float:
+        """The error that the sensor's noise alone makes."""
+        return (self.rounds[-1].addition if self.rounds else self.diagnoses[-1]).noise_floor_error
+
+    @property
+    def steps(self) -> list[tuple[str, float]]:
+        """Models on the way, each with its error on all samples."""
+        if not self.rounds:
+            return [("as its file says", self.first.plain.error), ("numbers refitted", self.first.refitted.error)]
+        start = self.rounds[0].addition
+        return [("as its file says", start.error_before), ("numbers refitted", start.error_refitted),
+                *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in self.rounds)]
+
+    @property
+    def moved(self) -> list[Number]:
+        """The car's numbers without and with the effects; none where nothing was added."""
+        return moved_between(self.rounds[0].addition, self.rounds[-1].addition) if self.rounds else []

@@ -1,0 +1,312 @@
+"""Which effects a model lacks, from drives over one road that nobody measured.
+
+Problem: without a profile there is no prediction to compare a drive with; the road would explain whatever the model
+does not. Solution: drives at different speeds meet the same road, and what one of them says of it the others have to
+agree with. The road, a Gaussian process of free level and waviness, is integrated out (``unknown_road``); models are
+compared by the likelihood of all drives together. The way is cut into stretches of some seconds, each with a level and
+a waviness of its own and with places that may be a little off, as roads change and distance signals wander.
+
+The likelihood itself is never computed, only its slopes are. What one model gains over another is their integral along
+a straight way from the one response to the other, which is short: the slopes, by a few points, are Gauss's.
+
+Only effects that leave a car answering in proportion to the road can be tried. What a road that is free takes for
+itself (a gain; a longer contact patch) shows in the information that is left of an effect beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise, permutations
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.identification.unknown_road.drive_operator import Drive
+from logger.identification.unknown_road.marginal_likelihood import UnknownRoad
+from logger.identification.unknown_road.road_state import Options, RoadState
+from logger.lab.likelihood.noise_floor import Noise, sensor_noise
+from logger.lab.likelihood.priors import Tolerance, VehiclePrior
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
+from logger.runs import Run
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.effect import Chosen
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_STRETCH_S, _LEAST_S = 10.0, 3.0
+_PLACE_OFF_M = 3.0
+PROBES = 8
+# What is granted to a stretch: deviations of its waviness, and of its places from those of the whole way.
+_WAVINESS, _WAVINESS_OFF = 2.0, 0.3
+_OFFSET_OFF_M = 0.05
+_LEVEL, _TILT = 0, 1
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+class NotOneRoad(ValueError):
+    """The drives are not over one road."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A model with all its numbers.
+
+    effects    with their values
+    logs       (p,) logarithms of the car's numbers over the nominal ones
+    roads      (r,) of every stretch its level, its waviness and the places of its drives but the first; the
+               logarithm of the noise last
+    gains      (x, f) its response
+    """
+
+    effects: tuple[Chosen, ...]
+    logs: Array
+    roads: Array
+    gains: Complex
+
+    @property
+    def noise_mps2(self) -> float:
+        """Deviation of what no road explains."""
+        return float(np.exp(self.roads[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
+    the information (m, m) or zeros; nothing of what is granted is in them."""
+
+    slopes: Array
+    information: Array
+
+
+class SameRoad:
+    """Drives over one road, a nominal vehicle, and what may be a little off.
+
+    stands    the vehicle as it stands, where fits begin, if that is another than was given
+
+    NotOneRoad unless each of the runs shares some seconds of the way with another.
+    """
+
+    def __init__(self, runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance,
+                 stands: Vehicle | None = None) -> None:
+        stands = stands or vehicle
+        self.runs, self.rate_hz = list(runs), runs[0].rate_hz
+        self.vehicle = replace(vehicle, contact_patch_m=stands.contact_patch_m)  # that is not free
+        known = VehiclePrior.of(vehicle, tolerance)
+        kept = [not name.endswith("contact_patch_m") for name in known.names]
+        self.prior = VehiclePrior(tuple(np.array(known.names)[kept].tolist()), known.deviations[kept],
+                                  known.steps[kept], wall=False)
+        self.stands = self.prior.logs(self.vehicle, stands)
+        structure = compose(stands).structure
+        self._behind_m = np.unique(structure.behind_m)
+        self._patch_m = structure.contact_patch_m
+        self.stretches = _cut(self.runs)
+        shared = {run for parts in self.stretches for run, _ in parts}
+        if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
+                             "it that another drive was over too, by their distances")
+        options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=PROBES)
+        generator = np.random.default_rng(options.seed)
+        nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
+        self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
+        sizes = [1 + len(parts) for parts in self.stretches]
+        ends = np.cumsum(sizes)
+        self._parts = [np.append(np.arange(end - size, end), ends[-1]) for size, end in zip(sizes, ends, strict=True)]
+        self._first = self._start(nominal)
+        self.count, self.rounds = len(self._first), 0
+
+    def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
+        """The car with these numbers and effects."""
+        return compose(self.prior.vehicle(self.vehicle, logs), effects)
+
+    def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
+        """Its response (x, f). ValueError if it does not answer in proportion to the road."""
+        return response_of(self.car(effects, logs), self.rate_hz)
+
+    def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
+        """A response with slopes (p, x, f), as roads are asked with."""
+        found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
+        return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
+
+    def start(self, effects: Sequence[Chosen] = ()) -> State:
+        """The car as it stands on roads of a likely level."""
+        return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
+
+    def look(self, table: Tabulated, roads: Array, information: bool) -> Look:
+        """The slopes, by the table's and by the roads' numbers, and the information."""
+        p, self.rounds = len(table.slopes), 0
+        slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
+        for road, part in zip(self._roads, self._parts, strict=True):
+            whole = np.append(np.arange(p), p + part)
+            asked = road.with_car(table)
+            own, known, _ = asked.score(self._at(roads[part], p), information)
+            self.rounds = max(self.rounds, asked.rounds)
+            slopes[whole] += own
+            matrix[np.ix_(whole, whole)] += known
+        return Look(slopes, matrix)
+
+    def prepared(self, state: State) -> SameRoad:
+        """The same, quick for models that are like this one."""
+        table, other = self.table(state.gains), copy(self)
+        other._roads = [road.with_car(table) for road in self._roads]
+        for road, part in zip(other._roads, self._parts, strict=True):
+            road.prepare(self._at(state.roads[part], 0))
+        return other
+
+    def granted(self, roads: Array) -> tuple[Array, Array]:
+        """How far roads are from what they usually are (r,), and the precision of that (r,)."""
+        off, precision = np.zeros(self.count), np.zeros(self.count)
+        for part in self._parts:
+            off[part[_TILT]] = roads[part[_TILT]] - _WAVINESS
+            precision[part[_TILT]] = _WAVINESS_OFF**-2
+            places = part[_TILT + 1 : -1]
+            off[places] = roads[places] - self._first[places]
+            precision[places] = _OFFSET_OFF_M**-2
+        return off, precision
+
+    def cost(self, state: State) -> float:
+        """What the state's numbers cost: squares of their deviations."""
+        off, precision = self.granted(state.roads)
+        return float(((state.logs / self.prior.deviations) ** 2).sum() + precision @ off**2)
+
+    def gain(self, before: State, after: State) -> float:
+        """By how much minus twice the log-likelihood falls from one state to another, what is granted counted in."""
+        change, road_change = after.gains - before.gains, after.roads - before.roads
+        total = 0.0
+        for node, weight in zip(0.5 * (_NODES + 1), 0.5 * _WEIGHTS, strict=True):
+            table = self.table(before.gains + node * change, change[None])
+            look = self.look(table, before.roads + node * road_change, information=False)
+            total += weight * float(look.slopes[0] + look.slopes[1:] @ road_change)
+        return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
+
+    def told(self, state: State) -> list[tuple[int, Array, Array]]:
+        """Of every drive over every stretch: its run, what was read, and what the other drives make one expect."""
+        found = []
+        table = self.table(state.gains)
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            other, at = road.with_car(table), self._at(state.roads[part], 0)
+            found += [(run, road.measured[number], other.told(at, number)) for number, (run, _) in enumerate(parts)]
+        return found
+
+    def told_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
+        """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
+        the latter alone makes one expect (n,)."""
+        table = self.table(state.gains)
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            other, at = road.with_car(table), self._at(state.roads[part], 0)
+            for number, by in permutations(range(len(parts)), 2):
+                yield parts[number][0], parts[by][0], road.measured[number], other.told(at, number, [by])
+
+    def errors(self, state: State) -> list[float]:
+        """Of every run, rms(read - expected) / rms(read), the road being told by the other drives alone; nan for one
+        that no other shares a stretch with."""
+        left, whole = np.zeros(len(self.runs)), np.zeros(len(self.runs))
+        for run, read, expected in self.told(state):
+            left[run] += float(((read - expected) ** 2).sum())
+            whole[run] += float((read**2).sum())
+        return [float(np.sqrt(one / all_)) if all_ > 0 else float("nan") for one, all_ in zip(left, whole, strict=True)]
+
+    def error(self, state: State) -> float:
+        """The same of all of them together."""
+        told = self.told(state)
+        return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in told)
+                             / sum(float((read**2).sum()) for _, read, _ in told)))
+
+    @property
+    def size_mps2(self) -> float:
+        """R.m.s. of what was read, by which errors are divided."""
+        squares = sum(float((one**2).sum()) for road in self._roads for one in road.measured)
+        return float(np.sqrt(squares / self.samples))
+
+    @property
+    def least_mps2(self) -> float:
+        """What is left is no less than two right simulations differ by."""
+        return DISCREPANCY * self.size_mps2
+
+    @property
+    def samples(self) -> int:
+        """How many there are, of all drives."""
+        return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
+
+    def noise(self, state: State) -> Noise:
+        """The sensor's noise, under what each drive has that the others do not tell: that is more than noise where the
+        road moves the car, so that it is asked only for noise that the recorder filtered."""
+        left: dict[int, list[Array]] = {}
+        for run, read, expected in self.told(state):
+            left.setdefault(run, []).append(read - expected)
+        runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
+        return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
+                            self.least_mps2, fitted=False)
+
+    def _at(self, own: Array, count: int) -> RoadState:
+        places = np.append(0.0, own[_TILT + 1 : -1])
+        return RoadState(np.zeros(count), float(own[_LEVEL]), float(own[_TILT]), places, float(np.exp(own[-1])))
+
+    def _start(self, nominal: Tabulated) -> Array:
+        """Levels and noise from the spectra; places by trying them on the longest stretch."""
+        first = np.zeros(int(self._parts[-1][-1]) + 1)
+        noises = []
+        for road, part in zip(self._roads, self._parts, strict=True):
+            level, noise = road.first_guess(np.zeros(0))
+            first[part[_LEVEL]], first[part[_TILT]] = level, _WAVINESS
+            noises.append(noise)
+        first[-1] = np.log(max(np.median(noises), self.least_mps2))
+        offsets = self._offsets(first)
+        for part, parts in zip(self._parts, self.stretches, strict=True):
+            own = [offsets[run] for run, _ in parts]
+            first[part[_TILT + 1 : -1]] = np.array(own[1:]) - own[0]
+        return first
+
+    def _offsets(self, first: Array) -> Array:
+        """By how much each run's places are off [m] against those of the first run of the stretch that most runs share;
+        where some are not over that one, by way of runs that share another stretch with both."""
+        offsets: dict[int, float] = {}
+        while left := [one for one, parts in enumerate(self.stretches) if any(run not in offsets for run, _ in parts)]:
+            tied = [one for one in left if any(run in offsets for run, _ in self.stretches[one])]
+            index = max(tied or left, key=lambda one: len(self.stretches[one]))
+            runs = [run for run, _ in self.stretches[index]]
+            at = self._at(first[self._parts[index]], 0)
+            offset = partial(self._roads[index].offset, at)  # against the first run of the stretch
+            if runs[0] not in offsets:
+                known = next((number for number, run in enumerate(runs) if run in offsets), None)
+                offsets[runs[0]] = 0.0 if known is None else offsets[runs[known]] - offset(known)
+            for number, run in enumerate(runs):
+                if run not in offsets:
+                    offsets[run] = offsets[runs[0]] + offset(number)
+        return np.array([offsets[run] for run in range(len(self.runs))])
+
+
+def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
+    """Stretches of the way that at least two runs share: of each the runs, by number, and their drives."""
+    ways = [np.maximum.accumulate(run.distance_m) for run in runs]
+    begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
+                    for places in ([run.first for run in runs], [-1] * len(runs)))
+    low, high = begins[min(1, len(begins) - 1)], ends[max(0, len(ends) - 2)]
+    if len(runs) < 2 or not high > low:
+        return []
+    pace = float(np.median([np.median(run.speed_mps) for run in runs]))
+    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / _STRETCH_S)) + 1)
+    found = []
+    for start, end in pairwise(edges):
+        parts = []
+        for number, (run, way) in enumerate(zip(runs, ways, strict=True)):
+            first, last = np.searchsorted(way, (start, end))
+            first = max(int(first), run.first)
+            if last - first >= _LEAST_S * run.rate_hz:
+                part = slice(first, int(last))
+                parts.append((number, Drive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
+        if len(parts) > 1:
+            found.append(parts)
+    return found
+
+
+def _joined(run: Run, parts: Sequence[Array]) -> Run:
+    """What was left in parts of a run, as a run."""
+    left = np.concatenate([np.zeros(run.first), *parts])
+    own = slice(len(left))
+    return replace(run, measured_mps2=left, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])

@@ -1,0 +1,139 @@
+"""Whether drives that are said to be over one road are, before anything is made of it.
+
+Problem: drives over two roads disagree whatever the car, and a search for what a model lacks then finds effects that
+make up for the disagreement. How much a model leaves does not tell: a car that lacks something leaves much as well.
+Solution: what one drive tells of the road is compared with what another one read. Over one road they go together,
+through a wrong car as well, if less; over two they do so only as much as chance makes two such records, which is what
+they do shifted against each other by far. Both are weighed by the power that was read at each frequency and around
+each instant, so that neither a resonance of the car nor a bump counts for all. A car that lacks much may tell nothing
+at all: before drives are called apart, the car is tried with each of the effects that it may lack. Where one road would
+not show either, nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.unknown_road.likelihood import SameRoad, State
+from logger.vehicle.effect import Chosen
+
+Array = npt.NDArray[np.float64]
+
+SEEN, PLAIN = 5.0, 10.0
+"""Standard deviations of chance from which on two drives are over one road (3e-7 each time; some hundred places and
+tens of cars are tried); and that one road would have to make before drives that show less are over two."""
+_LOWEST_HZ, _HIGHEST_OF_RATE, _SMOOTH_HZ, _SMOOTH_S = 0.5, 0.37, 1.5, 0.5
+_TAPER = 0.1  # of a stretch, at each end
+# Places may be a little off yet; what is shifted by more than the latter tells what chance makes.
+_NEAR_S, _FAR_S = 0.05, 1.0
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What one run tells of another one, in standard deviations of chance.
+
+    run, by    numbers of the runs: that which is told, and that which tells
+    found      how well what is told goes with what was read
+    expected   how well it would, were the model right
+    """
+
+    run: int
+    by: int
+    found: float
+    expected: float
+
+    @property
+    def seen(self) -> bool:
+        """Whether that is more than chance."""
+        return self.found > SEEN
+
+
+def likenesses(problem: SameRoad, state: State, lacking: Sequence[Chosen] = ()) -> list[Likeness]:
+    """Of all pairs of runs that share some of the way, each either way: through the car of a state or, where that shows
+    two roads, with one of the effects that it may lack, whichever makes them most alike."""
+    found = _likenesses(problem, state)
+    for one in lacking:
+        if apart(found) is None:
+            break
+        effects = (*state.effects, one)
+        other = _likenesses(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
+        found = [replace(old, found=max(old.found, new.found)) for old, new in zip(found, other, strict=True)]
+    return found
+
+
+def apart(found: Sequence[Likeness]) -> tuple[int, int] | None:
+    """The two runs that are most plainly over two roads; None if no two are."""
+    plain = {pair: most for pair, most in _unseen(found).items() if most > PLAIN}
+    return max(plain, key=lambda pair: plain[pair]) if plain else None
+
+
+def in_doubt(found: Sequence[Likeness]) -> list[tuple[int, int]]:
+    """Pairs of runs that may be over one road or two."""
+    return [pair for pair, most in _unseen(found).items() if most <= PLAIN]
+
+
+def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
+    """Pairs of runs of which neither tells the other, and how well one would were they over one road."""
+    ways: defaultdict[tuple[int, int], list[Likeness]] = defaultdict(list)
+    for one in found:
+        ways[min(one.run, one.by), max(one.run, one.by)].append(one)
+    return {pair: max(one.expected for one in both) for pair, both in ways.items()
+            if not any(one.seen for one in both)}
+
+
+def _likenesses(problem: SameRoad, state: State) -> list[Likeness]:
+    parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
+    for run, by, read, told in problem.told_by_each(state):
+        parts[run, by].append((read, told))
+    return [_likeness(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
+
+
+def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float) -> Likeness:
+    """Of what was read and told (n,) of each stretch."""
+    near = round(_NEAR_S * rate_hz)
+    like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
+    for read, told in pairs:
+        ours, theirs = _even(read, told, rate_hz)
+        size = float(np.linalg.norm(ours))
+        share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
+        ours, theirs = (_steady(one, rate_hz) for one in (ours, theirs))
+        both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
+        far = min(round(_FAR_S * rate_hz), len(both) // 4)
+        chance += float((both[far:-far] ** 2).mean())
+        like += both[np.arange(-near, near + 1)]
+        expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
+    deviation = float(np.sqrt(chance))
+    if not deviation > 0:  # nothing is told
+        return Likeness(run, by, 0.0, 0.0)
+    return Likeness(run, by, float(like.max()) / deviation, expected / deviation)
+
+
+def _even(read: Array, told: Array, rate_hz: float) -> tuple[Array, Array]:
+    """What was read and what was told (n,), both over the square root of the power that was read at each frequency."""
+    n = len(read)
+    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (_TAPER * n)
+    taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
+    ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, told))
+    f_hz = np.fft.rfftfreq(n, 1 / rate_hz)
+    power = _smooth(np.abs(ours) ** 2, round(_SMOOTH_HZ * n / rate_hz))
+    used = (f_hz >= _LOWEST_HZ) & (f_hz <= _HIGHEST_OF_RATE * rate_hz) & (power > 0)
+    gain = np.where(used, 1 / np.sqrt(np.where(used, power, 1.0)), 0.0)
+    return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
+
+
+def _steady(samples: Array, rate_hz: float) -> Array:
+    """Samples (n,) as strong all along: two roads that have a bump at about one place are two roads all the same."""
+    envelope = np.sqrt(_smooth(samples**2, round(_SMOOTH_S * rate_hz)))
+    return np.asarray(samples / np.maximum(envelope, 1e-300))
+
+
+def _smooth(power: Array, width: int) -> Array:
+    """Means (n,) of so many neighbours."""
+    width = max(1, width)
+    around = np.pad(power, width, mode="reflect")
+    return np.asarray(np.convolve(around, np.ones(width) / width, "same")[width:-width])

@@ -1,0 +1,71 @@
+"""Effects tried beside a model of drives over an unknown road, by its slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.selection.screening import scaled_by
+from logger.lab.unknown_road.fisher_scoring import Fitted, granted, inverse, sloped
+from logger.lab.unknown_road.likelihood import PROBES, SameRoad
+from logger.vehicle.effect import Chosen
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect at some values beside a model.
+
+    gain           what it promises, in minus twice the log-likelihood
+    at             the values at which it does
+    deviations     how many standard errors it stands out by at its values beside all that is free
+    beside_road    the same share of its information (0 to 1) that roads and places do not take
+    """
+
+    one: Chosen
+    gain: float
+    at: Chosen
+    deviations: float
+    beside_road: float
+
+
+def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
+    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response."""
+    state = base.state
+    gains, own = sloped(problem, state.effects, base.moves, state.logs)
+    changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
+    k, p = len(ones), len(own)
+    look = problem.look(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
+    rest = np.r_[0:p, p + k : p + k + problem.count]
+    road = np.arange(p + k, p + k + problem.count)
+    pull, grant = granted(problem, state.logs, len(base.moves), state.roads)
+    known = inverse(look.information[np.ix_(rest, rest)] + np.diag(grant))
+    by_road = inverse(look.information[np.ix_(road, road)] + np.diag(grant[p:]))
+    score = look.slopes[rest] - pull
+    found = []
+    for index, one in enumerate(ones, p):
+        alone, mixed = look.information[index, index], look.information[index, rest]
+        left = max(float(alone - mixed @ known @ mixed), 0.0)
+        taken = look.information[index, road]
+        share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
+        slope = float(look.slopes[index] - mixed @ known @ score)
+        found.append(_trial(one, slope, left, alone, share))
+    return found
+
+
+_STRONGEST, _WEAKEST, _NOTHING = 3.0, 0.03, 1e-4
+
+
+def _trial(one: Chosen, slope: float, left: float, alone: float, share: float) -> Trial:
+    if not left > _NOTHING * alone:
+        return Trial(one, 0.0, one, 0.0, max(share, 0.0))
+    strength = float(np.clip(slope / left, _WEAKEST, _STRONGEST))
+    scaled = scaled_by(one, strength)
+    if scaled is None:
+        strength, scaled = 1.0, one
+    gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / PROBES)
+    return Trial(one, gain, scaled, float(np.sqrt(left)), max(share, 0.0))

@@ -1,0 +1,117 @@
+"""A comparison in sentences for a person, and as one object for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.compare import FAR_SIGMA, Comparison, Standing
+from logger.lab.residuals.breakdown import Part
+from logger.lab.residuals.residual_tests import ResidualTest
+from logger.report.quantities import distance_error
+from logger.runs import normalised_rms_error
+
+Array = npt.NDArray[np.float64]
+
+_HELPS = 0.97
+_MOST_MOVES = 3
+
+
+def headline(found: Comparison) -> list[str]:
+    """How well the model does, with its numbers as they stand and refitted."""
+    plain, refitted = found.plain, found.refitted
+    left, measured = (_rms(one) for one in (plain.residuals.left, plain.residuals.measured))
+    lines = [f"The residual (measured - model) is {left:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
+             f"{plain.error:.3f}."]
+    refit = "with masses, springs, dampers and distances refitted within their tolerance"
+    if any(one.effect.parameters for one in found.effects):
+        refit += " (and the numbers of its effects)"
+    if refitted.error < _HELPS * plain.error:
+        share = 1 - (refitted.error / plain.error) ** 2
+        lines.append(f"{refit.capitalize()}, the error is {refitted.error:.3f}: the refit removes {share:.0%} of the "
+                     "residual's power.")
+    else:
+        lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
+    lines += distance_error(found.distance_error_m)
+    if found.far:
+        named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
+        lines.append(f"The refit moved {named}, more than {FAR_SIGMA:g} standard deviations of their tolerance. An "
+                     "effect that the model lacks biases them: do not trust these values.")
+    return lines
+
+
+def evidence(found: Comparison) -> list[str]:
+    """What speaks for a missing effect, or against one."""
+    if not found.tells:
+        return ["The residual is smaller than the difference between two correct simulations of one car: it is no "
+                "evidence."]
+    if not found.tests_found:
+        return ["No test finds more than noise in the residual."]
+    return [test.sentence for test in found.tests_found]
+
+
+def conclusion(found: Comparison) -> str:
+    """What it comes to, and what to do next."""
+    if found.missing and not any(test.road for test in found.tests_found):
+        return ("The residual is hardly more than noise, but only with numbers far from those of the vehicle's file. "
+                "Either the file is wrong, or such numbers imitate an effect that is missing. Next: ridelog diagnose "
+                "with the same arguments.")
+    if found.missing:
+        return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
+                "diagnose with the same arguments says which physical effect would explain it.")
+    if found.tests_found:
+        return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
+                "Nothing here asks for another effect of the car.")
+    return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
+
+
+# --- for a program ---
+
+
+def as_json(found: Comparison) -> dict[str, Any]:
+    """The comparison as one JSON object; error and where are of the model as it stands."""
+    return {
+        **_standing_json(found.plain),
+        "evidence": [*headline(found), *evidence(found), conclusion(found)],
+        "missing": found.missing,
+        "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
+        "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
+    }
+
+
+def _standing_json(standing: Standing) -> dict[str, Any]:
+    residuals, where = standing.residuals, standing.where
+    return {
+        "error": standing.error,
+        "runs": [{"run": run.name, "error": _finite(normalised_rms_error([run], [prediction])),
+                  "samples": run.count - run.first}
+                 for run, prediction in zip(residuals.runs, residuals.predictions, strict=True)],
+        "where": {
+            "frequency": [{**_part_json(part, "hz"), "name": part.name} for part in where.frequency],
+            "speed": [_part_json(part, "mps") for part in where.speed],
+            "amplitude": [_part_json(part, "mps2") for part in where.amplitude],
+            "place": [{**_part_json(part, "m"), "run": part.name}
+                      for part in sorted(where.place, key=lambda part: -part.share)],
+        },
+    }
+
+
+def _part_json(part: Part, unit: str) -> dict[str, Any]:
+    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": _finite(part.error),
+            "error_power_share": part.share}
+
+
+def _test_json(test: ResidualTest, found: bool) -> dict[str, Any]:
+    return {"name": test.name, "found": found, "value": _finite(test.value), "unit": test.unit,
+            "standard_error": _finite(test.standard_error), "p_value": _finite(test.p_value)}
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else value
+
+
+def _rms(signals: Sequence[Array]) -> float:
+    return float(np.sqrt(sum(float(one @ one) for one in signals) / sum(map(len, signals))))

@@ -1,0 +1,140 @@
+"""A diagnosis in sentences for a person, and as one object for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from logger.lab.diagnosis import Diagnosis
+from logger.lab.residuals.unexplained import Shape, sentences
+from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
+from logger.report.quantities import chance, distance_error, finite, numbers_of
+from logger.vehicle.effect import Chosen
+
+JUDGED_ON = "stretches that no fit saw"
+"""What the errors of steps and candidates are errors of."""
+_MOST_HIDDEN = 6
+
+
+def summary(found: Diagnosis) -> list[str]:
+    """What is missing, how certain that is, and what it could be instead: paragraphs."""
+    lines = [_missing(found, one) for one in found.missing]
+    if not lines and not found.unexplained:
+        lines.append("Nothing is missing: with the car's numbers refitted within their tolerance, the residual is "
+                     "hardly more than the sensor's noise.")
+    if found.left_over:
+        lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: in the worst run "
+                     f"the residual is {1 + found.excess:.3g} times the sensor's noise.")
+        if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
+            lines.append(f"Candidates that improve the fit by less than {IMITATION:.0%} of what a full explanation "
+                         "would are not named: they may only imitate what is missing.")
+    if found.conflicts:
+        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
+        lines.append(f"The fit needs numbers outside their tolerance: {off}. Either the vehicle's file is wrong "
+                     "there, or an effect is missing that no candidate explains.")
+    lines += distance_error(found.distance_error_m)
+    lines.append(_errors(found))
+    lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
+    dropped = [name for name in _on_the_way(found) if name not in found.verdict]
+    if dropped:
+        lines.append(f"Added during the search and dropped again, because the others explain it: {', '.join(dropped)}.")
+    return lines
+
+
+def looks_like(found: Diagnosis) -> list[str]:
+    """What no candidate explains, described; nothing where no more than noise is left."""
+    return [] if found.shape is None else sentences(found.shape)
+
+
+def untested(found: Diagnosis) -> list[str]:
+    """What these runs cannot tell of, and which drive would."""
+    lines = [f"{name}: could not be tried, {why}." for name, why in found.not_tried.items()]
+    lines += [f"{one.effect.name}: these runs could miss it. At its usual strength it stands out by "
+              f"{one.deviations:.1f} standard deviations, and {DETECTABLE_SIGMA:g} are needed. To see it: "
+              f"{one.effect.shown_by}."
+              for one in found.undetectable[:_MOST_HIDDEN]]
+    if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
+        lines.append(f"These runs could also miss: {', '.join(rest)}.")
+    return lines
+
+
+def _missing(found: Diagnosis, one: Chosen) -> str:
+    numbers = f": {numbers_of(one)}" if one.values else ""
+    candidate = found.candidate(one.effect.name)
+    says = "is missing"
+    if found.unexplained:
+        says = "would explain part of what is missing, or imitates something else"
+    return (f"{one.effect.name} {says} ({one.effect.title}){numbers}. "
+            f"The probability that noise alone looks like this, all candidates together: {chance(candidate.p_value)}.")
+
+
+def _errors(found: Diagnosis) -> str:
+    by_step = [f"{step.error:.3f} {_STEP_WORDS.get(step.words, step.words)}" for step in found.steps]
+    return (f"Error on {JUDGED_ON}: {', '.join(by_step)}. The sensor's noise alone makes about "
+            f"{found.noise_floor_error:.3f}.")
+
+
+_STEP_WORDS = {
+    "the vehicle as its file says": "as the vehicle's file says",
+    "its numbers refitted": "with its numbers refitted",
+}
+
+
+def _confusion(found: Diagnosis, one: Chosen) -> str:
+    """What explains as well, and which drive would tell."""
+    others = found.candidate(one.effect.name).confused_with
+    drives = [f"{name}: {found.catalogue[name].shown_by}" for name in (one.effect.name, *others)]
+    return (f"These runs cannot tell {one.effect.name} from {' or '.join(others)}: each explains about as much. What "
+            f"shows each best, and so would separate them: {'; '.join(drives)}.")
+
+
+def _on_the_way(found: Diagnosis) -> list[str]:
+    return [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
+
+
+def table(found: Diagnosis, most: int | None = None) -> Iterator[tuple[str, str, str, str]]:
+    """The candidates, best first: name, error, chance, numbers."""
+    by_name = {one.effect.name: one for one in found.missing}
+    for one in found.candidates[:most]:
+        name = one.effect.name
+        numbers = numbers_of(by_name.get(name, Chosen(one.effect, one.values)))
+        yield name, f"{one.error:.3f}", chance(one.p_value), numbers
+
+
+# --- for a program ---
+
+
+def as_json(found: Diagnosis) -> dict[str, Any]:
+    """The diagnosis as one JSON object."""
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    return {
+        "baseline_error": found.baseline_error, "noise_floor_error": found.noise_floor_error,
+        "unseen_noise_floor_error": found.noise_floor_error, "judged_on": JUDGED_ON,
+        "candidates": [
+            {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),
+             "log_likelihood_gain": one.gain / 2, "unseen_log_likelihood_gain": one.held_out_gain / 2}
+            for one in found.candidates],
+        "verdict": list(found.verdict), "unexplained": found.unexplained,
+        "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
+        "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        "not_tried": found.not_tried,
+        "hidden": {one.effect.name: one.deviations for one in found.undetectable},
+        "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
+        "sentences": [*summary(found), *looks_like(found)],
+    }
+
+
+def _shape_json(shape: Shape) -> dict[str, Any]:
+    forces, line = shape.tests.forces, shape.line
+    return {
+        "sentences": sentences(shape),
+        "force_by_rate": {"rate_mps": forces.by_rate.at.tolist(), "force_n": forces.by_rate.force_n.tolist(),
+                          "standard_error_n": forces.by_rate.error_n.tolist(), "share": forces.by_rate.share},
+        "force_by_travel": {"travel_m": forces.by_travel.at.tolist(), "force_n": forces.by_travel.force_n.tolist(),
+                            "standard_error_n": forces.by_travel.error_n.tolist(), "share": forces.by_travel.share},
+        "frequency": [{"from_hz": part.low, "to_hz": part.high, "error_power_share": part.share, "name": part.name}
+                      for part in shape.where.frequency],
+        "repeats_every_m": 1 / line.at_per_m if line is not None and line.found and not line.steady else None,
+    }

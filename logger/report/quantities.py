@@ -1,0 +1,77 @@
+"""Numbers with their errors and units, as a person reads them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import floor, isfinite, log10
+
+from logger.vehicle.effect import Chosen
+
+_SYMBOLS = {
+    "n": "N", "kg": "kg", "w": "W", "j": "J", "pa": "Pa", "hz": "Hz", "m": "m", "mm": "mm", "km": "km", "s": "s",
+    "ms": "ms", "rad": "rad", "deg": "deg", "mps": "m/s",
+}
+_UNIT = rf"(?:{'|'.join(_SYMBOLS)})[2-9]?"
+# The end of a name: N s2 of ``_n_s2``, kg m2, or one unit; then what that is per, if anything. Products begin with one
+# of the first five, so that the ``m`` of ``_m_kg`` belongs to the name.
+_ENDING = re.compile(rf"(?:_(?P<over>(?:n|kg|w|j|pa)(?:_(?:m|s|rad)[2-9]?)+|{_UNIT}))?"
+                     rf"(?P<under>(?:(?:^|_)per_{_UNIT}(?:_{_UNIT})*)*)$")
+_LARGE, _SMALL = 1e6, 1e-3
+_RARE = 1e-9
+
+
+def unit_of(name: str) -> str:
+    """The unit that a name ends in, ``N s/m`` of ``damping_n_s_per_m``, ``1/s`` of ``decay_per_s``; nothing for a
+    ratio."""
+    ending = _ENDING.search(name)
+    assert ending is not None  # the end alone is one
+    over, under = _product(ending["over"] or ""), [_product(one) for one in ending["under"].split("per_")[1:]]
+    return "/".join([over or "1" * bool(under), *(f"({one})" if {" ", "/"} & set(one) else one for one in under)])
+
+
+def _product(words: str) -> str:
+    """Symbols of units: ``N s2`` of ``n_s2``."""
+    return " ".join(_SYMBOLS[word.rstrip("23456789")] + word.lstrip("abcdefghijklmnopqrstuvwxyz")
+                    for word in words.split("_") if word)
+
+
+def measured(value: float, error: float | None) -> str:
+    """A value with its standard error, in no more digits than it deserves: ``85 ± 4``, ``1.61e6 ± 0.04e6``."""
+    if error is None or not isfinite(error) or not error > 0 or not isfinite(value):
+        return f"{value:.3g}"
+    decimals = 1 - floor(log10(error)) - (error / 10.0 ** floor(log10(error)) >= 2)
+    size = max(abs(value), error)
+    if _SMALL <= size < _LARGE:
+        return " ± ".join(f"{round(one, decimals):.{max(decimals, 0)}f}" for one in (value, error))
+    power = floor(log10(size))
+    return " ± ".join(f"{one / 10.0**power:.{max(decimals + power, 0)}f}e{power}" for one in (value, error))
+
+
+def numbers_of(one: Chosen) -> str:
+    """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none."""
+    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items())
+
+
+def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:
+    return f"{measured(value, errors.get(name))} {unit_of(name)}".rstrip()
+
+
+def chance(p_value: float) -> str:
+    """How probable, for a sentence."""
+    if p_value < _RARE:
+        return "below 1e-9"
+    return f"{p_value:.2g}" if p_value < 0.1 else f"{p_value:.0%}"
+
+
+def finite(errors: Mapping[str, float]) -> dict[str, float]:
+    """Those standard errors that are known."""
+    return {name: error for name, error in errors.items() if isfinite(error)}
+
+
+def distance_error(off_m: float) -> list[str]:
+    """A sentence on distances that are off by so much at most [m], if that is more than usual; nothing for 0."""
+    if off_m == 0:
+        return []
+    return [f"The distances of these runs are off by more than usual: up to {off_m:.2g} m. The fits take that into "
+            "account."]

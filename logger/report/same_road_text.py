@@ -1,0 +1,67 @@
+"""A diagnosis without a profile in sentences for a person, and as one object for a program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from logger.lab.unknown_road.diagnosis import Found
+from logger.report.quantities import chance, finite, numbers_of
+
+
+def summary(found: Found) -> list[str]:
+    """What is missing, how certain that is, and what it could be instead: paragraphs."""
+    lines = []
+    for one in found.missing:
+        candidate = next(other for other in found.candidates if other.one.effect.name == one.effect.name)
+        numbers = f": {numbers_of(one)}" if one.values else ""
+        lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
+                     f"looks like this, all candidates together: {chance(candidate.p_value)}.")
+        if candidate.confused_with:
+            lines.append(f"These drives cannot tell {one.effect.name} from {' or '.join(candidate.confused_with)}.")
+    if not lines:
+        lines.append("None of the effects that can be tried without a profile is missing.")
+    by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
+               for index, (words, error) in enumerate(found.steps)]
+    lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
+                 f"noise alone makes {found.floor_error:.3f}.")
+    if found.unexplained:
+        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
+                     "missing, maybe one of the effects that only a measured road can show.")
+    return lines
+
+
+def cannot_tell(found: Found) -> list[str]:
+    """What these drives cannot tell, in sentences."""
+    lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
+             "noise." for one, other in found.doubtful]
+    if found.taken_by_road:
+        lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
+                     "measured would do the same.")
+    lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
+              for why in dict.fromkeys(found.untried.values())]
+    lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
+              "deviations."
+              for name, deviations in found.hidden.items()]
+    return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
+
+
+def as_json(found: Found) -> dict[str, Any]:
+    """The diagnosis as one JSON object."""
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    values = {one.effect.name: dict(one.values) for one in found.missing}
+    return {
+        "baseline_error": found.steps[0][1], "noise_floor_error": found.floor_error,
+        "candidates": [
+            {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
+             "error": one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "fitted": one.fitted,
+             "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
+            for one in found.candidates],
+        "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
+        "left_over_noise": 1 + found.excess,
+        "steps": [{"step": words, "error": error} for words, error in found.steps],
+        "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
+        "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
+        "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),
+        "sentences": [*summary(found), *cannot_tell(found)],
+    }

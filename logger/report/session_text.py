@@ -1,0 +1,46 @@
+"""The lab's whole loop in sentences for a person, and as one object for a program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from logger.lab.session import Story
+from logger.report.add_effect_text import bias
+
+
+def ending(story: Story) -> list[str]:
+    """What it came to."""
+    diagnosis, steps = story.diagnoses[-1], story.steps
+    with_what = [bias(story.added, story.moved)] if story.added else []
+    lines = []
+    if story.added:
+        lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f} to {steps[-1][1]:.3f}, "
+                     "before and after with the car's numbers and the distances refitted within their tolerance. "
+                     f"As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
+    lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
+    if story.refused:
+        lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
+    if story.left:
+        lines.append(f"Found missing and not added: {', '.join(story.left)}. Go on with the last file.")
+    if story.refused or story.left:
+        return [*lines, *with_what]
+    if diagnosis.conflicts and not diagnosis.left_over:
+        lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
+    elif diagnosis.unexplained:
+        lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
+    else:
+        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can tell.")
+    return [*lines, *with_what]
+
+
+def as_json(story: Story) -> dict[str, Any]:
+    """The story as one JSON object."""
+    return {
+        "error_before": story.steps[0][1], "error_after": story.steps[-1][1], "noise_floor_error": story.floor,
+        "added": story.added, "refused": list(story.refused), "left": story.left,
+        "unexplained": story.diagnoses[-1].unexplained,
+        "steps": [{"step": words, "error": error} for words, error in story.steps],
+        "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
+        "biased": [one.name for one in story.moved if one.biased],
+        "vehicles": [one.file for one in story.rounds], "sentences": ending(story),
+    }

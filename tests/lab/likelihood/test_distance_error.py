@@ -1,0 +1,229 @@
+"""Distance errors: their numbers against plain calculus, how large they are found to be, and distances that wander
+laid where they were truly driven."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError, rate_of_change, unusual_m
+from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import Tolerance
+from logger.runs import Run
+from logger.vehicle.effect import Chosen, chosen
+
+from ...support.lab.noisy_runs import (
+    EFFECTS,
+    drawn,
+    noisy_runs,
+    off_m,
+    posterior_of,
+    tire_damping,
+    with_wrong_speed,
+    worst_rms,
+)
+from ...support.lab.runs_with_residual import a_run
+
+RATE_HZ = 100.0
+INNER = slice(50, -50)
+RUN = a_run("run", 10.0, 20.0, 1)
+ERROR = RecordError.of(RUN, Tolerance())
+SPEED_SCALE, TIME_OFFSET = EFFECTS["speed_scale"], EFFECTS["time_offset"]
+
+
+def laid(runs: list[Run], effects: tuple[Chosen, ...] = ()) -> tuple[Posterior, State]:
+    """Runs with their distance errors fitted."""
+    posterior = posterior_of(runs)
+    return posterior, aligned(posterior, posterior.start(effects))
+
+
+def gain_of(runs: list[Run], one: Chosen) -> tuple[float, Chosen]:
+    """By how much an effect makes a model more evident whose numbers and distance errors are all fitted; and it."""
+    posterior, without = laid(runs)
+    found = fit(posterior, aligned(posterior, posterior.start([one])))
+    return fit(posterior, without).linear.score - found.linear.score, found.state.effects[0]
+
+
+# --- the numbers of a record's error ---
+
+
+@pytest.mark.parametrize(("at_hz", "within"), [(1.0, 1e-9), (10.0, 1e-9), (25.0, 1e-6), (33.0, 3e-4)])
+def test_the_rate_of_change_of_a_wave_is_its_derivative(at_hz: float, within: float) -> None:
+    time_s = np.arange(1000) / RATE_HZ
+    turn = 2 * np.pi * at_hz
+    found = rate_of_change(np.sin(turn * time_s + 0.4), RATE_HZ)
+    assert np.abs(found - turn * np.cos(turn * time_s + 0.4))[INNER].max() < within * turn
+
+
+def test_a_recorder_that_averages_over_its_samples_is_granted_its_droop() -> None:
+    wave = np.sin(2 * np.pi * 20.0 * RUN.time_s)
+    k = np.zeros(ERROR.count)
+    k[-2:] = 0.01, np.pi**2 / 6  # sin(x) / x is 1 - x^2 / 6 with x = pi f / rate
+    expected = (1.01 - (np.pi * 20.0 / RUN.rate_hz) ** 2 / 6) * wave
+    assert ERROR.recorded(wave, k)[INNER] == pytest.approx(expected[INNER], abs=1e-3)
+    assert ERROR.moved_m(k) == pytest.approx(0.0)
+
+
+def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
+    """A prediction at a place farther by d is that of d / speed later; waves here are slow enough to be told so."""
+    time_s = RUN.time_s
+    k = 1e-3 * np.sin(np.arange(ERROR.count))
+    k[-4] *= 0.01  # the factor, by which a whole run is multiplied
+
+    def wave(at_s: np.ndarray) -> np.ndarray:
+        return np.sin(2 * np.pi * 1.3 * at_s) + 0.5 * np.sin(2 * np.pi * 4.1 * at_s)
+
+    later = wave(time_s + ERROR.moved_m(k) / RUN.speed_mps)
+    found = k @ ERROR.slopes(wave(time_s))
+    expected = ERROR.recorded(later, k) - wave(time_s)
+    assert np.abs(found - expected)[INNER].max() < 0.01 * np.abs(expected).max()
+
+
+def test_knots_go_through_what_is_straight_between_them() -> None:
+    line_m = 0.3 - 0.002 * np.arange(RUN.count)
+    assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
+
+
+@pytest.mark.parametrize(("lasts_s", "knots"), [(20.0, 81), (100.0, 401), (150.0, 480), (400.0, 480)])
+def test_longer_runs_have_more_knots_up_to_a_limit(lasts_s: float, knots: int) -> None:
+    assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).knots == knots
+
+
+# --- the prior ---
+
+
+def test_the_prior_has_the_deviations_that_it_was_given() -> None:
+    size = ErrorSize(start_m=0.01, walk_m=0.02, scale=0.001)
+    covariance = np.linalg.inv(ERROR.precision(size))
+
+    def deviation_m(sample: int) -> float:
+        rows = np.array([ERROR.moved_m(one)[sample] for one in np.eye(ERROR.count)])
+        rows[-3] = 0.0  # what of the distance is rougher than any car drives is not of this size
+        return float(np.sqrt(rows @ covariance @ rows))
+
+    driven_m = np.ptp(RUN.distance_m)
+    assert deviation_m(0) == pytest.approx(0.01, rel=1e-6)
+    expected_m = np.sqrt(0.01**2 + 0.02**2 * RUN.time_s[-1] + (0.001 * driven_m) ** 2)
+    assert deviation_m(-1) == pytest.approx(expected_m, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [USUAL, ErrorSize(0.05, 0.001, 0.01)])
+def test_the_determinant_is_that_of_the_precision(size: ErrorSize) -> None:
+    sign, expected = np.linalg.slogdet(ERROR.precision(size))
+    assert sign == 1
+    assert ERROR.log_determinant(size) == pytest.approx(expected)
+
+
+def test_sizes_are_kept_as_logarithms_and_the_usual_ones_cost_nothing() -> None:
+    size = ErrorSize(0.05, 0.001, 0.01)
+    assert astuple(ErrorSize.of(size.logs)) == pytest.approx(astuple(size))
+    assert USUAL.cost == 0.0 < ErrorSize(walk_m=0.01).cost < ErrorSize(start_m=0.01).cost
+
+
+def test_more_than_a_good_recorder_is_off_by_is_told_and_no_less() -> None:
+    usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * 20.0 + (USUAL.scale * np.ptp(RUN.distance_m)) ** 2)
+    for factor, expected in ((2.5, 0.0), (4.0, 4.0 * usual_m)):
+        k = ERROR.through(np.full(RUN.count, -factor * usual_m))
+        assert unusual_m([ERROR, ERROR], [np.zeros(ERROR.count), k]) == pytest.approx(expected)
+
+
+# --- sizes that are found ---
+
+
+@pytest.mark.parametrize("size", [ErrorSize(0.004, 0.004, 0.0003), ErrorSize(0.004, 0.03, 0.0003),
+                                  ErrorSize(0.02, 0.015, 0.0003)])
+def test_the_size_of_a_walk_is_found(size: ErrorSize) -> None:
+    found = []
+    for seed in range(6):
+        case = drawn([], seed, size)
+        start = case.posterior.at((), case.logs)
+        found.append(np.log(aligned(case.posterior, start).size.walk_m / size.walk_m))
+    assert np.mean(found) == pytest.approx(0.0, abs=0.35)
+    assert np.std(found) < 0.6
+
+
+def test_a_start_that_is_far_off_is_no_walk() -> None:
+    true = noisy_runs()
+    late = [replace(run, distance_m=run.distance_m + off) for run, off in zip(true, (0.06, -0.09), strict=True)]
+    posterior, state = laid(late)
+    assert worst_rms([one + off for one, off in zip(posterior.moved_m(state.record), (0.06, -0.09), strict=True)],
+                     true) < 0.005
+    assert state.size.start_m > 3 * USUAL.start_m and state.size.walk_m < USUAL.walk_m
+
+
+# --- distances that wander ---
+
+
+# As far as a real signal is off (0.08 m/s), from one reading to the next or for seconds.
+@pytest.fixture(scope="module", params=[(0.08, 0.02), (0.08, 1.0), (0.08, 5.0)], ids=["rough", "1 s", "5 s"])
+def wrong(request: pytest.FixtureRequest) -> tuple[float, float]:
+    return request.param  # type: ignore[no-any-return]
+
+
+def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> None:
+    true = noisy_runs()
+    runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(true)]
+    posterior, state = laid(runs)
+    truth_m = off_m(runs, true)
+    left_m = [found - one for found, one in zip(posterior.moved_m(state.record), truth_m, strict=True)]
+    before_m = worst_rms(truth_m, true)
+    assert before_m > 0.02 and worst_rms(left_m, true) < min(0.01, 0.5 * before_m)
+    undisturbed = posterior_of(true)
+    assert posterior.error(state) < 1.05 * undisturbed.error(undisturbed.start())
+
+
+@pytest.mark.parametrize("true", [0.0, 300.0])
+def test_a_distance_that_wanders_hides_no_physics_and_makes_none(wrong: tuple[float, float], true: float) -> None:
+    runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(noisy_runs([tire_damping(true)]))]
+    gain, tires = gain_of(runs, tire_damping(150.0))
+    assert gain > 50 if true else gain < 2
+    assert tires.p.tire_damping_n_s_per_m == pytest.approx(true, abs=80.0)
+
+
+def test_runs_that_do_not_wander_stay_where_they_were_recorded() -> None:
+    true = noisy_runs()
+    posterior, state = laid(true)
+    assert worst_rms(posterior.moved_m(state.record), true) < 0.003
+    assert unusual_m(posterior.record_errors, state.record) == 0.0
+    assert state.size.walk_m < USUAL.walk_m
+
+
+WHEEL = chosen(SPEED_SCALE, {"scale": 1.01})
+
+
+@pytest.mark.parametrize(("one", "start"), [
+    (WHEEL, chosen(SPEED_SCALE, {"scale": 1.0098})),
+    (chosen(SPEED_SCALE, {"scale": 1.04}), chosen(SPEED_SCALE, {"scale": 1.0398})),
+    (chosen(TIME_OFFSET, {"delay_s": 0.06}), chosen(TIME_OFFSET, {"delay_s": 0.05})),
+], ids=["a wheel 1 % off", "a wheel 4 % off", "a late clock"])
+def test_a_wrong_wheel_and_a_late_clock_are_no_distance_errors(one: Chosen, start: Chosen) -> None:
+    gain, found = gain_of(noisy_runs([one]), start)
+    assert gain > 10
+    (name,) = one.values
+    assert found.values[name] == pytest.approx(one.values[name], abs=0.002 if name == "delay_s" else 3e-4)
+
+
+def test_a_wrong_wheel_is_found_from_a_start_that_is_a_little_off() -> None:
+    _, found = gain_of(noisy_runs([WHEEL]), chosen(SPEED_SCALE, {"scale": 1.008}))
+    assert found.values["scale"] == pytest.approx(1.01, abs=5e-4)
+
+
+@pytest.mark.parametrize("apart", [0.001, 0.004])
+def test_runs_may_each_have_their_own_factor_and_start(apart: float) -> None:
+    true = noisy_runs([tire_damping(300.0)], speeds_mps=(8.0, 14.0, 11.0))
+    runs = [replace(run, distance_m=(1 + share * apart) * run.distance_m + start)
+            for run, share, start in zip(true, (1.0, -0.8, 0.3), (0.06, -0.04, 0.0), strict=True)]
+    gain, tires = gain_of(runs, tire_damping(150.0))
+    assert gain > 50
+    assert tires.p.tire_damping_n_s_per_m == pytest.approx(300.0, abs=80.0)
+
+
+def test_distances_that_are_coarse_from_sample_to_sample_are_smoothed() -> None:
+    true, rng = noisy_runs(), np.random.default_rng(7)
+    coarse = [replace(run, distance_m=run.distance_m + rng.normal(0, 0.05, run.count)) for run in true]
+    (posterior, state), (undisturbed, still) = laid(coarse), laid(true)
+    assert posterior.error(posterior.start()) > 1.3 * posterior.error(state)
+    assert posterior.error(state) < 1.1 * undisturbed.error(still)

@@ -1,0 +1,193 @@
+"""A posterior beside a state: what is eliminated run by run is what the whole dense system says, the gradient is that
+of the objective, and the sizes of distance errors are those with the most evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.linalg import block_diag, solve_triangular
+from scipy.optimize import minimize
+
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import effect_slopes
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.vehicle.effect import chosen
+from logger.vehicle.effect_parameters import moves_of
+
+from ...support.lab.noisy_runs import EFFECTS, drawn, noisy_runs, posterior_of, tire_damping
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A state off the best one in every respect, and slopes of two effects' numbers."""
+
+    posterior: Posterior
+    state: State
+    linear: LinearModel
+    own: list[Array]
+
+
+@cache
+def case() -> Case:
+    posterior = posterior_of(noisy_runs([tire_damping(300.0)], lasts_s=10.0))
+    rng = np.random.default_rng(1)
+    logs = 0.5 * posterior.prior.deviations * rng.normal(size=len(posterior.prior.names))
+    record = [1e-3 * rng.normal(size=one.count) for one in posterior.record_errors]
+    effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
+    state = posterior.at(effects, logs, record)
+    linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
+    own = effect_slopes(linear, effects, logs, moves_of(effects), state.predictions)
+    return Case(posterior, state, linear, linear.whitened(own))
+
+
+@dataclass(frozen=True, eq=False)
+class Dense:
+    """The whole system of one model: whitened slopes (numbers of the car, of effects and of all records; samples) and
+    the prior's precision."""
+
+    columns: Array
+    precision: Array
+    outer: int
+
+
+def dense(one: Case) -> Dense:
+    linear, parts = one.linear, []
+    assert linear.numbers is not None
+    record = [whitener(error.slopes(prediction)) for whitener, error, prediction in zip(
+        linear.whiteners, one.posterior.record_errors, one.state.predictions, strict=True)]
+    for index, (whitener, numbers, own) in enumerate(zip(linear.whiteners, linear.numbers, one.own, strict=True)):
+        of_records = [block if index == other else np.zeros((len(block), record[index].shape[1]))
+                      for other, block in enumerate(record)]
+        parts.append(np.concatenate([whitener(numbers), own, *of_records]))
+    precision = block_diag(np.diag(one.posterior.prior.curvature(one.state.logs)), np.zeros((len(one.own[0]),) * 2),
+                           *(error.precision(linear.size) for error in one.posterior.record_errors))
+    return Dense(np.concatenate(parts, axis=1), precision, linear.count + len(one.own[0]))
+
+
+def scaled(information: Array) -> tuple[Array, Array]:
+    """With a diagonal of ones, and the roots of what it was."""
+    size = np.sqrt(np.diag(information))
+    return information / np.outer(size, size), size
+
+
+def test_the_information_is_the_dense_one_with_the_records_integrated_out() -> None:
+    one, whole = case(), dense(case())
+    full, size = scaled(whole.columns @ whole.columns.T + whole.precision)
+    expected = np.linalg.inv(np.linalg.inv(full)[: whole.outer, : whole.outer])
+    found = one.linear.information(one.state.logs, one.own) / np.outer(size[: whole.outer], size[: whole.outer])
+    assert found == pytest.approx(expected, abs=1e-8)
+    alone = one.linear.information(one.state.logs)
+    assert alone == pytest.approx(one.linear.information(one.state.logs, one.own)[: len(alone), : len(alone)])
+
+
+def test_the_most_likely_records_are_those_of_least_squares() -> None:
+    one, whole = case(), dense(case())
+    rng = np.random.default_rng(2)
+    predictions = [each + rng.normal(0, 0.02, len(each)) for each in one.state.predictions]
+    found = one.linear.eliminated(predictions)
+    white = np.concatenate(one.linear.whitened([measured - each for measured, each in zip(
+        one.posterior.measured, predictions, strict=True)]))
+    columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
+    here = np.concatenate(one.state.record)
+    root = np.linalg.cholesky(precision).T
+    step, *_ = np.linalg.lstsq(np.vstack([columns.T, root]), np.concatenate([white, -root @ here]), rcond=None)
+    left = white - step @ columns
+    assert np.concatenate(found.record) == pytest.approx(here + step, abs=1e-7)
+    assert np.concatenate(found.residuals) == pytest.approx(left, abs=1e-6)
+    assert found.squares == pytest.approx(left @ left + (here + step) @ precision @ (here + step), rel=1e-9)
+
+
+def test_the_gradient_is_that_of_the_objective() -> None:
+    one = case()
+    assert one.linear.numbers is not None
+    numbers, logs = one.linear.numbers, one.state.logs
+    own = effect_slopes(one.linear, one.state.effects, logs, moves_of(one.state.effects), one.state.predictions)
+
+    def objective(x: Array) -> float:
+        there = [each + x[: len(logs)] @ of_car + x[len(logs):] @ of_effects for each, of_car, of_effects in zip(
+            one.state.predictions, numbers, own, strict=True)]
+        return one.linear.objective(there, logs + x[: len(logs)])
+
+    residuals = one.linear.eliminated(one.state.predictions).residuals
+    found = one.linear.gradient(residuals, logs, one.own)
+    steps = np.diag(1e-3 / np.sqrt(np.diag(one.linear.information(logs, one.own))))
+    expected = [-(objective(step) - objective(-step)) / (4 * step.sum()) for step in steps]
+    size = np.sqrt(np.diag(one.linear.information(logs, one.own)))
+    assert found / size == pytest.approx(expected / size, abs=1e-4)
+
+
+def test_one_column_has_the_products_of_the_information() -> None:
+    one = case()
+    information = one.linear.information(one.state.logs, one.own)
+    mixed, with_itself = one.linear.mixed([each[0] for each in one.own])
+    assert mixed == pytest.approx(information[one.linear.count, : one.linear.count])
+    assert with_itself == pytest.approx(information[one.linear.count, one.linear.count])
+
+
+def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> None:
+    one, whole = case(), dense(case())
+    columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
+    occam = np.linalg.slogdet(columns @ columns.T + precision)[1] - np.linalg.slogdet(precision)[1]
+    state = one.linear.state
+    expected = one.posterior.deviance(state) + one.posterior.cost(state) + occam + 2 * np.log(one.posterior.freedom)
+    assert one.linear.score == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_sizes_are_those_with_the_most_evidence() -> None:
+    """Against the density of the whitened residual with all distance errors integrated out, as a matrix."""
+    posterior = drawn([], 3, ErrorSize(0.01, 0.02, 0.0003), lasts_s=6.0).posterior
+    linear = LinearModel(posterior, posterior.start())
+    white = linear.whitened(posterior.residuals(linear.state))
+    slopes = [whitener(error.slopes(each)) for whitener, error, each in zip(
+        linear.whiteners, posterior.record_errors, linear.state.predictions, strict=True)]
+
+    def minus_twice_log_density(residual: Array, slope: Array, precision: Array) -> float:
+        root = np.linalg.cholesky(np.eye(len(residual)) + slope.T @ np.linalg.solve(precision, slope))
+        return float(2 * np.log(np.diag(root)).sum() + (solve_triangular(root, residual, lower=True) ** 2).sum())
+
+    def lack(logs: Array) -> float:
+        size = ErrorSize.of(logs)
+        return size.cost + sum(minus_twice_log_density(residual, slope, error.precision(size))
+                               for residual, slope, error in zip(white, slopes, posterior.record_errors, strict=True))
+
+    best = minimize(lack, linear.size.logs, method="Nelder-Mead", options={"maxfev": 60}).fun
+    assert lack(linear.size.logs) < best + 1.0
+    assert lack(USUAL.logs) > best + 5.0
+
+
+def test_numbers_that_are_held_do_nothing_and_leave_the_model_as_it_was() -> None:
+    one = case()
+    before = one.linear.information(one.state.logs)
+    held = one.linear.holding(["sprung_mass_kg"])
+    information = held.information(one.state.logs)
+    others = np.arange(1, len(information))
+    assert information[np.ix_(others, others)] == pytest.approx(before[np.ix_(others, others)])
+    assert information[0, 0] == pytest.approx(one.posterior.prior.curvature(one.state.logs)[0])
+    assert not information[0, 1:].any()
+    assert one.linear.information(one.state.logs) == pytest.approx(before)
+    assert one.linear.holding(["no_number_of_the_car"]) is one.linear
+
+
+def test_without_the_wall_only_the_prior_is_another() -> None:
+    one = case()
+    far = 3.0 * one.posterior.prior.deviations
+    loose = one.linear.without_wall()
+    wall = one.posterior.prior.curvature(far) - one.posterior.prior.without_wall().curvature(far)
+    assert one.linear.information(far) - loose.information(far) == pytest.approx(np.diag(wall), rel=1e-6, abs=1e-3)
+    assert loose.objective(one.state.predictions, far) < one.linear.objective(one.state.predictions, far)
+
+
+def test_a_model_without_slopes_of_the_car_holds_all_of_its_numbers() -> None:
+    one = case()
+    still = LinearModel(one.posterior, one.state)
+    assert still.count == 0 and still.information(one.state.logs).size == 0
+    assert still.score == pytest.approx(one.linear.score)
+    found = still.information(one.state.logs, one.own)
+    assert found == pytest.approx(one.linear.information(one.state.logs, one.own)[-len(one.own[0]):, -len(one.own[0]):])

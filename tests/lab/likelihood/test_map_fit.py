@@ -1,0 +1,166 @@
+"""Fits of a car, its effects and its distance errors: they end at the noise, where nothing near is likelier, from
+wherever they begin; and what they are asked to explain they do not bend the car for."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import CONVERGED, MapFit, aligned, fit
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.priors import Tolerance
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
+from logger.vehicle.named_parameters import changed, read
+
+from ...support.lab.noisy_runs import EFFECTS, FINE_HZ, NOISE_MPS2, drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.runs_with_residual import CAR
+
+
+def from_start(posterior: Posterior, *effects: Chosen) -> MapFit:
+    return fit(posterior, aligned(posterior, posterior.start(effects)))
+
+
+@cache
+def plain() -> MapFit:
+    """A car as its file says, in every respect."""
+    return from_start(posterior_of(noisy_runs()))
+
+
+@cache
+def damped() -> MapFit:
+    """A car with damped tires, and a model with them."""
+    return from_start(posterior_of(noisy_runs([tire_damping(300.0)])), tire_damping(150.0))
+
+
+def noise_share(posterior: Posterior) -> float:
+    return NOISE_MPS2 / posterior.size_mps2
+
+
+def test_a_car_that_lacks_nothing_ends_at_the_noise_with_the_numbers_that_it_has() -> None:
+    found, posterior = plain(), plain().posterior
+    assert posterior.error(found.state) == pytest.approx(noise_share(posterior), rel=0.03)
+    assert not posterior.prior.at_the_wall(found.state.logs)
+    assert np.abs(found.state.logs / posterior.prior.deviations).max() < 1.0
+
+
+def test_a_car_that_is_off_within_its_tolerance_ends_at_the_noise_too() -> None:
+    posterior = drawn([], 4, plain().state.size).posterior
+    found = from_start(posterior)
+    assert posterior.error(posterior.start()) > 1.2 * posterior.error(found.state)
+    assert posterior.error(found.state) == pytest.approx(noise_share(posterior), rel=0.04)
+
+
+def test_an_effect_is_found_with_its_number() -> None:
+    found, posterior = damped(), damped().posterior
+    without = from_start(posterior)
+    assert without.linear.score - found.linear.score > 50
+    assert posterior.error(found.state) == pytest.approx(noise_share(posterior), rel=0.03)
+    assert np.abs(without.state.logs / posterior.prior.deviations).max() > 2.0  # the car bends to make up for it
+    assert np.abs(found.state.logs / posterior.prior.deviations).max() < 1.5
+    assert found.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(300.0, abs=80.0)
+
+
+@pytest.mark.parametrize("start", [30.0, 800.0])
+def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
+    other = from_start(damped().posterior, tire_damping(start))
+    assert other.linear.score == pytest.approx(damped().linear.score, abs=2 * CONVERGED)
+    assert other.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
+        damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
+
+
+def test_nothing_near_a_fit_is_likelier() -> None:
+    """Numbers of the car and of the effect moved by half of what they are known to, truly predicted, the distance
+    errors made up for."""
+    found, posterior, state = damped(), damped().posterior, damped().state
+    here = found.linear.objective(state.predictions, state.logs)
+    known = 1 / np.sqrt(np.diag(found.linear.information(state.logs)))
+    moves = moves_of(state.effects)
+    coordinates = coordinates_of(state.effects, moves)
+    beside = [(state.effects, state.logs + way * row) for row in np.diag(0.5 * known) for way in (1, -1)]
+    beside += [(moved(state.effects, moves, coordinates + way * 15.0), state.logs) for way in (1, -1)]
+    for effects, logs in beside:
+        there = posterior.predict(effects, logs, state.record)
+        assert found.linear.objective(there, logs) > here - 0.5 * CONVERGED
+
+
+def test_an_effect_that_does_nothing_explains_nothing_and_costs_its_numbers() -> None:
+    posterior, state = plain().posterior, plain().state
+    gain = chosen(EFFECTS["sensor_gain"], {"gain": 1.0})
+    same = posterior.at([gain], state.logs, state.record, state.size)
+    assert posterior.deviance(same) == pytest.approx(posterior.deviance(state), abs=1e-6)
+    rise = LinearModel(posterior, same).score - LinearModel(posterior, state).score
+    assert rise == pytest.approx(np.log(posterior.freedom), abs=1e-6)
+
+
+def test_what_is_not_there_gains_nothing_when_it_is_fitted() -> None:
+    one = chosen(EFFECTS["sensor_bandwidth"], EFFECTS["sensor_bandwidth"].usual)
+    for found in (from_start(plain().posterior, tire_damping(100.0)), from_start(plain().posterior, one)):
+        assert found.linear.score > plain().linear.score - 3.0
+
+
+def test_a_car_bends_no_farther_than_the_wall_and_without_it_as_far_as_the_runs_ask() -> None:
+    heavy = changed(CAR, {"sprung_mass_kg": 1.12 * CAR.sprung_mass_kg})
+    posterior = Posterior(SimulatedRuns(noisy_runs(), FINE_HZ), heavy, Tolerance())
+    firm = from_start(posterior)
+    loose = fit(posterior.without_wall(), firm.state, firm.numbers)
+    assert posterior.prior.at_the_wall(firm.state.logs)
+    held, free = (read(one.posterior.prior.vehicle(heavy, one.state.logs), "sprung_mass_kg") for one in (firm, loose))
+    assert held > 1.04 * CAR.sprung_mass_kg and free < held - 0.02 * CAR.sprung_mass_kg
+    assert posterior.prior.cost(firm.state.logs) < posterior.prior.cost(loose.state.logs)
+    assert loose.posterior.deviance(loose.state) < posterior.deviance(firm.state) - 3
+
+
+def test_a_fit_begins_where_the_car_stands_and_its_prior_stays_where_it_was() -> None:
+    stands = changed(CAR, {"sprung_mass_kg": 1.02 * CAR.sprung_mass_kg})
+    posterior = Posterior(plain().posterior.runs, CAR, Tolerance(), stands)
+    start = posterior.start()
+    assert read(posterior.prior.vehicle(CAR, start.logs), "sprung_mass_kg") == pytest.approx(1.02 * CAR.sprung_mass_kg)
+    found = from_start(posterior)
+    assert found.linear.score == pytest.approx(plain().linear.score, abs=2 * CONVERGED)
+
+
+def test_aligning_moves_no_number_of_the_car_and_makes_nothing_worse() -> None:
+    posterior = drawn([], 4, plain().state.size).posterior
+    start = posterior.start()
+    state = aligned(posterior, start)
+    assert state.logs.tolist() == start.logs.tolist()
+    assert LinearModel(posterior, state).score <= LinearModel(posterior, start).score
+
+
+def test_a_round_that_is_not_worth_it_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    posterior = drawn([tire_damping(300.0)], 4, plain().state.size).posterior
+    start = aligned(posterior, posterior.start())
+    predict, asked = Posterior.predict, []
+    monkeypatch.setattr(Posterior, "predict", lambda *given, **named: (asked.append(1), predict(*given, **named))[1])
+    whole = fit(posterior, start)
+    thoroughly = len(asked)
+    asked.clear()
+    early = fit(posterior, start, rounds=1)
+    assert len(asked) < thoroughly
+    assert whole.linear.score <= early.linear.score <= LinearModel(posterior, start).score
+
+
+def test_slopes_by_the_cars_numbers_are_differences_of_predictions() -> None:
+    posterior, state = plain().posterior, plain().state
+    step = 0.002
+    found = posterior.number_slopes(state, np.full(len(posterior.prior.names), step))
+    logs = state.logs.copy()
+    logs[0] += step
+    there = posterior.predict((), logs, [0 * one for one in state.record])
+    here = posterior.predict((), state.logs, [0 * one for one in state.record])
+    off = np.concatenate([(high - low) / step for high, low in zip(there, here, strict=True)])
+    assert np.concatenate([one[0] for one in found]) == pytest.approx(off, abs=0.05 * np.abs(off).max())
+
+
+def test_a_rough_simulation_of_friction_tells_what_a_change_does() -> None:
+    posterior = plain().posterior
+    cars = [posterior.car([chosen(EFFECTS["dry_friction"], {"friction_force_n": force_n})], posterior.start().logs)
+            for force_n in (60.0, 90.0)]
+    fine, rough = (np.concatenate([there - here for here, there in zip(
+        *(posterior.runs.predict(car, rough=how) for car in cars), strict=True)]) for how in (False, True))
+    assert 0 < np.sqrt(np.mean((rough - fine) ** 2)) < 0.2 * np.sqrt(np.mean(fine**2))

@@ -1,0 +1,129 @@
+"""Whittle's likelihood: power in bands is what an independent estimate says, weights make noise of any colour white,
+and no level is believed below the share of the signal by which right simulations differ."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.signal import welch
+
+from logger.lab.likelihood.whittle import DISCREPANCY, Bands, deviance
+from logger.profiles.track import Track
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+NOISE = 0.05
+
+
+def run_of(samples: int, rate_hz: float = 100.0, measured: Array | None = None) -> Run:
+    zeros = np.zeros(samples)
+    return Run("run", rate_hz, zeros if measured is None else measured, np.arange(samples) * 0.1, zeros + 10.0,
+               Track(1.0, np.zeros(3)))
+
+
+def white(samples: int, seed: int = 1) -> Array:
+    return np.random.default_rng(seed).normal(0, NOISE, samples)
+
+
+def coloured(samples: int, seed: int = 2) -> Array:
+    return np.convolve(white(samples, seed), [1.0, 1.6, 0.8], "same")
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 80.0, 200.0])
+def test_white_noise_has_its_variance_in_every_band_and_where_it_is_quiet(rate_hz: float) -> None:
+    samples = round(400 * rate_hz)
+    noise, bands = white(samples), Bands(run_of(samples, rate_hz))
+    deviations = (bands.power(noise) / NOISE**2 - 1) / np.sqrt(2 / bands.freedom)
+    assert np.abs(deviations).max() < 4.0  # of some twenty bands
+    power, freedom = bands.quiet(noise)
+    assert abs(power / NOISE**2 - 1) < 4 * np.sqrt(2 / freedom)
+
+
+def test_power_is_that_of_welchs_method() -> None:
+    residual, run = coloured(3200), run_of(3200)
+    bands = Bands(run)
+    f_hz, density = welch(residual[run.first:], 100.0, "hann", 300, 150, detrend=False)
+    expected = [density[(f_hz >= low) & (f_hz < high)].mean() * 50.0
+                for low, high in zip(bands.edges_hz[:-1], bands.edges_hz[1:], strict=True)]
+    assert bands.power(residual) == pytest.approx(expected, rel=1e-9)
+
+
+def test_powers_scatter_by_their_degrees_of_freedom() -> None:
+    """Chi-squared with n degrees of freedom: a variance of 2 / n, that of overlapping blocks a little larger."""
+    bands = Bands(run_of(2700))
+    powers = np.array([bands.power(white(2700, seed)) for seed in range(300)]) / NOISE**2
+    assert (powers.var(axis=0) * bands.freedom / 2).mean() == pytest.approx(1.1, abs=0.2)
+    assert bands.freedom.sum() == pytest.approx(2 * (bands.edges_hz[-1] - bands.edges_hz[0]) * 25.0, rel=0.02)
+
+
+@pytest.mark.parametrize("rate_hz", [49.6, 75.0, 99.5, 99.8, 99.99999, 100.00001, 101.0, 119.8, 174.0])
+@pytest.mark.parametrize("seconds", [5.0, 12.0, 33.0, 61.3])
+def test_every_band_has_a_power_whatever_the_rate_and_the_length(rate_hz: float, seconds: float) -> None:
+    run = run_of(round(seconds * rate_hz), rate_hz)
+    bands, noise = Bands(run), white(run.count, 3)
+    assert np.isfinite(bands.power(noise)).all() and bands.freedom.min() > 0
+    mean = bands.freedom @ bands.power(noise) / bands.freedom.sum()
+    assert abs(mean / NOISE**2 - 1) < 5 * np.sqrt(2 / bands.freedom.sum())
+
+
+def test_weighed_noise_of_any_colour_has_the_power_of_its_bands() -> None:
+    samples = 12_200
+    residual, bands = coloured(samples), Bands(run_of(samples))
+    whitened = bands.whitener(residual)(residual)
+    assert whitened.shape == (12_000,)
+    in_bands = (bands.edges_hz[-1] - bands.edges_hz[0]) / 50.0
+    assert (whitened**2).mean() == pytest.approx(in_bands, rel=0.03)
+
+
+def test_columns_are_weighed_like_a_residual_and_the_beginning_counts_nowhere() -> None:
+    run = run_of(2000)
+    bands = Bands(run)
+    one, other = white(2000, 1), coloured(2000, 2)
+    whitener = bands.whitener(other)
+    assert whitener(np.stack([one, other])) == pytest.approx(np.stack([whitener(one), whitener(other)]))
+    begun = one + 100.0 * (np.arange(2000) < run.first)
+    assert bands.power(begun) == pytest.approx(bands.power(one))
+    assert whitener(begun) == pytest.approx(whitener(one))
+
+
+def test_what_is_twice_as_strong_costs_the_logarithm_of_four_for_each_degree_of_freedom() -> None:
+    bands, noise = Bands(run_of(6000)), white(6000, 3)
+    assert bands.deviance(2 * noise) - bands.deviance(noise) == pytest.approx(np.log(4) * bands.freedom.sum())
+    assert deviance([bands, bands], [noise, 2 * noise]) == pytest.approx(
+        bands.deviance(noise) + bands.deviance(2 * noise))
+
+
+def test_the_levels_are_the_most_likely_ones() -> None:
+    bands, residual = Bands(run_of(3000)), coloured(3000)
+    power, level = bands.power(residual), bands.levels(residual)
+
+    def minus_twice_log(levels: Array) -> float:
+        return float(bands.freedom @ (np.log(levels) + power / levels - 1))
+
+    assert bands.deviance(residual) == pytest.approx(minus_twice_log(level))
+    for factor in (0.9, 1.1):
+        assert minus_twice_log(factor * level) > bands.deviance(residual) + 1.0
+
+
+def test_no_level_is_below_the_discrepancy_which_is_a_share_of_the_signal_in_its_band() -> None:
+    signal = 20 * coloured(6000)
+    bands = Bands(run_of(6000, measured=signal))
+    assert bands.floor == pytest.approx(DISCREPANCY**2 * bands.power(signal))
+    assert bands.levels(1e-7 * signal) == pytest.approx(bands.floor)
+    assert bands.levels(signal) == pytest.approx(bands.power(signal))
+    assert Bands(run_of(6000, measured=10 * signal)).floor == pytest.approx(100 * bands.floor)
+
+
+def test_what_is_far_below_the_discrepancy_gains_next_to_nothing_more() -> None:
+    signal = 20 * coloured(6000)
+    bands = Bands(run_of(6000, measured=signal))
+    at, below, nothing = (bands.deviance(share * DISCREPANCY * signal) for share in (1.0, 0.1, 0.0))
+    assert at - below == pytest.approx(0.99 * bands.freedom.sum())
+    assert below - nothing == pytest.approx(0.01 * bands.freedom.sum())
+
+
+def test_where_nothing_but_zeros_was_measured_nothing_is_divided_by_nothing() -> None:
+    bands = Bands(run_of(2000))
+    assert np.isfinite(bands.deviance(np.zeros(2000)))
+    assert np.isfinite(bands.whitener(np.zeros(2000))(white(2000))).all()

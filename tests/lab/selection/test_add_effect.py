@@ -1,0 +1,146 @@
+"""An effect that is added comes with its numbers, what it changed, and how often noise would do as much."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.selection.add_effect import BIASED, AddedEffects, Number, add, moved_between
+from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.runs import normalised_rms_error
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import chosen
+from logger.vehicle.named_parameters import read
+
+from ...support.lab.runs_with_residual import CAR
+from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
+
+OFFSET_M = 0.4
+
+
+@pytest.fixture(scope="module")
+def runs() -> SimulatedRuns:
+    return secret_runs([hidden("sensor_offset", offset_m=OFFSET_M)])
+
+
+@pytest.fixture(scope="module")
+def added(runs: SimulatedRuns) -> AddedEffects:
+    return add(posterior_of(runs), [], [hidden("sensor_offset", offset_m=0.2)])
+
+
+def test_the_number_that_was_hidden_is_found_within_its_error(added: AddedEffects) -> None:
+    (one,) = added.effects
+    assert added.names == ("sensor_offset",) and added.new == (one,)
+    error = one.standard_errors["offset_m"]
+    assert 0.002 < error < 0.03
+    assert one.values["offset_m"] == pytest.approx(OFFSET_M, abs=4 * error)
+
+
+def test_each_error_is_less_than_the_one_before_and_the_last_is_hardly_more_than_noise(added: AddedEffects) -> None:
+    assert added.error_before > added.error_refitted > added.error_as_written >= added.error_after
+    assert added.error_after == pytest.approx(added.noise_floor_error, rel=0.05)
+
+
+def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedRuns, added: AddedEffects) -> None:
+    before, written = (normalised_rms_error(runs.runs, runs.predict(car)) for car in (
+        compose(CAR), compose(added.vehicle, added.effects)))
+    assert (added.error_before, added.error_as_written) == pytest.approx((before, written), rel=1e-9)
+    counted = np.concatenate([run.kept_mps2 for run in runs.runs])
+    assert added.noise_floor_error == pytest.approx(NOISE_MPS2 / np.sqrt((counted**2).mean()), rel=0.05)
+
+
+def test_how_often_noise_would_gain_as_much_is_by_the_evidence_of_both_models(runs: SimulatedRuns) -> None:
+    posterior, one = posterior_of(secret_runs(noise_mps2=0.3, lasts_s=12.0)), hidden("sensor_offset", offset_m=0.1)
+    without, there = (fit(posterior, aligned(posterior, posterior.start(some))) for some in ([], [one]))
+    gain = without.linear.score - there.linear.score
+    found = add(posterior, [], [one], candidates=3)
+    assert found.p_value == pytest.approx(probability_by_chance(gain, 3), abs=1e-3)
+    assert found.helps == (found.p_value < FALSE_ALARM)
+
+
+def test_numbers_that_the_missing_effect_had_biased_are_right_with_it(added: AddedEffects) -> None:
+    assert added.helps
+    biased = [one for one in added.moved if one.biased]
+    assert len(biased) >= 4
+    for one in biased:
+        assert abs(one.found - one.nominal) < abs(one.without - one.nominal)
+    assert all(abs(one.found - one.nominal) < 4 * one.standard_error for one in added.numbers)
+    shifts = [abs(one.shift) for one in added.moved]
+    assert shifts == sorted(shifts, reverse=True) and {*added.moved} == {*added.numbers}
+
+
+def test_what_is_written_is_the_vehicle_that_holds_on_to_what_was_given(added: AddedEffects) -> None:
+    for one in added.numbers:
+        assert one.nominal == read(CAR, one.name) and one.written == read(added.vehicle, one.name)
+        assert abs(one.written / one.nominal - 1) < 0.08
+
+
+def test_an_effect_that_does_nothing_moves_no_number_of_a_car_that_bends(runs: SimulatedRuns) -> None:
+    found = add(posterior_of(runs), [], [chosen(EFFECTS["wheel_lift"], {})])
+    assert any(abs(one.written - one.found) > 2 * one.standard_error for one in found.numbers)  # it was held
+    assert not found.helps and not any(one.biased for one in found.moved)
+    assert found.error_after == pytest.approx(found.error_refitted, rel=0.005)
+
+
+def test_effects_that_are_there_stay_and_are_fitted_too(runs: SimulatedRuns) -> None:
+    found = add(posterior_of(runs), [hidden("sensor_offset", offset_m=0.3)], [hidden("tire_damping")])
+    offset, tires = found.effects
+    assert (offset.effect.name, tires.effect.name) == ("sensor_offset", "tire_damping") and found.new == (tires,)
+    assert offset.values["offset_m"] == pytest.approx(OFFSET_M, abs=0.03)
+    assert {"offset_m"} == offset.standard_errors.keys()
+    assert not found.helps
+
+
+def test_distances_are_told_of_only_where_they_are_off_by_more_than_usual(runs: SimulatedRuns,
+                                                                          added: AddedEffects) -> None:
+    assert added.distance_error_m == 0
+    off = [replace(one, distance_m=one.distance_m + 0.3) for one in runs.runs]
+    found = add(posterior_of(SimulatedRuns(off, 500.0)), [], [hidden("sensor_offset")])
+    assert found.distance_error_m == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_shift_counts_standard_errors() -> None:
+    number = Number("sprung_mass_kg", 875.0, 900.0, 9.0, 880.0, 8.0, 878.0)
+    assert number.shift == -2.5 and number.biased
+    assert not replace(number, without=880.0 + 8.0 * BIASED).biased
+    assert replace(number, standard_error=0.0).shift == 0
+
+
+def test_between_first_and_last_numbers_move_from_without_any_to_with_all(added: AddedEffects) -> None:
+    later = replace(added, numbers=tuple(replace(one, found=1.1 * one.found, written=0.0, without=0.0)
+                                         for one in added.numbers))
+    between = {one.name: one for one in moved_between(added, later)}
+    for one, now in zip(added.numbers, later.numbers, strict=True):
+        found = between[one.name]
+        assert (found.without, found.found, found.written) == (one.without, now.found, now.written)
+
+
+@pytest.mark.slow
+def test_two_effects_added_one_after_the_other_keep_to_the_car_that_was_given() -> None:
+    friction, offset = hidden("dry_friction", friction_force_n=90.0), hidden("sensor_offset", offset_m=OFFSET_M)
+    runs = secret_runs([friction, offset], lasts_s=20.0)
+    first = add(posterior_of(runs), [], [friction])
+    bent = max(abs(one.written / one.nominal - 1) for one in first.numbers)
+    assert 0.04 < bent < 0.1  # the missing offset pulls at the car, which holds on to what was granted
+    assert max(abs(one.without / one.nominal - 1) for one in first.numbers) > 0.12  # one that does not, shows it
+    second = add(posterior_of(runs, stands=first.vehicle), first.effects, [offset])
+    assert second.error_before == pytest.approx(first.error_as_written, rel=1e-6)
+    found = {one.effect.name: one for one in second.effects}
+    assert found["sensor_offset"].values["offset_m"] == pytest.approx(OFFSET_M, rel=0.08)
+    assert found["dry_friction"].values["friction_force_n"] == pytest.approx(90.0, rel=0.08)
+    assert max(abs(one.written / one.nominal - 1) for one in second.numbers) < bent
+
+
+@pytest.mark.slow
+def test_standard_errors_are_as_large_as_numbers_are_off() -> None:
+    off = []
+    for seed in range(20):
+        posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], lasts_s=10.0, noise_mps2=0.2,
+                                             seed=seed))
+        (one,) = add(posterior, [], [hidden("sensor_offset", offset_m=0.2)]).effects
+        off.append((one.values["offset_m"] - 0.2) / one.standard_errors["offset_m"])
+    assert 0.2 < np.mean(np.square(off)) < 2.0  # priors make the errors of cars that are just right too large

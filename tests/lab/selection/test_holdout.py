@@ -1,0 +1,123 @@
+"""Errors on unseen stretches are those of models that were really refitted without them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.optimize import least_squares
+
+from logger.lab.diagnosis import refitted
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import MapFit, aligned, effect_slopes, fit
+from logger.lab.likelihood.whittle import deviance
+from logger.lab.selection.holdout import folds, held_out
+from logger.runs import Run, normalised_rms
+from logger.vehicle.effect import Chosen
+from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
+
+from ...support.lab.secret_runs import hidden, posterior_of, secret_runs
+
+Array = npt.NDArray[np.float64]
+
+SETS = 3
+
+
+@pytest.fixture(scope="module")
+def plain() -> LinearModel:
+    """The right model, fitted."""
+    posterior = posterior_of(secret_runs(lasts_s=15.0))
+    return refitted(posterior, posterior.start()).found.linear
+
+
+def test_each_sample_that_counts_is_held_out_once_in_stretches_of_seconds(plain: LinearModel) -> None:
+    for run in plain.posterior.runs.runs:
+        which = folds(run)
+        assert which.shape == run.kept_mps2.shape and set(which) == set(range(SETS))
+        changes = np.flatnonzero(np.diff(which))
+        assert np.diff(changes).min(initial=run.count) >= 4 * run.rate_hz
+        assert np.bincount(which).min() >= 0.25 * len(which)
+
+
+def test_a_long_run_is_held_out_in_many_stretches_and_a_short_one_in_three(plain: LinearModel) -> None:
+    run = plain.posterior.runs.runs[0]
+
+    def lasting(seconds: float) -> Run:
+        zeros = np.zeros(round(seconds * run.rate_hz))
+        return replace(run, measured_mps2=zeros, distance_m=zeros, speed_mps=zeros)
+
+    assert np.count_nonzero(np.diff(folds(lasting(182.0)))) == 29
+    assert np.count_nonzero(np.diff(folds(lasting(2.5)))) == SETS - 1
+
+
+# --- against fits ---
+
+
+def unseen_when_refitted(found: MapFit) -> tuple[float, float]:
+    """Error and deviance of models whose numbers were fitted to convergence, by true predictions, without each set of
+    stretches in turn; distances stay as they are."""
+    posterior, state = found.posterior, found.state
+    runs, moves, p = posterior.runs.runs, moves_of(state.effects), len(state.logs)
+    here = np.concatenate([state.logs, coordinates_of(state.effects, moves)])
+    scale = np.concatenate([posterior.prior.deviations, np.maximum(0.1 * np.abs(here[p:]), 1e-3)])
+
+    def residuals(x: Array) -> list[Array]:
+        there: tuple[Chosen, ...] = moved(state.effects, moves, x[p:])
+        predicted = posterior.predict(there, x[:p], state.record)
+        return [y - one for y, one in zip(posterior.measured, predicted, strict=True)]
+
+    unseen = residuals(here)
+    for held in range(SETS):
+        def seen(z: Array, held: int = held) -> Array:
+            x = here + z * scale
+            parts = [white[folds(run) != held] for run, white in zip(
+                runs, found.linear.whitened(residuals(x)), strict=True)]
+            beyond = np.maximum(np.abs(x[:p] / posterior.prior.deviations) - 2.0, 0.0)  # the wall of the prior
+            return np.concatenate([*parts, x[:p] / posterior.prior.deviations, 10.0 * beyond**2])
+
+        x = here + scale * least_squares(seen, np.zeros(len(here)), x_scale="jac", diff_step=1e-4).x
+        for run, one, kept in zip(runs, residuals(x), unseen, strict=True):
+            kept[run.first:][folds(run) == held] = one[run.first:][folds(run) == held]
+    counted = [one[run.first:] for run, one in zip(runs, unseen, strict=True)]
+    return normalised_rms(counted, [run.kept_mps2 for run in runs]), deviance(posterior.bands, unseen)
+
+
+@pytest.mark.parametrize("model", ["right", "with one that is there", "with one that is not there"])
+def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None:
+    there = [hidden("sensor_offset", offset_m=0.3)] if model == "with one that is there" else []
+    tried = [] if model == "right" else [hidden("sensor_offset", offset_m=0.2)]
+    posterior = posterior_of(secret_runs(there, lasts_s=12.0))
+    found = fit(posterior, aligned(posterior, posterior.start(tried)))
+    state = found.state
+    own = effect_slopes(found.linear, state.effects, state.logs, moves_of(tried), state.predictions) if tried else None
+    quick = held_out(found.linear, own)
+    error, lack = unseen_when_refitted(found)
+    seen_error, seen_lack = posterior.error(state), posterior.deviance(state)
+    assert quick.error > seen_error and quick.deviance > seen_lack
+    assert quick.error - seen_error == pytest.approx(error - seen_error, rel=0.1)
+    assert quick.deviance - seen_lack == pytest.approx(lack - seen_lack, rel=0.1)
+
+
+# --- what it is for ---
+
+
+def test_numbers_that_fit_noise_make_the_error_larger(plain: LinearModel) -> None:
+    rng = np.random.default_rng(1)
+    own = [rng.normal(size=(40, run.count)) for run in plain.posterior.runs.runs]
+    honest, vain = held_out(plain), held_out(plain, own)
+    assert vain.error > 1.005 * honest.error and vain.deviance > honest.deviance + 10
+
+
+def test_columns_that_do_nothing_change_nothing(plain: LinearModel) -> None:
+    nothing = [np.zeros((2, run.count)) for run in plain.posterior.runs.runs]
+    there, here = held_out(plain, nothing), held_out(plain)
+    assert (there.error, there.deviance) == pytest.approx((here.error, here.deviance), rel=1e-9)
+
+
+def test_a_model_without_numbers_is_judged_as_it_is(plain: LinearModel) -> None:
+    posterior, state = plain.posterior, plain.state
+    found = held_out(LinearModel(posterior, state))
+    assert found.error == pytest.approx(posterior.error(state))
+    assert found.deviance == pytest.approx(posterior.deviance(state))

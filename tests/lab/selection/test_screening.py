@@ -1,0 +1,158 @@
+"""What an effect would gain is told without a fit, and as dense algebra over all unknowns would tell it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from logger.lab.diagnosis import refitted
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.selection.candidate_fit import refined, roughly_fitted
+from logger.lab.selection.screening import Baseline, as_recorded, misalignment, scaled_by, screened
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.vehicle.effect import Misalignment
+
+from ...support.lab.runs_with_residual import CAR
+from ...support.lab.secret_runs import EFFECTS, Dense, hidden, posterior_of, secret_runs
+
+STILL = Misalignment(1.0, 0.0)
+
+
+def fitted(posterior: Posterior) -> Baseline:
+    return refitted(posterior, posterior.start())
+
+
+@pytest.fixture(scope="module")
+def slight() -> Baseline:
+    """A plain car beside loud runs with a sensor that sits ahead, which do not bend it to the wall."""
+    found = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], noise_mps2=0.5)))
+    assert not found.posterior.prior.at_the_wall(found.state.logs)
+    return found
+
+
+@pytest.mark.parametrize("name", ["sensor_offset", "tire_damping", "payload"])
+def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseline, name: str) -> None:
+    dense = Dense(slight.linear)
+    found = screened(slight, EFFECTS[name], [STILL])
+    trial = found.trials[0]
+    before, _ = dense.least(dense.residual, dense.here)
+    after, there = dense.least(dense.residual, dense.here, dense.white(trial.change))
+    assert trial.start is None and found.gain == trial.gain
+    best = before - after
+    strength = there[-1]
+    if 0.03 <= strength <= 10:
+        assert trial.gain == pytest.approx(best, rel=1e-6, abs=1e-4)
+        assert trial.logs == pytest.approx(there[: dense.count], abs=1e-6)
+    else:  # not as strong, or as weak, as would be best
+        assert trial.gain < best
+
+
+def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight: Baseline) -> None:
+    names = ("sensor_offset", "sensor_gain", "tire_damping", "sensor_bandwidth", "cg_shift")
+    promises = {name: screened(slight, EFFECTS[name], [STILL]) for name in names}
+    assert max(promises, key=lambda name: promises[name].gain) == "sensor_offset"
+    rough = roughly_fitted(slight.score, slight, promises["sensor_offset"])[0]
+    fine = refined(slight.score, rough)
+    assert fine.gain >= rough.gain - 1.0
+    counted = np.log(slight.posterior.freedom)  # of the number that it has
+    assert fine.gain == pytest.approx(promises["sensor_offset"].gain - counted, rel=0.3)
+    assert fine.gain == pytest.approx(slight.score - fine.found.linear.score)
+    assert fine.chosen.effect is fine.effect is EFFECTS["sensor_offset"]
+    assert fine.chosen.values["offset_m"] == pytest.approx(0.2, abs=0.1)
+
+
+def test_a_car_that_is_bent_to_the_wall_does_not_hide_what_bends_it() -> None:
+    base = fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)])))
+    assert base.posterior.prior.at_the_wall(base.state.logs)
+    found = screened(base, EFFECTS["sensor_offset"], [STILL])
+    assert found.gain > 500
+    fine = refined(base.score, roughly_fitted(base.score, base, found)[0])
+    assert fine.chosen.values["offset_m"] == pytest.approx(0.4, abs=0.03)
+
+
+def test_each_choice_has_its_best_trial_and_the_most_promising_is_first(slight: Baseline) -> None:
+    found = screened(slight, EFFECTS["body_bending"], [STILL])
+    assert {one.one.values["ends_move"] for one in found.trials} == {0.0, 1.0}
+    frequencies = {one.one.values["frequency_hz"] for one in found.trials}
+    assert len(frequencies) * 2 >= len(found.trials)  # of one choice no two trials are of one frequency
+    assert found.gain == max(one.gain for one in found.trials)
+    assert len(screened(slight, EFFECTS["tire_damping"], [STILL]).trials) == 1
+
+
+def test_what_changes_nothing_promises_nothing(slight: Baseline) -> None:
+    no_wheel_lifts_here = screened(slight, EFFECTS["wheel_lift"], [STILL])
+    assert no_wheel_lifts_here.gain == pytest.approx(0, abs=1e-6)
+
+
+def test_a_patch_of_another_length_is_found_though_the_car_has_such_a_number_too() -> None:
+    patch_m = 0.75 * CAR.contact_patch_m
+    base = fitted(posterior_of(secret_runs([hidden("tire_enveloping", contact_patch_m=patch_m)])))
+    place = base.posterior.prior.names.index("contact_patch_m")
+    assert base.state.logs[place] < 0
+    found = screened(base, EFFECTS["tire_enveloping"], [STILL])
+    fine = refined(base.score, roughly_fitted(base.score, base, found)[0])
+    assert fine.gain > 30
+    assert fine.chosen.values["contact_patch_m"] == pytest.approx(patch_m, rel=0.1)
+
+
+def test_as_recorded_is_the_nominal_car_on_distances_without_their_trend() -> None:
+    runs = SimulatedRuns([replace(one, distance_m=1.004 * one.distance_m + 0.1) for one in secret_runs().runs], 500.0)
+    base = fitted(posterior_of(runs))
+    there = as_recorded(base)
+    assert there.state.effects == base.state.effects and not there.state.logs.any()
+    for run, moved_m, was_m in zip(runs.runs, base.posterior.moved_m(there.state.record),
+                                   base.posterior.moved_m(base.state.record), strict=True):
+        assert abs(was_m).max() > 0.2
+        assert np.polyfit(run.distance_m, moved_m, 1) == pytest.approx(0, abs=0.02)
+        assert abs(moved_m).max() < 0.1 * abs(was_m).max()
+
+
+def test_a_wrong_speed_is_tried_where_the_runs_then_lie() -> None:
+    posterior = posterior_of(secret_runs([hidden("speed_scale", scale=1.02)]))
+    base = fitted(posterior)
+    found = screened(base, EFFECTS["speed_scale"], [misalignment(posterior, posterior.start())])
+    best = found.trials[0]
+    assert best.start is not None and best.start.effects[-1] == best.one
+    assert best.one.values["scale"] == pytest.approx(1.02, abs=2e-3)
+    assert best.gain > 100
+
+
+# --- how the runs lie ---
+
+
+@pytest.mark.parametrize("scale", [0.95, 1.0, 1.03])
+def test_one_factor_of_all_distances_is_seen(scale: float) -> None:
+    runs = secret_runs().runs
+    posterior = posterior_of(SimulatedRuns([replace(one, distance_m=scale * one.distance_m) for one in runs], 500.0))
+    assert misalignment(posterior, posterior.start()).scale == pytest.approx(scale, abs=2e-3)
+
+
+@pytest.mark.parametrize("late", [-90, 0, 40])
+def test_one_delay_of_all_accelerations_is_seen(late: int) -> None:
+    runs = secret_runs().runs
+    posterior = posterior_of(SimulatedRuns([
+        replace(one, measured_mps2=np.roll(one.measured_mps2, late)) for one in runs], 500.0))
+    assert misalignment(posterior, posterior.start()).delay_s == pytest.approx(late / 100, abs=0.01)
+
+
+# --- strengths ---
+
+
+@pytest.mark.parametrize(("name", "parameter", "value", "half"), [
+    ("sensor_gain", "gain", 1.21, 1.1), ("sensor_offset", "offset_m", 0.4, 0.2), ("speed_scale", "scale", 1.0404, 1.02),
+    ("tire_damping", "tire_damping_n_s_per_m", 300.0, 150.0), ("sensor_bandwidth", "cutoff_hz", 20.0, 40.0),
+    ("top_mount_compliance", "mount_stiffness_n_per_m", 2e5, 4e5),
+])
+def test_half_an_effect_is_half_way_to_where_it_does_nothing(
+        name: str, parameter: str, value: float, half: float) -> None:
+    one = hidden(name, **{parameter: value})
+    found, same = scaled_by(one, 0.5), scaled_by(one, 1.0)
+    assert found is not None and found.values[parameter] == pytest.approx(half)
+    assert same is not None and same.values == pytest.approx(one.values)
+
+
+def test_an_effect_that_is_there_or_not_has_no_half() -> None:
+    assert scaled_by(hidden("wheel_lift"), 0.5) is None
+    assert scaled_by(hidden("tire_enveloping", contact_patch_m=0.2), 0.5) is None

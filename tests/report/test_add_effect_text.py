@@ -1,0 +1,103 @@
+"""What is said of an effect that was added: its numbers, whether it is to be kept, and what it had biased."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+from logger.lab.selection.add_effect import AddedEffects, Number
+from logger.report.add_effect_text import MOVED_HEADS, as_json, bias, errors, judgement, moved_rows
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.effect import chosen
+
+from ..support.lab.runs_with_residual import CAR
+
+EFFECTS = shipped_effects()
+MASS = Number("sprung_mass_kg", nominal=875.0, without=846.0, without_standard_error=9.8, found=876.0,
+              standard_error=7.5, written=874.0)
+TIRE = Number("rear.tire_stiffness_n_per_m", nominal=238180.0, without=300000.0, without_standard_error=3000.0,
+              found=240000.0, standard_error=3000.0, written=239000.0)
+STILL = Number("contact_patch_m", nominal=0.25, without=0.2501, without_standard_error=0.003, found=0.25,
+               standard_error=0.003, written=0.25)
+FOUND = AddedEffects(
+    CAR, (chosen(EFFECTS["sensor_gain"], {"gain": 1.02}, standard_errors={"gain": 0.01}),
+          chosen(EFFECTS["dry_friction"], EFFECTS["dry_friction"].usual | {"friction_force_n": 84.7}, standard_errors={
+              "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")})),
+    ("dry_friction",), (STILL, MASS, TIRE), error_before=0.47, error_refitted=0.43, error_after=0.153,
+    error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, distance_error_m=0.0)
+
+
+def test_the_errors_are_told_from_the_file_as_it_was_to_the_noise() -> None:
+    told = errors(FOUND)
+    assert [error for _, error, _ in told] == [0.47, 0.43, 0.153, 0.154, 0.15]
+    assert [which for which, _, _ in told] == ["before", "", "after", "", "of noise"]
+    assert "with dry_friction, all refitted" in told[2][2]
+    both = errors(replace(FOUND, names=("dry_friction", "sensor_gain")))
+    assert "with dry_friction and sensor_gain" in both[2][2]
+
+
+def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
+    assert judgement(FOUND) == [
+        "dry_friction: friction_force_n 85 ± 4 N, transition_velocity_m_per_s 0 m/s.",
+        "It helps: the probability that noise alone improves the fit as much is below 1e-9."]
+
+
+def test_an_effect_that_does_not_help_is_warned_of() -> None:
+    assert judgement(replace(FOUND, p_value=0.02))[-1] == (
+        "WARNING: it does not help. The probability that noise alone improves the fit as much is 0.02; these runs are "
+        "no reason to keep it.")
+
+
+def test_an_effect_without_numbers_is_told_in_words() -> None:
+    lift = replace(FOUND, effects=(chosen(EFFECTS["wheel_lift"], {}),), names=("wheel_lift",))
+    assert judgement(lift)[0] == f"wheel_lift: {EFFECTS['wheel_lift'].title}."
+
+
+def test_a_number_at_its_bound_was_not_measured() -> None:
+    asymmetry = EFFECTS["damper_asymmetry"]
+    (ratio,) = asymmetry.parameters
+    bound = replace(FOUND, effects=(chosen(asymmetry, {ratio.name: ratio.high}),), names=("damper_asymmetry",))
+    assert judgement(bound)[1] == (f"At its bound: {ratio.name}. That is where the fit was stopped, not what was "
+                                   "measured.")
+    assert not any("bound" in one for one in judgement(FOUND))
+
+
+def test_distances_that_are_off_are_told_of() -> None:
+    assert any("up to 0.34 m" in one for one in judgement(replace(FOUND, distance_error_m=0.34)))
+
+
+def test_the_number_that_was_biased_most_is_told_with_how_wrong_it_was() -> None:
+    said = bias(FOUND.names, FOUND.moved)
+    assert said == ("Without dry_friction these were biased: rear.tire_stiffness_n_per_m, sprung_mass_kg. "
+                    "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors away from what it is "
+                    "with it.")
+    low = bias(("dry_friction", "sensor_gain"), [MASS])
+    assert "Without dry_friction and sensor_gain" in low and "3.4% too low" in low and low.endswith("with them.")
+    many = [replace(MASS, name=f"number{i}") for i in range(6)]
+    assert "number0, number1, number2, number3 and 2 more." in bias(FOUND.names, many)
+
+
+def test_where_nothing_was_biased_that_is_said() -> None:
+    assert bias(FOUND.names, [STILL]) == (
+        "No number of the car moved by more than 2 standard errors when dry_friction was added.")
+
+
+def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
+    rows = list(moved_rows(FOUND.moved))
+    assert all(len(row) == len(MOVED_HEADS) for row in rows)
+    assert rows[1] == ("sprung_mass_kg", "874", "-3.3%", "+0.1% ± 0.9%", "+4.0", "was biased")
+    assert rows[2][-1] == ""
+
+
+def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was_added() -> None:
+    told = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    assert {"effect", "parameters", "standard_errors", "error_before", "error_after"} <= told.keys()
+    assert told["effect"] == "dry_friction" and told["parameters"]["friction_force_n"] == 84.7
+    assert told["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
+    assert (told["error_before"], told["error_after"]) == (0.47, 0.153)
+    assert (told["error_refitted"], told["error_as_written"], told["noise_floor_error"]) == (0.43, 0.154, 0.15)
+    assert told["helps"] is True and told["p_value"] == 1e-12
+    assert told["biased"] == ["rear.tire_stiffness_n_per_m", "sprung_mass_kg"]
+    assert told["numbers"][1] == {
+        "name": "sprung_mass_kg", "nominal": 875.0, "without": 846.0, "without_standard_error": 9.8, "with": 876.0,
+        "with_standard_error": 7.5, "shift_standard_errors": 4.0, "written": 874.0}

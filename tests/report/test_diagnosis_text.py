@@ -1,0 +1,180 @@
+"""What is said of a diagnosis: what is missing, how sure that is, what else it could be; and the contract's object."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from logger.lab.diagnosis import HAS_IT, Candidate, Diagnosis, Step
+from logger.lab.likelihood.noise_floor import Noise
+from logger.lab.residuals.breakdown import breakdown
+from logger.lab.residuals.residual_tests import run_residual_tests
+from logger.lab.residuals.unexplained import Shape, spatial_line_of
+from logger.lab.selection.detectability import Undetectable
+from logger.report.diagnosis_text import JUDGED_ON, as_json, looks_like, summary, table, untested
+from logger.store.formats.effect_file import shipped_effects
+from logger.vehicle.effect import chosen
+
+from ..support.lab.runs_with_residual import beside_with
+
+EFFECTS = shipped_effects()
+
+
+def candidate(name: str, p_value: float, gain: float, **values: float) -> Candidate:
+    return Candidate(EFFECTS[name], EFFECTS[name].usual | values, 0.2, p_value, gain, gain - 4.0, ())
+
+
+OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
+NOTHING = Diagnosis(
+    runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=Noise(0.05, 0.001),
+    noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, conflicts={},
+    steps=(Step("the vehicle as its file says", 0.31), Step("its numbers refitted", 0.152)), effects=(),
+    undetectable=(), shape=None, distance_error_m=0.0)
+FRICTION = candidate("dry_friction", 1e-12, 500.0, friction_force_n=84.7)
+FOUND = replace(
+    NOTHING, candidates=(FRICTION, *OTHERS), verdict=("dry_friction",),
+    effects=(chosen(EFFECTS["dry_friction"], FRICTION.values, standard_errors={
+        "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")}),),
+    steps=(NOTHING.steps[0], Step("its numbers refitted", 0.25), Step("with dry_friction", 0.153)))
+
+
+@pytest.fixture(scope="module")
+def shape() -> Shape:
+    """Of a residual that turns with a wheel."""
+    def turns(run: object, _model: object, rng: np.random.Generator) -> np.ndarray:
+        return 0.05 * np.sin(run.distance_m / 0.31) + rng.normal(0, 0.03, run.count)  # type: ignore[attr-defined]
+
+    residuals = beside_with(turns)
+    where = breakdown(residuals)
+    return Shape(residuals, where, run_residual_tests(residuals, where, residuals), spatial_line_of(residuals))
+
+
+# --- sentences ---
+
+
+def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
+    nothing, errors = summary(NOTHING)
+    assert nothing.startswith("Nothing is missing: ")
+    assert errors == ("Error on stretches that no fit saw: 0.310 as the vehicle's file says, 0.152 with its numbers "
+                      "refitted. The sensor's noise alone makes about 0.150.")
+    assert looks_like(NOTHING) == untested(NOTHING) == []
+
+
+def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() -> None:
+    missing, errors = summary(FOUND)
+    assert missing == (f"dry_friction is missing ({EFFECTS['dry_friction'].title}): friction_force_n 85 ± 4 N, "
+                       "transition_velocity_m_per_s 0 m/s. The probability that noise alone looks like this, all "
+                       "candidates together: below 1e-9.")
+    assert errors.endswith("0.153 with dry_friction. The sensor's noise alone makes about 0.150.")
+
+
+def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
+    missing, left, *_ = summary(replace(FOUND, excess=0.5))
+    assert "dry_friction would explain part of what is missing, or imitates something else" in missing
+    assert left == ("Something more is missing that no candidate explains: in the worst run the residual is 1.5 times "
+                    "the sensor's noise.")
+
+
+def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
+    found = replace(NOTHING, excess=2.0)
+    left, _ = summary(found)
+    assert left == ("Something is missing that no candidate explains: in the worst run the residual is 3 times the "
+                    "sensor's noise.")
+    imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
+    _, imitation, _ = summary(imitating)
+    assert imitation.startswith("Candidates that improve the fit by less than 10% of what a full explanation would")
+
+
+def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
+    found = replace(NOTHING, conflicts={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13})
+    conflict, _ = summary(found)
+    assert found.unexplained and not found.left_over
+    assert conflict.startswith("The fit needs numbers outside their tolerance: front.suspension_stiffness_n_per_m by "
+                               "+24%, sprung_mass_kg by -13%.")
+
+
+def test_distances_that_are_off_are_told_of() -> None:
+    assert any("up to 0.34 m" in one for one in summary(replace(NOTHING, distance_error_m=0.34)))
+
+
+def test_what_explains_as_well_is_named_with_the_drives_that_would_tell() -> None:
+    alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
+    said = summary(replace(FOUND, candidates=(alike, *OTHERS)))[-1]
+    assert said.startswith("These runs cannot tell dry_friction from damper_blow_off or sensor_gain: each explains")
+    for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
+        assert f"{name}: {EFFECTS[name].shown_by}" in said
+
+
+def test_what_was_added_and_dropped_again_is_named() -> None:
+    steps = (*FOUND.steps[:2], Step("with tire_damping", 0.2), *FOUND.steps[2:])
+    assert summary(replace(FOUND, steps=steps))[-1] == (
+        "Added during the search and dropped again, because the others explain it: tire_damping.")
+    assert not any("dropped again" in one for one in summary(FOUND))
+
+
+def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
+    hidden = tuple(Undetectable(EFFECTS[name], 0.5 * place) for place, name in enumerate(
+        ["wheel_lift", "bump_stop", "payload", "occupant", "sensor_gain", "roll", "cg_shift", "tire_damping"]))
+    found = replace(NOTHING, undetectable=hidden, obstacles={
+        "roll": "one track is known", "dry_friction": HAS_IT})
+    obstacle, first, *more = untested(found)
+    assert obstacle == "roll: could not be tried, one track is known."
+    assert first == ("wheel_lift: these runs could miss it. At its usual strength it stands out by 0.0 standard "
+                     f"deviations, and 6 are needed. To see it: {EFFECTS['wheel_lift'].shown_by}.")
+    assert len(more) == 6 and more[-1] == "These runs could also miss: cg_shift, tire_damping."
+
+
+def test_what_it_looks_like_is_said_where_something_is_left(shape: Shape) -> None:
+    said = looks_like(replace(NOTHING, excess=0.5, shape=shape))
+    assert any("A wheel of 0.31 m radius" in one for one in said)
+
+
+def test_the_table_has_the_candidates_in_order_with_errors_where_they_are_known() -> None:
+    rows = list(table(FOUND))
+    assert [row[0] for row in rows] == ["dry_friction", "tire_damping", "sensor_gain"]
+    assert rows[0][1:3] == ("0.200", "below 1e-9") and rows[0][3].startswith("friction_force_n 85 ± 4 N")
+    assert rows[1][2] == "30%" and "±" not in rows[1][3]
+    assert list(table(FOUND, 1)) == rows[:1]
+
+
+# --- for a program ---
+
+
+def test_the_object_has_what_the_contract_promises() -> None:
+    told = json.loads(json.dumps(as_json(FOUND), allow_nan=False))
+    assert {"baseline_error", "noise_floor_error", "candidates", "verdict", "unexplained"} <= told.keys()
+    assert (told["baseline_error"], told["noise_floor_error"]) == (0.31, 0.15)
+    assert told["verdict"] == ["dry_friction"] and told["unexplained"] is False
+    best, *others = told["candidates"]
+    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= best.keys() == others[0].keys()
+    assert best["effect"] == "dry_friction" and best["parameters"] == dict(FRICTION.values)
+    assert (best["error"], best["p_value"], best["confused_with"]) == (0.2, 1e-12, [])
+    assert best["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
+    assert others[0]["standard_errors"] == {}
+    assert (best["log_likelihood_gain"], best["unseen_log_likelihood_gain"]) == (250.0, 248.0)
+
+
+def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> None:
+    found = replace(FOUND, excess=0.5, shape=shape, conflicts={"sprung_mass_kg": -0.13}, obstacles={
+        "roll": "one track is known", "sensor_offset": HAS_IT}, undetectable=(
+            Undetectable(EFFECTS["wheel_lift"], 0.1),))
+    told = json.loads(json.dumps(as_json(found), allow_nan=False))
+    assert told["unexplained"] is True and told["left_over_noise"] == 1.5
+    assert told["numbers_off_too_far"] == {"sprung_mass_kg": -0.13}
+    assert told["not_tried"] == {"roll": "one track is known"} and told["hidden"] == {"wheel_lift": 0.1}
+    assert told["judged_on"] == JUDGED_ON
+    assert told["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
+    assert told["sentences"] == [*summary(found), *looks_like(found)]
+    seen = told["unexplained_shape"]
+    assert seen["repeats_every_m"] == pytest.approx(2 * np.pi * 0.31, rel=0.02)
+    assert sum(part["error_power_share"] for part in seen["frequency"]) == pytest.approx(1.0, abs=0.05)
+    for force, at in (("force_by_rate", "rate_mps"), ("force_by_travel", "travel_m")):
+        assert len(seen[force][at]) == len(seen[force]["force_n"]) == len(seen[force]["standard_error_n"]) > 2
+
+
+def test_a_diagnosis_that_lacks_nothing_has_an_empty_verdict() -> None:
+    told = as_json(NOTHING)
+    assert told["verdict"] == [] and told["unexplained"] is False and told["unexplained_shape"] is None
