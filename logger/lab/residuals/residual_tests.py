@@ -9,7 +9,6 @@ large enough to matter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
+from logger.lab.residuals.block_statistics import autocorrelations, band_pass, mean_of_blocks, rank_correlation, rms
 from logger.lab.residuals.breakdown import BAND_NAMES, Breakdown, ModelResiduals, Part, block_means, short_names
 from logger.lab.residuals.force_state_map import Curve, ForceMap, Term, force_map
 from logger.lab.residuals.road_coherence import Coherence, with_road
@@ -106,7 +106,7 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
     test = autocorrelation(residuals.residual, 0)
-    rho = _autocorrelations(residuals.residual, LAGS)
+    rho = autocorrelations(residuals.residual, LAGS)
     largest = int(np.abs(rho).argmax())
     error = sum(map(len, residuals.residual)) ** -0.5
     return ResidualTest("whiteness", float(rho[largest]), "1", error, test.p_value, abs(rho[largest]) > 0.1, False,
@@ -137,10 +137,10 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
 
 def _lean(residuals: ModelResiduals) -> ResidualTest:
     """Skewness, with Student's test of the cubes of blocks."""
-    scale = _rms(residuals.residual)
+    scale = rms(residuals.residual)
     if not scale > 0:
         return _nothing("lean", "1")
-    mean, error, p_value = _mean_of_blocks([(one / scale) ** 3 for one in residuals.residual], residuals, _LONG_BLOCK_S)
+    mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in residuals.residual], residuals, _LONG_BLOCK_S)
     return ResidualTest("lean", mean, "1", error, p_value, abs(mean) > _LEAST_LEAN, True,
                 f"The residual has its sharp peaks {'upward' if mean > 0 else 'downward'} (skewness {mean:.1f}): "
                 f"something pushes the body {'up' if mean > 0 else 'down'} in short blows.")
@@ -181,7 +181,7 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
     size = sum(float(one @ one) for one in residuals.model) / sum(map(len, residuals.model))
     if not size > 0:
         return _nothing("gain", "1")
-    excess, error, p_value = _mean_of_blocks(
+    excess, error, p_value = mean_of_blocks(
         [residual * model / size for residual, model in zip(residuals.residual, residuals.model, strict=True)],
         residuals, _LONG_BLOCK_S)
     return ResidualTest("gain", 1 + excess, "1", error, p_value, _LEAST_CHANGE < abs(excess) < _ALIKE, True,
@@ -238,7 +238,7 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 
     if high_hz <= low_hz:
         return None
-    model, residual = ([_band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
+    model, residual = ([band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
                    for signals in (residuals.model, residuals.residual))
     own = block_means(residuals, [one**2 for one in model], _LONG_BLOCK_S)
     cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], _LONG_BLOCK_S)
@@ -316,7 +316,7 @@ def _direction(forces: ForceMap, residuals: ModelResiduals) -> ResidualTest:
 
 
 def _excitation(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
-    rho, p_value = _ranks(block_means(residuals, [one**2 for one in residuals.residual]),
+    rho, p_value = rank_correlation(block_means(residuals, [one**2 for one in residuals.residual]),
                           block_means(residuals, [one**2 for one in residuals.model]))
     low, high = where.amplitude[0], where.amplitude[-1]
     grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
@@ -359,7 +359,7 @@ def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
     usual = float(np.median([part.residual_mps2 for part in where.place]))
     if not usual > 0:
         return _nothing("place", "1")
-    worth = 1 / (1 + 2 * float((_autocorrelations(residuals.residual, _MEMORY) ** 2).sum()))
+    worth = 1 / (1 + 2 * float((autocorrelations(residuals.residual, _MEMORY) ** 2).sum()))
     mean = sum(part.residual_mps2**2 * part.samples for part in where.place) / sum(part.samples for part in where.place)
     chances = [float(chi2.sf(worth * part.samples * part.residual_mps2**2 / mean, worth * part.samples))
                for part in where.place]
@@ -378,50 +378,6 @@ def worst_places(where: Breakdown, count: int) -> list[Part]:
 
 
 # --- arithmetic ---
-
-
-def _mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals, seconds: float) -> tuple[float, float, float]:
-    """Mean, its standard error from the spread of blocks, and Student's p-value against 0."""
-    from scipy.stats import t
-
-    means = block_means(residuals, signals, seconds)
-    if len(means) < 4:
-        return float(means.mean()), float("nan"), _UNKNOWN
-    mean, error = float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means)))
-    return mean, error, float(2 * t.sf(abs(mean) / error, len(means) - 1)) if error > 0 else _UNKNOWN
-
-
-def _ranks(one: Array, other: Array) -> tuple[float, float]:
-    """Spearman's rank correlation and its p-value."""
-    from scipy.stats import rankdata
-
-    return _correlation(rankdata(one), rankdata(other), len(one) - 2)
-
-
-def _correlation(one: Array, other: Array, freedom: int) -> tuple[float, float]:
-    from scipy.stats import t
-
-    one, other = one - one.mean(), other - other.mean()
-    size = float(np.sqrt((one @ one) * (other @ other)))
-    if freedom < 6 or not size > 0:
-        return _UNKNOWN, _UNKNOWN
-    rho = float(one @ other) / size
-    return rho, float(2 * t.sf(abs(rho) * np.sqrt(freedom / max(1 - rho**2, 1e-12)), freedom))
-
-
-def _autocorrelations(signals: Sequence[Array], lags: int) -> Array:
-    """At 1 ... lags samples (lags,)."""
-    power = sum(float(one @ one) for one in signals) or 1.0
-    return np.array([sum(float(one[lag:] @ one[:-lag]) for one in signals) for lag in range(1, lags + 1)]) / power
-
-
-def _band_pass(signal: Array, low_hz: float, high_hz: float, rate_hz: float) -> Array:
-    f_hz = np.fft.rfftfreq(len(signal), 1 / rate_hz)
-    return np.fft.irfft(np.where((f_hz >= low_hz) & (f_hz < high_hz), np.fft.rfft(signal), 0.0), len(signal))
-
-
-def _rms(signals: Sequence[Array]) -> float:
-    return float(np.sqrt(sum(float(one @ one) for one in signals) / sum(map(len, signals))))
 
 
 def _power(coherence: Coherence, low_hz: float, high_hz: float) -> float:

@@ -114,7 +114,7 @@ def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: 
 
 
 def _even(read: Array, predicted: Array, rate_hz: float) -> tuple[Array, Array]:
-    """What was read and what was predicted (n,), both over the square root of the power that was read at each frequency."""
+    """What was read and what was predicted (n,), both over the root of the power that was read at each frequency."""
     n = len(read)
     ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (_TAPER * n)
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
