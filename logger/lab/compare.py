@@ -1,9 +1,9 @@
 """A model compared with measurements: how large the error is, where it sits, and what kind of thing is missing.
 
 Problem: the numbers of a car are never exact, and a small mistake in them leaves an error that says nothing about
-physics. Solution: the error is told and shared out as the model stands; then the car's numbers and the distances of the
-runs are refitted within what they are usually off, and its residuals are tested after that. When a number
-has to move much farther than such numbers are off, that is told as well: a missing effect pulls at them.
+physics. Solution: the error is computed and broken down as the model stands; then the car's numbers and the distances
+of the runs are refitted within what they are usually off, and the residuals are tested after that. When a number has to
+move much farther than such numbers are off, that is reported: a missing effect pulls at it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FAR_SIGMA = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A model beside its measurements, its error (rms left / rms measured, all samples that count), and where it is."""
+    """A model with its residuals, its error (rms residual / rms measured, all samples that count), and where it is."""
 
     residuals: ModelResiduals
     error: float
@@ -65,7 +65,7 @@ class Comparison:
 
     @property
     def tells(self) -> bool:
-        """Whether more is left than two right simulations of a car differ by."""
+        """Whether the residual is larger than what two right simulations of a car differ by."""
         return self.refitted.error >= DISCREPANCY
 
     @property
@@ -75,7 +75,7 @@ class Comparison:
 
     @property
     def missing(self) -> bool:
-        """Whether what is left is tied to the road or the car's motion, or numbers had to move far: an effect may
+        """Whether the residual is tied to the road or the car's motion, or numbers had to move far: an effect may
         explain it."""
         return bool(self.far) or any(test.road for test in self.tests_found)
 

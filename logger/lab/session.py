@@ -43,7 +43,7 @@ class Story:
         return [name for one in self.rounds for name in one.addition.names]
 
     @property
-    def left(self) -> list[str]:
+    def not_added(self) -> list[str]:
         """Names of the effects that were found missing last and neither added nor refused: the rounds were used up."""
         missing = [one.effect.name for one in self.diagnoses[-1].missing]
         return [name for name in missing if name not in self.added and name not in self.refused]

@@ -23,8 +23,8 @@ _MOST_MOVES = 3
 def headline(found: Comparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
-    left, measured = (_rms(one) for one in (plain.residuals.left, plain.residuals.measured))
-    lines = [f"The residual (measured - model) is {left:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
+    residual, measured = (_rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
+    lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
              f"{plain.error:.3f}."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):

@@ -84,7 +84,7 @@ def _candidates(found: Diagnosis) -> Html:
 
 def _where(shape: Shape) -> Html:
     """By frequency, and along the way."""
-    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_told(2))
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_text(2))
             for part in shape.where.frequency]
     drawn = grid(("Band", "Hz", "Share of the residual", "Error"), rows)
     if shape.line is not None and shape.line.found:

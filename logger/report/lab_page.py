@@ -46,7 +46,7 @@ def _tiles(found: Comparison) -> Html:
     return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
                   ("Error after the refit", f"{found.refitted.error:.3f}", ""),
                   ("ResidualTests found", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
-                  ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.left)) / residuals.rate_hz:.0f} s")])
+                  ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
 
 
 # --- pictures ---
@@ -55,15 +55,15 @@ def _tiles(found: Comparison) -> Html:
 def _worst_place(standing: Standing) -> Html:
     residuals, worst = standing.residuals, worst_places(standing.where, 1)[0]
     index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
-    run, left = residuals.runs[index], residuals.left[index]
+    run, residual = residuals.runs[index], residuals.residual[index]
     at_m = run.distance_m[run.first:]
     inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
-    middle = int(inside[np.abs(left[inside]).argmax()])
+    middle = int(inside[np.abs(residual[inside]).argmax()])
     reach = round(_AROUND_S * residuals.rate_hz)
     part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(left)))[part] / residuals.rate_hz
+    time_s = (run.first + np.arange(len(residual)))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
-        ("measured", residuals.measured), ("what is left", residuals.left), ("model", residuals.model)))
+        ("measured", residuals.measured), ("what is left", residuals.residual), ("model", residuals.model)))
     title = f"{short_names(residuals.runs)[run.name]}, around {at_m[middle]:.0f} m"
     return section("The worst place", chart(Curves(title, "time in the run [s]", "acceleration [m/s2]", lines)))
 
@@ -77,7 +77,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     """The charts of it: of the body, and of the wheels and above."""
     f_hz = frequencies(residuals)
     density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
-               for one in (residuals.measured, residuals.left, residuals.model)]
+               for one in (residuals.measured, residuals.residual, residuals.model)]
 
     def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
@@ -94,10 +94,10 @@ def _places(standing: Standing) -> Html:
         parts = [part for part in standing.where.place if part.name == run.name]
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
-                              np.array([part.left_mps2 for part in parts])))
+                              np.array([part.residual_mps2 for part in parts])))
     along = Curves("What is left along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
-    rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.left_mps2:.3g}",
-             part.error_told(2)) for part in worst_places(standing.where, _WORST)]
+    rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
+             part.error_text(2)) for part in worst_places(standing.where, _WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
         ("Run", "From, to [m]", "Share of what is left", "Left [m/s2]", "Error"), rows))
 
@@ -147,10 +147,10 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
 
     def cells(one: Part | None, part: Part) -> Html:
         bar = html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
-        before = html("<td class=n>{}</td>", one.error_told(3) if one else "") if stands else EMPTY
+        before = html("<td class=n>{}</td>", one.error_text(3) if one else "") if stands else EMPTY
         return ((html("<td>{}</td>", part.name) if named else EMPTY)
                 + html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
-                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, part.error_told(3)) + before)
+                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, part.error_text(3)) + before)
 
     heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
              + Html("<th>Share of what is left</th><th></th><th class=n>Error</th>")

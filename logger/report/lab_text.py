@@ -18,7 +18,7 @@ _PLACES = 5
 def comparison_lines(found: Comparison) -> list[str]:
     """What a person reads of a comparison."""
     residuals = found.plain.residuals
-    seconds = sum(map(len, residuals.left)) / residuals.rate_hz
+    seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
     return [
         f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
         paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
@@ -44,13 +44,13 @@ def _tables(found: Comparison) -> list[str]:
 
 def _row(plain: Part | None, refitted: Part, unit: str) -> str:
     name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", plain.error_told(3)) if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_told(3):>8}"
+    share, error = (f"{plain.share:.1%}", plain.error_text(3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_text(3):>8}"
 
 
 def _place(part: Part, run: str) -> str:
     name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_told(3):>8}"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_text(3):>8}"
 
 
 def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:

@@ -20,9 +20,9 @@ def ending(story: Story) -> list[str]:
     lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
     if story.refused:
         lines.append(f"Found missing and left out as you wished: {', '.join(story.refused)}.")
-    if story.left:
-        lines.append(f"Found missing and not added: {', '.join(story.left)}. Go on with the last file.")
-    if story.refused or story.left:
+    if story.not_added:
+        lines.append(f"Found missing and not added: {', '.join(story.not_added)}. Go on with the last file.")
+    if story.refused or story.not_added:
         return [*lines, *with_what]
     if diagnosis.conflicts and not diagnosis.left_over:
         lines.append("Numbers of the vehicle's file are outside their tolerance: check them.")
@@ -37,7 +37,7 @@ def as_json(story: Story) -> dict[str, Any]:
     """The story as one JSON object."""
     return {
         "error_before": story.steps[0][1], "error_after": story.steps[-1][1], "noise_floor_error": story.floor,
-        "added": story.added, "refused": list(story.refused), "left": story.left,
+        "added": story.added, "refused": list(story.refused), "left": story.not_added,
         "unexplained": story.diagnoses[-1].unexplained,
         "steps": [{"step": words, "error": error} for words, error in story.steps],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],

@@ -75,18 +75,19 @@ def _moved(story: Story) -> Html:
 
 
 def _spectra(story: Story) -> Html:
-    """What was left before and after, by frequency."""
+    """The residual before and after, by frequency."""
     before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)
     kept = (f_hz > 0) & (f_hz <= _HIGHEST_OF_RATE * before.rate_hz)
 
     def line(name: str, residuals: ModelResiduals, measured: bool) -> Line:
-        signals = residuals.measured if measured else residuals.left
+        signals = residuals.measured if measured else residuals.residual
         power = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / f_hz[1]
         return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
 
-    return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", (
-        line("measured", before, True), line("left at first", before, False), line("left at last", after, False))))
+    lines = (line("measured", before, True), line("residual at first", before, False),
+             line("residual at last", after, False))
+    return chart(Curves("By frequency", "frequency [Hz]", "power [dB of (m/s2)2/Hz]", lines))
 
 
 def _place(story: Story) -> Html:
@@ -95,15 +96,16 @@ def _place(story: Story) -> Html:
     worst = worst_places(before.where, 1)[0]
     residuals = before.residuals
     index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
-    run, left = residuals.runs[index], residuals.left[index]
+    run, residual = residuals.runs[index], residuals.residual[index]
     at_m = run.distance_m[run.first:]
     inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
-    middle = int(inside[np.abs(left[inside]).argmax()])
+    middle = int(inside[np.abs(residual[inside]).argmax()])
     reach = round(_AROUND_S * residuals.rate_hz)
     part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(left)))[part] / residuals.rate_hz
+    time_s = (run.first + np.arange(len(residual)))[part] / residuals.rate_hz
     name = short_names(residuals.runs)[run.name]
     lines = (Line("measured", time_s, residuals.measured[index][part]),
-             Line("left at first", time_s, left[part]), Line("left at last", time_s, after.residuals.left[index][part]))
+             Line("residual at first", time_s, residual[part]),
+             Line("residual at last", time_s, after.residuals.residual[index][part]))
     return chart(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
                           "acceleration [m/s2]", lines))

@@ -72,12 +72,12 @@ def test_the_effect_in_the_model_leaves_noise() -> None:
 
 def test_error_is_the_ratio_of_rms_without_the_first_two_seconds(lacking: Comparison) -> None:
     residuals = lacking.plain.residuals
-    left = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
+    residual = np.concatenate([(run.measured_mps2 - one)[200:] for run, one in
                            zip(residuals.runs, residuals.predictions, strict=True)])
     measured = np.concatenate([run.measured_mps2[200:] for run in residuals.runs])
     told = as_json(lacking)
-    assert told["error"] == pytest.approx(np.sqrt(np.mean(left**2) / np.mean(measured**2)))
-    assert sum(run["samples"] for run in told["runs"]) == len(left)
+    assert told["error"] == pytest.approx(np.sqrt(np.mean(residual**2) / np.mean(measured**2)))
+    assert sum(run["samples"] for run in told["runs"]) == len(residual)
 
 
 def test_json_has_what_the_format_names(lacking: Comparison) -> None:

@@ -130,7 +130,7 @@ class UnknownRoad:
         """Factor the equations as they are here, so that those of a place nearby are solved in few rounds."""
         self._nearby = factored(self.model(at), self.grid.count)
 
-    def told(self, at: RoadState, number: int, by: Sequence[int] | None = None) -> Array:
+    def predicted(self, at: RoadState, number: int, by: Sequence[int] | None = None) -> Array:
         """What the other drives, or some, make one expect in the drive of this number (n,), less its mean [m/s2]."""
         model, crossings = self.model(at), self.crossings
         others = [index for index in range(len(crossings)) if index != number] if by is None else list(by)

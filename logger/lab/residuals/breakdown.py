@@ -49,11 +49,11 @@ class Band:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the data: its share of the power left out, and its error (rms left / rms measured, in it; NaN where
+    """A part of the data: its share of the residual power, and its error (rms residual / rms measured, in it; NaN where
     nothing was measured).
 
     low, high    its ends, in the unit of the list it stands in
-    left_mps2    rms of what is left in it
+    residual_mps2    rms of the residual in it
     samples      in it; of a band all
     name         of a band, or of the run that a place is in; else empty
     """
@@ -62,18 +62,19 @@ class Part:
     high: float
     error: float
     share: float
-    left_mps2: float
+    residual_mps2: float
     samples: int
     name: str = ""
 
-    def error_told(self, digits: int) -> str:
+    def error_text(self, digits: int) -> str:
         """The error with so many digits behind the point; a dash where there is none."""
         return f"{self.error:.{digits}f}" if np.isfinite(self.error) else "-"
 
 
 @dataclass(frozen=True)
 class Breakdown:
-    """Where what is left sits: by frequency [Hz], speed [m/s], rms of the model's acceleration [m/s2], place [m]."""
+    """Where the residual power sits: by frequency [Hz], speed [m/s], r.m.s. of the model's acceleration [m/s2], place
+    [m]."""
 
     frequency: tuple[Part, ...]
     speed: tuple[Part, ...]
@@ -100,7 +101,7 @@ class ModelResiduals:
         return self.runs[0].rate_hz
 
     @cached_property
-    def left(self) -> list[Array]:
+    def residual(self) -> list[Array]:
         """measured - model, the samples that count, per run [m/s2]."""
         return [(run.measured_mps2 - one)[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
@@ -135,7 +136,7 @@ class ModelResiduals:
 
 
 def breakdown(residuals: ModelResiduals) -> Breakdown:
-    """Where what is left sits."""
+    """Where the power of the residuals sits."""
     return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
 
 
@@ -166,7 +167,7 @@ def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray
 
 def segment_size(residuals: ModelResiduals) -> int:
     """Samples in a segment, an even number."""
-    longest = max(map(len, residuals.left))
+    longest = max(map(len, residuals.residual))
     return min(round(SEGMENT_S * residuals.rate_hz), longest) // 2 * 2
 
 
@@ -204,15 +205,15 @@ def place_length_m(runs: Sequence[Run]) -> float:
 
 
 def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
-    left, measured = (np.mean(np.abs(segments(residuals, one)) ** 2, axis=0)
-                      for one in (residuals.left, residuals.measured))
-    f_hz, whole = frequencies(residuals), float(left.sum())
+    residual, measured = (np.mean(np.abs(segments(residuals, one)) ** 2, axis=0)
+                      for one in (residuals.residual, residuals.measured))
+    f_hz, whole = frequencies(residuals), float(residual.sum())
     found = []
     for band in residuals.bands:
         inside = (f_hz >= band.from_hz) & ((f_hz < band.to_hz) | (band is residuals.bands[-1]))
-        part, of = float(left[inside].sum()), float(measured[inside].sum())
+        part, of = float(residual[inside].sum()), float(measured[inside].sum())
         found.append(Part(band.from_hz, band.to_hz, _ratio(part, of), part / whole if whole > 0 else 0.0,
-                          float(np.sqrt(part)), sum(map(len, residuals.left)), band.name))
+                          float(np.sqrt(part)), sum(map(len, residuals.residual)), band.name))
     return tuple(found)
 
 
@@ -236,26 +237,26 @@ def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
 
 def _by_place(residuals: ModelResiduals) -> tuple[Part, ...]:
     length = place_length_m(residuals.runs)
-    whole = sum(float(one @ one) for one in residuals.left)
+    whole = sum(float(one @ one) for one in residuals.residual)
     found: list[Part] = []
-    for run, left, measured in zip(residuals.runs, residuals.left, residuals.measured, strict=True):
+    for run, residual, measured in zip(residuals.runs, residuals.residual, residuals.measured, strict=True):
         at = run.distance_m[run.first:]
         edges = np.arange(np.floor(at.min() / length), np.floor(at.max() / length) + 2) * length
-        found += _parts(at, edges, left, measured, whole, run.name)
+        found += _parts(at, edges, residual, measured, whole, run.name)
     return tuple(found)
 
 
 def _binned(residuals: ModelResiduals, values: Array, edges: Array) -> tuple[Part, ...]:
-    left, measured = np.concatenate(residuals.left), np.concatenate(residuals.measured)
-    return tuple(_parts(values, edges, left, measured, float(left @ left)))
+    residual, measured = np.concatenate(residuals.residual), np.concatenate(residuals.measured)
+    return tuple(_parts(values, edges, residual, measured, float(residual @ residual)))
 
 
-def _parts(values: Array, edges: Array, left: Array, measured: Array, whole: float, name: str = "") -> list[Part]:
+def _parts(values: Array, edges: Array, residual: Array, measured: Array, whole: float, name: str = "") -> list[Part]:
     """Bins [edge, next edge) that hold samples."""
     index = np.searchsorted(edges, values, side="right") - 1
     bins = len(edges) - 1
     count = np.bincount(index, minlength=bins)
-    power, of = (np.bincount(index, one**2, minlength=bins) for one in (left, measured))
+    power, of = (np.bincount(index, one**2, minlength=bins) for one in (residual, measured))
     return [Part(float(edges[i]), float(edges[i + 1]), _ratio(power[i], of[i]),
                  float(power[i] / whole) if whole > 0 else 0.0, float(np.sqrt(power[i] / count[i])), int(count[i]),
                  name)

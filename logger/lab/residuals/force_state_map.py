@@ -38,7 +38,7 @@ _NOTHING = 1e-100
 class Curve:
     """A missing force by one coordinate: knots (k,), force and its standard error [N] in each suspension.
 
-    What a linear law would do is taken out of it. p_value: of a force so large by chance; share: of the power left
+    What a linear law would do is taken out of it. p_value: of a force so large by chance; share: of the residual power
     """
 
     at: Array
@@ -51,7 +51,7 @@ class Curve:
 @dataclass(frozen=True)
 class Term:
     """One term: its coefficient with its standard error, how probable one so large would be by chance, and the share of
-    the power left that it explains."""
+    the residual power that it explains."""
 
     value: float
     error: float
@@ -90,12 +90,12 @@ def force_map(residuals: ModelResiduals) -> ForceMap:
         regression.term(_through(residuals, [lambda travel, _: travel**3])))
 
 
-def whitening(left: Sequence[Array]) -> Array:
+def whitening(residual: Sequence[Array]) -> Array:
     """Filter (p + 1,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white."""
-    if autocorrelation(left, 0).passed:
+    if autocorrelation(residual, 0).passed:
         return np.ones(1)
-    count = sum(map(len, left))
-    lags = np.array([sum(float(one[: len(one) - lag] @ one[lag:]) for one in left) / count
+    count = sum(map(len, residual))
+    lags = np.array([sum(float(one[: len(one) - lag] @ one[lag:]) for one in residual) / count
                      for lag in range(_ORDER + 1)])
     lags[0] *= 1 + 1e-6
     table = lags[np.abs(np.arange(_ORDER)[:, None] - np.arange(_ORDER))]
@@ -106,27 +106,27 @@ class _Regression:
     """The residual, and what is never physics, whitened."""
 
     def __init__(self, residuals: ModelResiduals) -> None:
-        self._filter = whitening(residuals.left)
+        self._filter = whitening(residuals.residual)
         wheels = range(residuals.responses[0].rate_mps.shape[1])
         linear = [_through(residuals, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
         rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
         nuisance = [np.column_stack([*(one[index] for one in linear), model, rate])
                     for index, (model, rate) in enumerate(zip(residuals.model, rates, strict=True))]
-        self._plain, self._white = (_Without(np.concatenate(left), np.concatenate(columns)) for left, columns in (
-            (residuals.left, nuisance), (self._whitened(residuals.left), self._whitened(nuisance))))
+        pairs = ((residuals.residual, nuisance), (self._whitened(residuals.residual), self._whitened(nuisance)))
+        self._plain, self._white = (_Without(np.concatenate(one), np.concatenate(columns)) for one, columns in pairs)
 
     def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
         """Coefficients (k,), their covariance (k, k), the p-value of all together, and the share that they explain."""
         from scipy.stats import f
 
-        coefficients, covariance, rank, power, left = self._white.fit(np.concatenate(self._whitened(columns)))
+        coefficients, covariance, rank, power, residual = self._white.fit(np.concatenate(self._whitened(columns)))
         freedom = self._white.freedom - rank
-        if rank == 0 or not left > 0:
+        if rank == 0 or not residual > 0:
             return coefficients, covariance, float("nan"), 0.0
-        variance = left / freedom
-        p_value = float(f.sf((power - left) / rank / variance, rank, freedom))
-        _, _, rank, power, left = self._plain.fit(np.concatenate(columns))
-        share = 1 - left / power * self._plain.freedom / (self._plain.freedom - rank) if power > 0 else 0.0
+        variance = residual / freedom
+        p_value = float(f.sf((power - residual) / rank / variance, rank, freedom))
+        _, _, rank, power, residual = self._plain.fit(np.concatenate(columns))
+        share = 1 - residual / power * self._plain.freedom / (self._plain.freedom - rank) if power > 0 else 0.0
         return coefficients, covariance * variance, p_value, max(share, 0.0)
 
     def term(self, columns: Sequence[Array]) -> Term:
@@ -145,8 +145,8 @@ class _Without:
 
     def __init__(self, target: Array, others: Array) -> None:
         scaled = others / np.maximum(np.sqrt((others**2).sum(axis=0)), 1e-300)
-        left, values, _ = np.linalg.svd(scaled, full_matrices=False)
-        self._basis = left[:, values > _RANK * values[0]]
+        residual, values, _ = np.linalg.svd(scaled, full_matrices=False)
+        self._basis = residual[:, values > _RANK * values[0]]
         self._target = self._removed(target)
         self.freedom = len(target) - self._basis.shape[1]
 

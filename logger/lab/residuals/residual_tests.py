@@ -9,7 +9,6 @@ large enough to matter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
+from logger.lab.residuals.block_statistics import autocorrelations, band_pass, mean_of_blocks, rank_correlation, rms
 from logger.lab.residuals.breakdown import BAND_NAMES, Breakdown, ModelResiduals, Part, block_means, short_names
 from logger.lab.residuals.force_state_map import Curve, ForceMap, Term, force_map
 from logger.lab.residuals.road_coherence import Coherence, with_road
@@ -50,7 +50,7 @@ class ResidualTest:
     value, unit        what it is, and its standard error where there is one; NaN where the runs cannot tell
     p_value            how probable it would be in noise; NaN where the runs cannot tell
     large              whether it is large enough to matter
-    road               whether it ties what is left to the road or to the car's motion
+    road               whether it ties the residual to the road or to the car's motion
     sentence           what it says when it is found
     """
 
@@ -105,11 +105,11 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    test = autocorrelation(residuals.left, 0)
-    rho = _autocorrelations(residuals.left, LAGS)
+    test = autocorrelation(residuals.residual, 0)
+    rho = autocorrelations(residuals.residual, LAGS)
     largest = int(np.abs(rho).argmax())
-    return ResidualTest("whiteness", float(rho[largest]), "1", (1 / sum(map(len, residuals.left))) ** 0.5, test.p_value,
-                abs(rho[largest]) > 0.1, False,
+    error = sum(map(len, residuals.residual)) ** -0.5
+    return ResidualTest("whiteness", float(rho[largest]), "1", error, test.p_value, abs(rho[largest]) > 0.1, False,
                 f"The residual is not white: samples {(largest + 1) / residuals.rate_hz * 1000:.0f} ms apart have a "
                 f"correlation of {rho[largest]:.2f}.")
 
@@ -119,7 +119,7 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
     from scipy.stats import f
 
     parts = where.frequency
-    whole, span_s = parts[-1].high, sum(map(len, residuals.left)) / residuals.rate_hz
+    whole, span_s = parts[-1].high, sum(map(len, residuals.residual)) / residuals.rate_hz
     chances = []
     for part in parts:
         width = part.high - part.low
@@ -132,15 +132,15 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
     width = (part.high - part.low) / whole
     return ResidualTest("frequency", part.share, "1", None, min(chances[best], 1.0), part.share > 2 * width, False,
                 f"{_percent(part.share)} of the residual's power lies {_band_words(part)}, where white noise would "
-                f"have {_percent(width)}; the error there is {part.error_told(2)}.")
+                f"have {_percent(width)}; the error there is {part.error_text(2)}.")
 
 
 def _lean(residuals: ModelResiduals) -> ResidualTest:
     """Skewness, with Student's test of the cubes of blocks."""
-    scale = _rms(residuals.left)
+    scale = rms(residuals.residual)
     if not scale > 0:
         return _nothing("lean", "1")
-    mean, error, p_value = _mean_of_blocks([(one / scale) ** 3 for one in residuals.left], residuals, _LONG_BLOCK_S)
+    mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in residuals.residual], residuals, _LONG_BLOCK_S)
     return ResidualTest("lean", mean, "1", error, p_value, abs(mean) > _LEAST_LEAN, True,
                 f"The residual has its sharp peaks {'upward' if mean > 0 else 'downward'} (skewness {mean:.1f}): "
                 f"something pushes the body {'up' if mean > 0 else 'down'} in short blows.")
@@ -149,10 +149,10 @@ def _lean(residuals: ModelResiduals) -> ResidualTest:
 def _tone(residuals: ModelResiduals) -> ResidualTest:
     """The frequency that stands out most, of all runs."""
     tones = []
-    for run, left in zip(residuals.runs, residuals.left, strict=True):
-        f_hz = np.fft.rfftfreq(len(left), 1 / residuals.rate_hz)
-        reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(left) / residuals.rate_hz))
-        found = loudest(periodogram(left), reach=reach)
+    for run, residual in zip(residuals.runs, residuals.residual, strict=True):
+        f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
+        reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(residual) / residuals.rate_hz))
+        found = loudest(periodogram(residual), reach=reach)
         if found is not None:
             tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), short_names(residuals.runs)[run.name]))
     if not tones:
@@ -181,9 +181,9 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
     size = sum(float(one @ one) for one in residuals.model) / sum(map(len, residuals.model))
     if not size > 0:
         return _nothing("gain", "1")
-    excess, error, p_value = _mean_of_blocks(
-        [left * model / size for left, model in zip(residuals.left, residuals.model, strict=True)], residuals,
-        _LONG_BLOCK_S)
+    excess, error, p_value = mean_of_blocks(
+        [residual * model / size for residual, model in zip(residuals.residual, residuals.model, strict=True)],
+        residuals, _LONG_BLOCK_S)
     return ResidualTest("gain", 1 + excess, "1", error, p_value, _LEAST_CHANGE < abs(excess) < _ALIKE, True,
                 f"Where both agree in shape, the measurement is {1 + excess:.3g} times the model "
                 f"(standard error {error:.1g}).")
@@ -238,10 +238,10 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 
     if high_hz <= low_hz:
         return None
-    model, left = ([_band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
-                   for signals in (residuals.model, residuals.left))
+    model, residual = ([band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
+                   for signals in (residuals.model, residuals.residual))
     own = block_means(residuals, [one**2 for one in model], _LONG_BLOCK_S)
-    cross = block_means(residuals, [a * b for a, b in zip(left, model, strict=True)], _LONG_BLOCK_S)
+    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], _LONG_BLOCK_S)
     third = len(own) // 3
     if third < 4 or not own.any():
         return None
@@ -316,19 +316,19 @@ def _direction(forces: ForceMap, residuals: ModelResiduals) -> ResidualTest:
 
 
 def _excitation(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
-    rho, p_value = _ranks(block_means(residuals, [one**2 for one in residuals.left]),
+    rho, p_value = rank_correlation(block_means(residuals, [one**2 for one in residuals.residual]),
                           block_means(residuals, [one**2 for one in residuals.model]))
     low, high = where.amplitude[0], where.amplitude[-1]
-    grown = max(high.left_mps2, 1e-300) / max(low.left_mps2, 1e-300)
+    grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
     large = len(where.amplitude) > 1 and (grown > _GROWN if rho > 0 else grown < 1 / _GROWN)
     return ResidualTest("excitation", rho, "1", None, p_value, large, True,
-                f"The residual {'grows' if rho > 0 else 'shrinks'} as the road moves the car more: {low.left_mps2:.2g} "
-                f"m/s2 where the model has up to {low.high:.2g} m/s2, {high.left_mps2:.2g} where it has {high.low:.2g} "
-                "and more.")
+                f"The residual {'grows' if rho > 0 else 'shrinks'} as the road moves the car more: "
+                f"{low.residual_mps2:.2g} m/s2 where the model has up to {low.high:.2g} m/s2, "
+                f"{high.residual_mps2:.2g} where it has {high.low:.2g} and more.")
 
 
 def _speed(residuals: ModelResiduals) -> ResidualTest:
-    """By which factor what is left changes from the slowest to the fastest driving at equal excitation: a regression of
+    """By which factor the residual changes from the slowest to the fastest driving at equal excitation: a regression of
     the logarithms of blocks on speed and excitation, the second bent as it will."""
     from scipy.stats import t
 
@@ -337,12 +337,12 @@ def _speed(residuals: ModelResiduals) -> ResidualTest:
     freedom = len(speed) - 5
     if fast < _SPEED_SPREAD * max(slow, 0.1) or freedom < 6:
         return _nothing("speed", "1")
-    left, model = (np.log(np.maximum(block_means(residuals, [one**2 for one in signals]), 1e-300))
-                   for signals in (residuals.left, residuals.model))
+    residual, model = (np.log(np.maximum(block_means(residuals, [one**2 for one in signals]), 1e-300))
+                   for signals in (residuals.residual, residuals.model))
     level = (model - model.mean()) / (float(model.std()) or 1.0)
     columns = np.column_stack([np.ones(len(level)), (speed - slow) / (fast - slow), level, level**2, level**3])
-    coefficients, *_ = np.linalg.lstsq(columns, left, rcond=None)
-    rest = left - columns @ coefficients
+    coefficients, *_ = np.linalg.lstsq(columns, residual, rcond=None)
+    rest = residual - columns @ coefficients
     error = float(np.sqrt(rest @ rest / freedom * np.linalg.pinv(columns.T @ columns)[1, 1]))
     factor = float(np.exp(coefficients[1] / 2))
     p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else _UNKNOWN
@@ -356,72 +356,28 @@ def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
     """The place with most power for its length, as so many independent samples as its autocorrelation leaves."""
     from scipy.stats import chi2
 
-    usual = float(np.median([part.left_mps2 for part in where.place]))
+    usual = float(np.median([part.residual_mps2 for part in where.place]))
     if not usual > 0:
         return _nothing("place", "1")
-    worth = 1 / (1 + 2 * float((_autocorrelations(residuals.left, _MEMORY) ** 2).sum()))
-    mean = sum(part.left_mps2**2 * part.samples for part in where.place) / sum(part.samples for part in where.place)
-    chances = [float(chi2.sf(worth * part.samples * part.left_mps2**2 / mean, worth * part.samples))
+    worth = 1 / (1 + 2 * float((autocorrelations(residuals.residual, _MEMORY) ** 2).sum()))
+    mean = sum(part.residual_mps2**2 * part.samples for part in where.place) / sum(part.samples for part in where.place)
+    chances = [float(chi2.sf(worth * part.samples * part.residual_mps2**2 / mean, worth * part.samples))
                for part in where.place]
     worst = worst_places(where, 3)
     names = short_names(residuals.runs)
-    named = "; ".join(f"{names[part.name]}, {part.low:g} to {part.high:g} m ({part.left_mps2 / usual:.1f} times)"
+    named = "; ".join(f"{names[part.name]}, {part.low:g} to {part.high:g} m ({part.residual_mps2 / usual:.1f} times)"
                       for part in worst)
-    ratio = max(part.left_mps2 for part in worst) / usual
+    ratio = max(part.residual_mps2 for part in worst) / usual
     return ResidualTest("place", ratio, "1", None, min(1.0, min(chances) * len(chances)), ratio > 2, False,
                 f"At some places the residual is much larger than usual: {named}.")
 
 
 def worst_places(where: Breakdown, count: int) -> list[Part]:
-    """The places that hold most of what is left."""
+    """The places that hold most of the residual power."""
     return sorted(where.place, key=lambda part: -part.share)[:count]
 
 
 # --- arithmetic ---
-
-
-def _mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals, seconds: float) -> tuple[float, float, float]:
-    """Mean, its standard error from the spread of blocks, and Student's p-value against 0."""
-    from scipy.stats import t
-
-    means = block_means(residuals, signals, seconds)
-    if len(means) < 4:
-        return float(means.mean()), float("nan"), _UNKNOWN
-    mean, error = float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means)))
-    return mean, error, float(2 * t.sf(abs(mean) / error, len(means) - 1)) if error > 0 else _UNKNOWN
-
-
-def _ranks(one: Array, other: Array) -> tuple[float, float]:
-    """Spearman's rank correlation and its p-value."""
-    from scipy.stats import rankdata
-
-    return _correlation(rankdata(one), rankdata(other), len(one) - 2)
-
-
-def _correlation(one: Array, other: Array, freedom: int) -> tuple[float, float]:
-    from scipy.stats import t
-
-    one, other = one - one.mean(), other - other.mean()
-    size = float(np.sqrt((one @ one) * (other @ other)))
-    if freedom < 6 or not size > 0:
-        return _UNKNOWN, _UNKNOWN
-    rho = float(one @ other) / size
-    return rho, float(2 * t.sf(abs(rho) * np.sqrt(freedom / max(1 - rho**2, 1e-12)), freedom))
-
-
-def _autocorrelations(signals: Sequence[Array], lags: int) -> Array:
-    """At 1 ... lags samples (lags,)."""
-    power = sum(float(one @ one) for one in signals) or 1.0
-    return np.array([sum(float(one[lag:] @ one[:-lag]) for one in signals) for lag in range(1, lags + 1)]) / power
-
-
-def _band_pass(signal: Array, low_hz: float, high_hz: float, rate_hz: float) -> Array:
-    f_hz = np.fft.rfftfreq(len(signal), 1 / rate_hz)
-    return np.fft.irfft(np.where((f_hz >= low_hz) & (f_hz < high_hz), np.fft.rfft(signal), 0.0), len(signal))
-
-
-def _rms(signals: Sequence[Array]) -> float:
-    return float(np.sqrt(sum(float(one @ one) for one in signals) / sum(map(len, signals))))
 
 
 def _power(coherence: Coherence, low_hz: float, high_hz: float) -> float:

@@ -1,4 +1,4 @@
-"""How much of what is left the road has caused: the multiple coherence of residual and road.
+"""How much of the residual the road has caused: the multiple coherence of residual and road.
 
 Problem: noise leaves a residual as well as missing physics does; only the second follows the road. Solution: in
 segments of each run the spectrum of the residual is fitted by those of the road's slope under the front and the rear
@@ -44,7 +44,7 @@ class Coherence:
     power: Array
 
     def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
-        """Between two frequencies: the share of the power left, and how probable it would be by chance."""
+        """Between two frequencies: the share of the residual power, and how probable it would be by chance."""
         from scipy.special import digamma, polygamma
         from scipy.stats import gamma
 
@@ -77,12 +77,12 @@ def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
 
 
 def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> Coherence:
-    left = segments(residuals, residuals.left)
+    residual = segments(residuals, residuals.residual)
     roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
-    count = len(left)
-    power = np.mean(np.abs(left) ** 2, axis=0)
+    count = len(residual)
+    power = np.mean(np.abs(residual) ** 2, axis=0)
     own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
-    cross = np.einsum("sfi,sf->fi", roads.conj(), left) / count
+    cross = np.einsum("sfi,sf->fi", roads.conj(), residual) / count
     gain = np.einsum("fij,fj->fi", np.linalg.pinv(own, rcond=1e-6, hermitian=True), cross)
     found = np.einsum("fi,fi->f", cross.conj(), gain).real
     raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)

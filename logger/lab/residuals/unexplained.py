@@ -1,4 +1,4 @@
-"""What is left when no candidate explains it: not named, but described.
+"""The residual that no candidate explains: not named, but described.
 
 Problem: something is missing, and nothing on the list is it. Solution: what the best model leaves is read as a
 comparison reads it (which force in the suspensions, at which frequencies, following what), and once more along the way
@@ -99,13 +99,13 @@ def spatial_line_of(residuals: ModelResiduals) -> SpatialLine | None:
     run, at another speed, has it too."""
     found = []
     names = short_names(residuals.runs)
-    for run, left in zip(residuals.runs, residuals.left, strict=True):
+    for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         speed = run.speed_mps[run.first:]
         if speed.min() < _SLOWEST_MPS or run.distance_m[-1] <= run.distance_m[run.first]:
             continue
         way = np.maximum.accumulate(run.distance_m[run.first:])
         step_m = float(np.median(speed)) / run.rate_hz
-        along = np.interp(np.arange(way[0], way[-1], step_m), way, left)
+        along = np.interp(np.arange(way[0], way[-1], step_m), way, residual)
         per_m = np.fft.rfftfreq(len(along), step_m)
         asked = (per_m > _FROM_PER_M) & (per_m < _TO_PER_M)
         power = periodogram(along)

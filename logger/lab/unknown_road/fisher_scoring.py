@@ -53,24 +53,24 @@ def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
         gains, slopes = sloped(problem, effects, moves, logs)
         if problem.rounds > _MANY_ROUNDS:
             problem = problem.prepared(State(effects, logs, roads, gains))
-        look = problem.look(problem.table(gains, slopes), roads, information=True)
-        pull, grant = granted(problem, logs, q, roads)
-        score = look.slopes - pull
-        step = _step(score, look.information + np.diag(grant), here, low, high)
+        scored = problem.scored(problem.table(gains, slopes), roads, information=True)
+        pull, prior_precision = prior_terms(problem, logs, q, roads)
+        score = scored.slopes - pull
+        step = _step(score, scored.information + np.diag(prior_precision), here, low, high)
         if count and float(score @ step) < _SETTLED:
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
     found = State(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), look.information, look.information + np.diag(grant), problem)
+    return Fitted(found, tuple(moves), scored.information, scored.information + np.diag(prior_precision), problem)
 
 
-def granted(problem: SameRoad, logs: Array, moves: int, roads: Array) -> tuple[Array, Array]:
+def prior_terms(problem: SameRoad, logs: Array, moves: int, roads: Array) -> tuple[Array, Array]:
     """How strongly what is granted pulls at each number (m,), and its precision (m,)."""
-    off, precision = problem.granted(roads)
+    off, precision = problem.prior_terms(roads)
     own = problem.prior.deviations**-2
-    grant = np.concatenate([own, np.zeros(moves), precision])
-    return grant * np.concatenate([logs, np.zeros(moves), off]), grant
+    prior_precision = np.concatenate([own, np.zeros(moves), precision])
+    return prior_precision * np.concatenate([logs, np.zeros(moves), off]), prior_precision
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:

@@ -42,7 +42,7 @@ Complex = npt.NDArray[np.complex128]
 _STRETCH_S, _LEAST_S = 10.0, 3.0
 _PLACE_OFF_M = 3.0
 PROBES = 8
-# What is granted to a stretch: deviations of its waviness, and of its places from those of the whole way.
+# Priors of a stretch: deviations of its waviness, and of its places from those of the whole way.
 _WAVINESS, _WAVINESS_OFF = 2.0, 0.3
 _OFFSET_OFF_M = 0.05
 _LEVEL, _TILT = 0, 1
@@ -76,9 +76,9 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ScoreAndInformation:
     """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
-    the information (m, m) or zeros; nothing of what is granted is in them."""
+    the information (m, m) or zeros; nothing of the priors is in them."""
 
     slopes: Array
     information: Array
@@ -137,7 +137,7 @@ class SameRoad:
         """The car as it stands on roads of a likely level."""
         return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
 
-    def look(self, table: Tabulated, roads: Array, information: bool) -> Look:
+    def scored(self, table: Tabulated, roads: Array, information: bool) -> ScoreAndInformation:
         """The slopes, by the table's and by the roads' numbers, and the information."""
         p, self.rounds = len(table.slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
@@ -148,7 +148,7 @@ class SameRoad:
             self.rounds = max(self.rounds, asked.rounds)
             slopes[whole] += own
             matrix[np.ix_(whole, whole)] += known
-        return Look(slopes, matrix)
+        return ScoreAndInformation(slopes, matrix)
 
     def prepared(self, state: State) -> SameRoad:
         """The same, quick for models that are like this one."""
@@ -158,7 +158,7 @@ class SameRoad:
             road.prepare(self._at(state.roads[part], 0))
         return other
 
-    def granted(self, roads: Array) -> tuple[Array, Array]:
+    def prior_terms(self, roads: Array) -> tuple[Array, Array]:
         """How far roads are from what they usually are (r,), and the precision of that (r,)."""
         off, precision = np.zeros(self.count), np.zeros(self.count)
         for part in self._parts:
@@ -171,51 +171,52 @@ class SameRoad:
 
     def cost(self, state: State) -> float:
         """What the state's numbers cost: squares of their deviations."""
-        off, precision = self.granted(state.roads)
+        off, precision = self.prior_terms(state.roads)
         return float(((state.logs / self.prior.deviations) ** 2).sum() + precision @ off**2)
 
     def gain(self, before: State, after: State) -> float:
-        """By how much minus twice the log-likelihood falls from one state to another, what is granted counted in."""
+        """By how much minus twice the log-likelihood falls from one state to another, the priors counted in."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
         total = 0.0
         for node, weight in zip(0.5 * (_NODES + 1), 0.5 * _WEIGHTS, strict=True):
             table = self.table(before.gains + node * change, change[None])
-            look = self.look(table, before.roads + node * road_change, information=False)
-            total += weight * float(look.slopes[0] + look.slopes[1:] @ road_change)
+            scored = self.scored(table, before.roads + node * road_change, information=False)
+            total += weight * float(scored.slopes[0] + scored.slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
-    def told(self, state: State) -> list[tuple[int, Array, Array]]:
+    def predicted_by_others(self, state: State) -> list[tuple[int, Array, Array]]:
         """Of every drive over every stretch: its run, what was read, and what the other drives make one expect."""
         found = []
         table = self.table(state.gains)
         for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
             other, at = road.with_car(table), self._at(state.roads[part], 0)
-            found += [(run, road.measured[number], other.told(at, number)) for number, (run, _) in enumerate(parts)]
+            found += [(run, road.measured[number], other.predicted(at, number))
+                      for number, (run, _) in enumerate(parts)]
         return found
 
-    def told_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
+    def predicted_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
         """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
         the latter alone makes one expect (n,)."""
         table = self.table(state.gains)
         for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
             other, at = road.with_car(table), self._at(state.roads[part], 0)
             for number, by in permutations(range(len(parts)), 2):
-                yield parts[number][0], parts[by][0], road.measured[number], other.told(at, number, [by])
+                yield parts[number][0], parts[by][0], road.measured[number], other.predicted(at, number, [by])
 
     def errors(self, state: State) -> list[float]:
-        """Of every run, rms(read - expected) / rms(read), the road being told by the other drives alone; nan for one
+        """Of every run, rms(read - expected) / rms(read), the road being known from the other drives alone; nan for one
         that no other shares a stretch with."""
         left, whole = np.zeros(len(self.runs)), np.zeros(len(self.runs))
-        for run, read, expected in self.told(state):
+        for run, read, expected in self.predicted_by_others(state):
             left[run] += float(((read - expected) ** 2).sum())
             whole[run] += float((read**2).sum())
         return [float(np.sqrt(one / all_)) if all_ > 0 else float("nan") for one, all_ in zip(left, whole, strict=True)]
 
     def error(self, state: State) -> float:
         """The same of all of them together."""
-        told = self.told(state)
-        return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in told)
-                             / sum(float((read**2).sum()) for _, read, _ in told)))
+        pairs = self.predicted_by_others(state)
+        return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in pairs)
+                             / sum(float((read**2).sum()) for _, read, _ in pairs)))
 
     @property
     def size_mps2(self) -> float:
@@ -237,7 +238,7 @@ class SameRoad:
         """The sensor's noise, under what each drive has that the others do not tell: that is more than noise where the
         road moves the car, so that it is asked only for noise that the recorder filtered."""
         left: dict[int, list[Array]] = {}
-        for run, read, expected in self.told(state):
+        for run, read, expected in self.predicted_by_others(state):
             left.setdefault(run, []).append(read - expected)
         runs = [_joined(self.runs[run], parts) for run, parts in left.items()]
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],

@@ -37,8 +37,8 @@ _NEAR_S, _FAR_S = 0.05, 1.0
 class Likeness:
     """What one run tells of another one, in standard deviations of chance.
 
-    run, by    numbers of the runs: that which is told, and that which tells
-    found      how well what is told goes with what was read
+    run, by    numbers of the runs: that which is predicted, and that which predicts it
+    found      how well what is predicted goes with what was read
     expected   how well it would, were the model right
     """
 
@@ -88,17 +88,17 @@ def _unseen(found: Sequence[Likeness]) -> dict[tuple[int, int], float]:
 
 def _likenesses(problem: SameRoad, state: State) -> list[Likeness]:
     parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
-    for run, by, read, told in problem.told_by_each(state):
-        parts[run, by].append((read, told))
+    for run, by, read, predicted in problem.predicted_by_each(state):
+        parts[run, by].append((read, predicted))
     return [_likeness(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
 
 
 def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float) -> Likeness:
-    """Of what was read and told (n,) of each stretch."""
+    """Of what was read and predicted (n,) of each stretch."""
     near = round(_NEAR_S * rate_hz)
     like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
-    for read, told in pairs:
-        ours, theirs = _even(read, told, rate_hz)
+    for read, predicted in pairs:
+        ours, theirs = _even(read, predicted, rate_hz)
         size = float(np.linalg.norm(ours))
         share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
         ours, theirs = (_steady(one, rate_hz) for one in (ours, theirs))
@@ -108,17 +108,17 @@ def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: 
         like += both[np.arange(-near, near + 1)]
         expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
     deviation = float(np.sqrt(chance))
-    if not deviation > 0:  # nothing is told
+    if not deviation > 0:  # nothing is predicted
         return Likeness(run, by, 0.0, 0.0)
     return Likeness(run, by, float(like.max()) / deviation, expected / deviation)
 
 
-def _even(read: Array, told: Array, rate_hz: float) -> tuple[Array, Array]:
-    """What was read and what was told (n,), both over the square root of the power that was read at each frequency."""
+def _even(read: Array, predicted: Array, rate_hz: float) -> tuple[Array, Array]:
+    """What was read and what was predicted (n,), both over the root of the power that was read at each frequency."""
     n = len(read)
     ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (_TAPER * n)
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
-    ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, told))
+    ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, predicted))
     f_hz = np.fft.rfftfreq(n, 1 / rate_hz)
     power = _smooth(np.abs(ours) ** 2, round(_SMOOTH_HZ * n / rate_hz))
     used = (f_hz >= _LOWEST_HZ) & (f_hz <= _HIGHEST_OF_RATE * rate_hz) & (power > 0)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.selection.screening import scaled_by
-from logger.lab.unknown_road.fisher_scoring import Fitted, granted, inverse, sloped
+from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, prior_terms, sloped
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
 
@@ -39,20 +39,20 @@ def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Tria
     gains, own = sloped(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
-    look = problem.look(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
+    scored = problem.scored(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
-    pull, grant = granted(problem, state.logs, len(base.moves), state.roads)
-    known = inverse(look.information[np.ix_(rest, rest)] + np.diag(grant))
-    by_road = inverse(look.information[np.ix_(road, road)] + np.diag(grant[p:]))
-    score = look.slopes[rest] - pull
+    pull, prior_precision = prior_terms(problem, state.logs, len(base.moves), state.roads)
+    known = inverse(scored.information[np.ix_(rest, rest)] + np.diag(prior_precision))
+    by_road = inverse(scored.information[np.ix_(road, road)] + np.diag(prior_precision[p:]))
+    score = scored.slopes[rest] - pull
     found = []
     for index, one in enumerate(ones, p):
-        alone, mixed = look.information[index, index], look.information[index, rest]
+        alone, mixed = scored.information[index, index], scored.information[index, rest]
         left = max(float(alone - mixed @ known @ mixed), 0.0)
-        taken = look.information[index, road]
+        taken = scored.information[index, road]
         share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
-        slope = float(look.slopes[index] - mixed @ known @ score)
+        slope = float(scored.slopes[index] - mixed @ known @ score)
         found.append(_trial(one, slope, left, alone, share))
     return found
 

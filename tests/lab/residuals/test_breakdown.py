@@ -61,7 +61,7 @@ def test_where_nothing_was_measured_there_is_no_error() -> None:
 
     where = breakdown(beside_with(silent))
     unknown = [part for part in where.place if not np.isfinite(part.error)]
-    assert unknown and all(part.left_mps2 > 0 and part.error_told(3) == "-" for part in unknown)
+    assert unknown and all(part.residual_mps2 > 0 and part.error_text(3) == "-" for part in unknown)
     assert all(part.error > 0 for part in where.place if part not in unknown)
 
 

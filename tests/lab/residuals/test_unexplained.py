@@ -74,7 +74,8 @@ def test_the_shape_of_a_fitted_model_is_that_of_its_residuals() -> None:
     posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)]))
     state = refitted(posterior, posterior.start()).state
     found = shape_of(posterior, state)
-    for run, left, whole in zip(posterior.runs.runs, found.residuals.left, posterior.residuals(state), strict=True):
-        assert left == pytest.approx(whole[run.first:])
+    residuals = found.residuals.residual
+    for run, residual, whole in zip(posterior.runs.runs, residuals, posterior.residuals(state), strict=True):
+        assert residual == pytest.approx(whole[run.first:])
     said = sentences(found)
     assert said and all(one.endswith(".") for one in said)

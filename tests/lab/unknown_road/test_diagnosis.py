@@ -186,7 +186,7 @@ def test_errors_and_floor_are_over_the_same() -> None:
     runs = [run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)]
     runs[1] = replace(runs[1], measured_mps2=runs[1].measured_mps2 + 1.5)
     problem = SameRoad(runs, CAR, Tolerance())
-    read = np.concatenate([one for _, one, _ in problem.told(problem.start())])
+    read = np.concatenate([one for _, one, _ in problem.predicted_by_others(problem.start())])
     assert problem.size_mps2 == pytest.approx(np.sqrt(np.mean(read**2)))
 
 

@@ -83,5 +83,5 @@ class Dense:
             columns, here = np.vstack([columns, own]), np.append(here, 0.0)
             prior = np.pad(prior, (0, 1))
         step = np.linalg.solve(columns @ columns.T + prior, columns @ residual - prior @ here)
-        left = residual - step @ columns
-        return float(left @ left + (here + step) @ prior @ (here + step)), here + step
+        residual = residual - step @ columns
+        return float(residual @ residual + (here + step) @ prior @ (here + step)), here + step
