@@ -70,7 +70,7 @@ def beside(runs: SimulatedRuns, patch: float = 0.0) -> MapFit:
     logs = np.where(np.array(posterior.prior.names) == "contact_patch_m", patch, 0.0)
     state = posterior.at((), logs)
     numbers = posterior.number_slopes(state, posterior.prior.steps)
-    return MapFit(LinearModel(posterior, state, numbers), numbers)
+    return MapFit.of(LinearModel(posterior, state, numbers))
 
 
 def test_another_contact_length_than_the_cars_own_shows_on_a_rough_road_driven_slowly() -> None:

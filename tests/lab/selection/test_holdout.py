@@ -29,7 +29,7 @@ SETS = 3
 def plain() -> LinearModel:
     """The right model, fitted."""
     posterior = posterior_of(secret_runs(lasts_s=15.0))
-    return refitted(posterior, posterior.start()).found.linear
+    return refitted(posterior, posterior.start()).found.linear()
 
 
 def test_each_sample_that_counts_is_held_out_once_in_stretches_of_seconds(plain: LinearModel) -> None:
