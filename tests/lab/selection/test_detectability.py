@@ -30,7 +30,7 @@ def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: MapFi
     posterior, state = loud.posterior, loud.state
     one = chosen(EFFECTS[name], EFFECTS[name].usual)
     there, here = (posterior.predict(effects, state.logs, state.record, rough=True) for effects in ((one,), ()))
-    dense = Dense(loud.linear)
+    dense = Dense(loud.linear())
     change = dense.white([new - old for new, old in zip(there, here, strict=True)])
     left, _ = dense.least(change, np.zeros(len(dense.here)))
     assert hidden.effect is EFFECTS[name]
