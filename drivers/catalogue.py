@@ -17,12 +17,16 @@ class CatalogueError(Exception):
     """A file of a catalogue that offers nothing, or something of another name: file, and what was expected."""
 
 
+def names(package: str, offer: str) -> list[str]:
+    """The names of the files of ``package`` that are to offer ``offer``, in alphabetical order. None of them is run."""
+    found = sorted(module.name for module in iter_modules(import_module(package).__path__))
+    return [name for name in found if name != offer.lower() and not name.startswith("_")]
+
+
 def offers(package: str, offer: str) -> dict[str, Any]:
     """What the files of ``package`` offer as ``offer``, by name, in alphabetical order. Raises CatalogueError."""
     found = {}
-    for name in sorted(module.name for module in iter_modules(import_module(package).__path__)):
-        if name == offer.lower() or name.startswith("_"):
-            continue
+    for name in names(package, offer):
         module = import_module(f"{package}.{name}")
         if not hasattr(module, offer):
             raise CatalogueError(f"{module.__file__}: expected it to offer {offer}")

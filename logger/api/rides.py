@@ -82,8 +82,8 @@ def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_h
     """The comfort and health values of an acceleration record (ISO 2631-1:1997), by the formula of the standard.
 
     record         at the seat, 80 samples a second or more, 1 s or longer; or a run, or a file
-    weighting      of the vertical axis: wk, wd, wf, wc, we, wj or wb. With wk, x and y are weighted by wd and combined
-                   with it
+    weighting      of the vertical axis, by a name that ``ridelog comfort --help`` lists. With wk, x and y are weighted
+                   by wd and combined with it
     daily_hours    of such riding, for the health values; None: as long as the record
 
     Raises BadInput for what is none of this, and as ``read_record``.

@@ -11,16 +11,18 @@ import argparse
 import json
 from pathlib import Path
 
+from drivers.catalogue import names
 from logger.errors import EXIT_DONE, BadInput
 
 USUAL = "wk"
+_WEIGHTINGS = ("logger.dsp.weightings", "WEIGHTING")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="CSV with t_s,accel_z_mps2[,accel_x_mps2,accel_y_mps2]")
     parser.add_argument("--weighting", default=USUAL, metavar="NAME",
-                        help="weighting of accel_z_mps2: wk (default), wd, wf, wc, we, wj or wb. With wk, accel_x_mps2 "
-                             "and accel_y_mps2 are weighted by wd and combined with it")
+                        help=f"weighting of accel_z_mps2: one of {', '.join(names(*_WEIGHTINGS))} (default: {USUAL}). "
+                             "With wk, accel_x_mps2 and accel_y_mps2 are weighted by wd and combined with it")
     parser.add_argument("--daily-hours", type=float, metavar="H",
                         help="hours a day of such riding, for the health values (default: the length of the record)")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -33,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.report.comfort_text import as_json, lines
     from logger.store.formats.record_file import read_record
 
-    weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
+    weightings = catalogue(*_WEIGHTINGS)
     if args.weighting not in weightings:
         raise BadInput(f"--weighting: expected one of {', '.join(weightings)}, found {args.weighting!r}")
     if args.daily_hours is not None and not 0.0 < args.daily_hours <= 24.0:

@@ -26,8 +26,9 @@ _EXPLAINED = {
     "compare": "First question: does the model fail at all, or are only its numbers a little off? Nominal masses and "
                "springs are never exact, so they are refitted within a few per cent, and only what is left then is "
                "evidence.",
-    "diagnose": "Second question: which physical effect would explain what is left? Each of twenty is simulated and "
-                "fitted together with the car's numbers, on two thirds of each drive; the other third is the judge.",
+    "diagnose": "Second question: which physical effect would explain what is left? Each that ridelog knows is "
+                "simulated and fitted together with the car's numbers, on two thirds of each drive; the other third is "
+                "the judge.",
     "add": "The effect is fitted on all of the drives, with the car's numbers. Look at the table: what the missing "
            "effect had made of masses, springs and dampers. They looked like results, and were wrong.",
     "again": "The same comparison once more, with the new vehicle file.",

@@ -199,7 +199,7 @@ def _conflicts(posterior: Posterior, state: State) -> dict[str, float]:
 
 def _held_out(found: MapFit) -> HoldOut:
     """A fitted model on what its fit did not see."""
-    linear, state = found.linear, found.state
+    linear, state = found.linear(), found.state
     moves = moves_of(state.effects)
     own = effect_slopes(linear, state.effects, state.logs, moves, state.predictions) if moves else None
     return held_out(linear, own)

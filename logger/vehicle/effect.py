@@ -202,7 +202,7 @@ class VehicleEffect(Effect):
 
 
 class BodyEffect(Effect):
-    """Something with a motion of its own on the body; use ``structure.hung``."""
+    """Other masses, springs and dampers in the car's matrices, or one more mass on the body (``structure.hung``)."""
 
     @abstractmethod
     def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:

@@ -12,7 +12,9 @@ import pytest
 from logger.commands.main import main
 from logger.dsp.weightings import wb, wd, wf, wk
 from logger.errors import BadInput
+from logger.plugins import catalogue
 
+WEIGHTINGS = ", ".join(catalogue("logger.dsp.weightings", "WEIGHTING"))
 AGREED = ["weighting", "a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor", "comfort"]
 SINE_HZ = 6.3
 AMPLITUDE_MPS2 = 1.2
@@ -130,7 +132,7 @@ def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pyte
 @pytest.mark.parametrize(
     ("arguments", "rate_hz", "seconds", "complaint"),
     [
-        (["--weighting", "wx"], 100, 2, "expected one of wb, wc, wd, we, wf, wj, wk, found 'wx'"),
+        (["--weighting", "wx"], 100, 2, f"expected one of {WEIGHTINGS}, found 'wx'"),
         (["--daily-hours", "25"], 100, 2, "at most 24 hours, found 25"),
         (["--daily-hours", "nan"], 100, 2, "at most 24 hours, found nan"),
         ([], 50, 2, r"ride\.csv: expected at least 80 samples a second, found 50"),
@@ -147,4 +149,10 @@ def test_the_command_exits_2_with_one_line(tmp_path: Path, ridelog: Path) -> Non
     done = subprocess.run([ridelog, "comfort", tmp_path / "none.csv", "--weighting", "wx"], capture_output=True,
                           text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
-    assert "wb, wc, wd, we, wf, wj, wk" in done.stderr
+    assert WEIGHTINGS in done.stderr
+
+
+def test_the_help_names_every_weighting(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["comfort", "--help"])
+    assert f"one of {WEIGHTINGS} (default: wk)" in " ".join(capsys.readouterr().out.split())

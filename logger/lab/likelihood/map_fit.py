@@ -38,23 +38,26 @@ places."""
 
 @dataclass(frozen=True, eq=False)
 class MapFit:
-    """A fitted model, beside which it is linear.
+    """A fitted model.
 
+    state      laid out
     numbers    slopes by the car's numbers (p, n) per run, taken near it
+    score      minus twice the log of its evidence
     """
 
-    linear: LinearModel
+    posterior: Posterior
+    state: State
     numbers: list[Array]
+    score: float
 
-    @property
-    def posterior(self) -> Posterior:
-        """Of which it is the most likely state."""
-        return self.linear.posterior
+    @staticmethod
+    def of(linear: LinearModel) -> MapFit:
+        """The state that a model is linear beside; the linear model itself, which takes much memory, is let go."""
+        return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
 
-    @property
-    def state(self) -> State:
-        """The model, laid out."""
-        return self.linear.state
+    def linear(self) -> LinearModel:
+        """The model beside its state, made anew."""
+        return LinearModel(self.posterior, self.state, self.numbers)
 
 
 def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, rounds: int = _ROUNDS,
@@ -81,7 +84,7 @@ def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, 
         if gained < enough or done == 1:
             fresh, numbers = True, posterior.number_slopes(best.state, _fine_steps(best))
             now = best = LinearModel(posterior, best.state, numbers)
-    return MapFit(best, numbers)
+    return MapFit.of(best)
 
 
 def laid_out(posterior: Posterior, state: State, numbers: list[Array] | None, least: float) -> LinearModel:

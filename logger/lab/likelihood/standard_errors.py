@@ -27,7 +27,7 @@ def standard_errors(found: MapFit) -> tuple[tuple[Chosen, ...], Array]:
 
     Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
-    linear, state = found.linear.without_wall(), found.state
+    linear, state = found.linear().without_wall(), found.state
     moves = moves_of(state.effects)
     own = linear.whitened(effect_slopes(linear, state.effects, state.logs, moves, state.predictions)) if moves else None
     information = linear.information(state.logs, own)

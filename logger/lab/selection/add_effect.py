@@ -140,7 +140,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_before=posterior.error(posterior.start(present)), error_refitted=posterior.error(before.state),
         error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, noise_of(posterior, state)),
-        p_value=probability_by_chance(before.linear.score - after.linear.score, candidates),
+        p_value=probability_by_chance(before.score - after.score, candidates),
         distance_error_m=unusual_m(posterior.record_errors, state.record))
 
 

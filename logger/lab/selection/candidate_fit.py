@@ -46,7 +46,7 @@ def roughly_fitted(score: float, base: Baseline, screened: Screened) -> list[Can
 def refined(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = _ROUNDS) -> CandidateFit:
     """The same with slopes of its own."""
     found = fit(one.found.posterior, one.found.state, one.found.numbers, rounds, worth)
-    return CandidateFit(found, score - found.linear.score)
+    return CandidateFit(found, score - found.score)
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
@@ -59,4 +59,4 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
                       linear.size, [])
     state = minimised(linear, state, moves_of(state.effects), _STEPS)
     there = laid_out(posterior, state, list(linear.numbers or ()), score)
-    return CandidateFit(MapFit(there, list(linear.numbers or ())), score - there.score)
+    return CandidateFit(MapFit.of(there), score - there.score)

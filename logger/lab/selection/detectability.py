@@ -42,7 +42,7 @@ class _Sensitivity:
     """By how much effects would stand out beside a fitted model."""
 
     def __init__(self, found: MapFit) -> None:
-        self._linear, self._state = found.linear.without_wall(), found.state
+        self._linear, self._state = found.linear().without_wall(), found.state
         self._covariance = np.linalg.inv(self._linear.information(self._state.logs))
         self._here = self._predicted(self._state.effects)
 

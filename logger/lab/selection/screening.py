@@ -82,7 +82,7 @@ class Baseline:
     @staticmethod
     def of(found: MapFit) -> Baseline:
         """From a fit."""
-        linear, state = found.linear, found.state
+        linear, state = found.linear(), found.state
         quadratics = [_Quadratic.of(linear)]
         if linear.prior.at_the_wall(state.logs):
             quadratics.append(_Quadratic.of(linear.without_wall()))
@@ -97,7 +97,7 @@ class Baseline:
     @property
     def linear(self) -> LinearModel:
         """The model beside its state."""
-        return self.found.linear
+        return self.quadratics[0].linear
 
     @property
     def state(self) -> State:
@@ -117,7 +117,7 @@ def as_recorded(base: Baseline) -> Baseline:
     record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
     there = posterior.at(state.effects, np.zeros_like(state.logs), record)
     numbers = posterior.number_slopes(there, posterior.prior.steps)
-    return Baseline.of(MapFit(LinearModel(posterior, there, numbers), numbers))
+    return Baseline.of(MapFit.of(LinearModel(posterior, there, numbers)))
 
 
 @dataclass(frozen=True, eq=False)

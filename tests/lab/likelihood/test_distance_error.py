@@ -44,7 +44,7 @@ def gain_of(runs: list[Run], one: Chosen) -> tuple[float, Chosen]:
     """By how much an effect makes a model more evident whose numbers and distance errors are all fitted; and it."""
     posterior, without = laid(runs)
     found = fit(posterior, aligned(posterior, posterior.start([one])))
-    return fit(posterior, without).linear.score - found.linear.score, found.state.effects[0]
+    return fit(posterior, without).score - found.score, found.state.effects[0]
 
 
 # --- the numbers of a record's error ---

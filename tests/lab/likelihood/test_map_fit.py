@@ -58,7 +58,7 @@ def test_a_car_that_is_off_within_its_tolerance_ends_at_the_noise_too() -> None:
 def test_an_effect_is_found_with_its_number() -> None:
     found, posterior = damped(), damped().posterior
     without = from_start(posterior)
-    assert without.linear.score - found.linear.score > 50
+    assert without.score - found.score > 50
     assert posterior.error(found.state) == pytest.approx(noise_share(posterior), rel=0.03)
     assert np.abs(without.state.logs / posterior.prior.deviations).max() > 2.0  # the car bends to make up for it
     assert np.abs(found.state.logs / posterior.prior.deviations).max() < 1.5
@@ -68,7 +68,7 @@ def test_an_effect_is_found_with_its_number() -> None:
 @pytest.mark.parametrize("start", [30.0, 800.0])
 def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
     other = from_start(damped().posterior, tire_damping(start))
-    assert other.linear.score == pytest.approx(damped().linear.score, abs=2 * CONVERGED)
+    assert other.score == pytest.approx(damped().score, abs=2 * CONVERGED)
     assert other.state.effects[0].p.tire_damping_n_s_per_m == pytest.approx(
         damped().state.effects[0].p.tire_damping_n_s_per_m, abs=20.0)
 
@@ -77,15 +77,16 @@ def test_nothing_near_a_fit_is_likelier() -> None:
     """Numbers of the car and of the effect moved by half of what they are known to, truly predicted, the distance
     errors made up for."""
     found, posterior, state = damped(), damped().posterior, damped().state
-    here = found.linear.objective(state.predictions, state.logs)
-    known = 1 / np.sqrt(np.diag(found.linear.information(state.logs)))
+    linear = found.linear()
+    here = linear.objective(state.predictions, state.logs)
+    known = 1 / np.sqrt(np.diag(linear.information(state.logs)))
     moves = moves_of(state.effects)
     coordinates = coordinates_of(state.effects, moves)
     beside = [(state.effects, state.logs + way * row) for row in np.diag(0.5 * known) for way in (1, -1)]
     beside += [(moved(state.effects, moves, coordinates + way * 15.0), state.logs) for way in (1, -1)]
     for effects, logs in beside:
         there = posterior.predict(effects, logs, state.record)
-        assert found.linear.objective(there, logs) > here - 0.5 * CONVERGED
+        assert linear.objective(there, logs) > here - 0.5 * CONVERGED
 
 
 def test_an_effect_that_does_nothing_explains_nothing_and_costs_its_numbers() -> None:
@@ -100,7 +101,7 @@ def test_an_effect_that_does_nothing_explains_nothing_and_costs_its_numbers() ->
 def test_what_is_not_there_gains_nothing_when_it_is_fitted() -> None:
     one = chosen(EFFECTS["sensor_bandwidth"], EFFECTS["sensor_bandwidth"].usual)
     for found in (from_start(plain().posterior, tire_damping(100.0)), from_start(plain().posterior, one)):
-        assert found.linear.score > plain().linear.score - 3.0
+        assert found.score > plain().score - 3.0
 
 
 def test_a_car_bends_no_farther_than_the_wall_and_without_it_as_far_as_the_runs_ask() -> None:
@@ -121,7 +122,7 @@ def test_a_fit_begins_where_the_car_stands_and_its_prior_stays_where_it_was() ->
     start = posterior.start()
     assert read(posterior.prior.vehicle(CAR, start.logs), "sprung_mass_kg") == pytest.approx(1.02 * CAR.sprung_mass_kg)
     found = from_start(posterior)
-    assert found.linear.score == pytest.approx(plain().linear.score, abs=2 * CONVERGED)
+    assert found.score == pytest.approx(plain().score, abs=2 * CONVERGED)
 
 
 def test_aligning_moves_no_number_of_the_car_and_makes_nothing_worse() -> None:
@@ -142,7 +143,7 @@ def test_a_round_that_is_not_worth_it_is_the_last(monkeypatch: pytest.MonkeyPatc
     asked.clear()
     early = fit(posterior, start, rounds=1)
     assert len(asked) < thoroughly
-    assert whole.linear.score <= early.linear.score <= LinearModel(posterior, start).score
+    assert whole.score <= early.score <= LinearModel(posterior, start).score
 
 
 def test_slopes_by_the_cars_numbers_are_differences_of_predictions() -> None:

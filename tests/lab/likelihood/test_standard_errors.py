@@ -62,7 +62,7 @@ def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
 def test_errors_are_the_roots_of_the_inverse_information_whatever_the_units() -> None:
     """A cubic stiffness of 1e6 beside a ratio of 1: the plain inverse is right too, where it is well enough scaled."""
     (tires,), deviations = standard_errors(found())
-    linear, state = found().linear.without_wall(), found().state
+    linear, state = found().linear().without_wall(), found().state
     information = linear.information(state.logs)
     alone = np.sqrt(np.diag(np.linalg.inv(information)))
     assert (deviations >= alone * (1 - 1e-9)).all()

@@ -30,7 +30,7 @@ def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: MapFi
     posterior, state = loud.posterior, loud.state
     one = chosen(EFFECTS[name], EFFECTS[name].usual)
     there, here = (posterior.predict(effects, state.logs, state.record, rough=True) for effects in ((one,), ()))
-    dense = Dense(loud.linear)
+    dense = Dense(loud.linear())
     change = dense.white([new - old for new, old in zip(there, here, strict=True)])
     left, _ = dense.least(change, np.zeros(len(dense.here)))
     assert hidden.effect is EFFECTS[name]
@@ -70,7 +70,7 @@ def beside(runs: SimulatedRuns, patch: float = 0.0) -> MapFit:
     logs = np.where(np.array(posterior.prior.names) == "contact_patch_m", patch, 0.0)
     state = posterior.at((), logs)
     numbers = posterior.number_slopes(state, posterior.prior.steps)
-    return MapFit(LinearModel(posterior, state, numbers), numbers)
+    return MapFit.of(LinearModel(posterior, state, numbers))
 
 
 def test_another_contact_length_than_the_cars_own_shows_on_a_rough_road_driven_slowly() -> None:

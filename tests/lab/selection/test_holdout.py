@@ -29,7 +29,7 @@ SETS = 3
 def plain() -> LinearModel:
     """The right model, fitted."""
     posterior = posterior_of(secret_runs(lasts_s=15.0))
-    return refitted(posterior, posterior.start()).found.linear
+    return refitted(posterior, posterior.start()).found.linear()
 
 
 def test_each_sample_that_counts_is_held_out_once_in_stretches_of_seconds(plain: LinearModel) -> None:
@@ -73,7 +73,7 @@ def unseen_when_refitted(found: MapFit) -> tuple[float, float]:
         def seen(z: Array, held: int = held) -> Array:
             x = here + z * scale
             parts = [white[folds(run) != held] for run, white in zip(
-                runs, found.linear.whitened(residuals(x)), strict=True)]
+                runs, found.linear().whitened(residuals(x)), strict=True)]
             beyond = np.maximum(np.abs(x[:p] / posterior.prior.deviations) - 2.0, 0.0)  # the wall of the prior
             return np.concatenate([*parts, x[:p] / posterior.prior.deviations, 10.0 * beyond**2])
 
@@ -91,8 +91,9 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
     posterior = posterior_of(secret_runs(there, lasts_s=12.0))
     found = fit(posterior, aligned(posterior, posterior.start(tried)))
     state = found.state
-    own = effect_slopes(found.linear, state.effects, state.logs, moves_of(tried), state.predictions) if tried else None
-    quick = held_out(found.linear, own)
+    linear = found.linear()
+    own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.predictions) if tried else None
+    quick = held_out(linear, own)
     error, lack = unseen_when_refitted(found)
     seen_error, seen_lack = posterior.error(state), posterior.deviance(state)
     assert quick.error > seen_error and quick.deviance > seen_lack

@@ -123,7 +123,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> 
     state = posterior.at([at_an_end], offset_base.state.logs)
     one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     model = refined(offset_base.score, one, rounds=1).found
-    ended = replace(one, found=replace(model, linear=fit(posterior, state, model.numbers, rounds=0).linear), gain=1e9)
+    ended = replace(one, found=fit(posterior, state, model.numbers, rounds=0), gain=1e9)
     assert at_an_end.at_an_end and ended.effect.name == "occupant"
     assert not search(FEW).accepted(offset_base, ended)
 
