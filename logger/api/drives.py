@@ -271,9 +271,9 @@ def estimate(
     WINDOW.check("window_m", window_m)
     drive = run if isinstance(run, Run) else read_run(run)
     found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
-    told, windows = as_json(str(drive.path), found), found.windows
+    summary, windows = as_json(str(drive.path), found), found.windows
     parts = found.road.parts if found.road else ()
-    return Estimate("\n".join(lines(found, told)), told, told.get("iri_m_per_km", np.nan), windows.edges_m,
+    return Estimate("\n".join(lines(found, summary)), summary, summary.get("iri_m_per_km", np.nan), windows.edges_m,
                     windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts))

@@ -151,10 +151,10 @@ def identify(
     records = records_of([(drive, drive.track) for drive in drives], skip_s, question)
     found = (on_measured_roads(model, word, records, question) if road == "measured" else
              on_unmeasured_roads(model, word, records, question, one_road=road == "same"))
-    told = found.as_json
-    return Identification("\n".join(found.lines), told, told["parameters"], told["standard_errors"],
-                          told["error_before"], told["error_after"], told["converged"], tuple(told["cannot_tell"]),
-                          model_of(found.model))
+    summary = found.as_json
+    return Identification("\n".join(found.lines), summary, summary["parameters"], summary["standard_errors"],
+                          summary["error_before"], summary["error_after"], summary["converged"],
+                          tuple(summary["cannot_tell"]), model_of(found.model))
 
 
 def records_of(drives: Sequence[tuple[Drive, Track | None]], skip_s: float, question: Question) -> list[Record]:

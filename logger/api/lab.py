@@ -69,11 +69,11 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     from logger.report.lab_text import comparison_lines
 
     found = _bench(vehicle, runs, (), tolerance, thin=False).compared()
-    told = as_json(found)
+    summary = as_json(found)
     return Comparison(
-        "\n".join(comparison_lines(found)), told, told["error"], told["refitted"]["error"],
-        {one["run"]: one["error"] for one in told["runs"]}, told["missing"], tuple(told["evidence"]),
-        told["refitted"]["moves"], tuple(told["refitted"]["moved_far"]), spectra(found.refitted.residuals))
+        "\n".join(comparison_lines(found)), summary, summary["error"], summary["refitted"]["error"],
+        {one["run"]: one["error"] for one in summary["runs"]}, summary["missing"], tuple(summary["evidence"]),
+        summary["refitted"]["moves"], tuple(summary["refitted"]["moved_far"]), spectra(found.refitted.residuals))
 
 
 @dataclass(frozen=True)
@@ -149,12 +149,13 @@ def diagnose(
             raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(bench.effects)}")
         bench = replace(bench, effects={name: bench.effects[name] for name in sorted(candidates)})
     found = bench.diagnosed(progress)
-    told = as_json(found)
+    summary = as_json(found)
     return Diagnosis(
-        "\n".join(diagnosis_lines(found, None)), told, told["baseline_error"], told["noise_floor_error"],
+        "\n".join(diagnosis_lines(found, None)), summary, summary["baseline_error"], summary["noise_floor_error"],
         tuple(Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
-                        tuple(one["confused_with"])) for one in told["candidates"]),
-        tuple(told["verdict"]), told["unexplained"], tuple((one["step"], one["error"]) for one in told["steps"]))
+                        tuple(one["confused_with"])) for one in summary["candidates"]),
+        tuple(summary["verdict"]), summary["unexplained"],
+        tuple((one["step"], one["error"]) for one in summary["steps"]))
 
 
 @dataclass(frozen=True)
@@ -237,14 +238,14 @@ def add_effect(
     bench = bench.with_effect(effect, file)
     is_given = set(values) >= {one.name for one in effect.parameters}
     found = bench.added(bench.searched(effect, values, progress), 1 if is_given else len(effect.trials()), progress)
-    told = as_json(found)
+    summary = as_json(found)
     numbers = tuple(
         ShiftedNumber(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
-               one["with_standard_error"], one["name"] in told["biased"]) for one in told["numbers"])
+               one["with_standard_error"], one["name"] in summary["biased"]) for one in summary["numbers"])
     return AddedEffect(
-        "\n".join(addition_lines(found)), told, told["effect"], told["parameters"], told["standard_errors"],
-        told["error_before"], told["error_refitted"], told["error_after"], told["noise_floor_error"], told["p_value"],
-        told["helps"], numbers, model_of(bench.model_with(found)))
+        "\n".join(addition_lines(found)), summary, summary["effect"], summary["parameters"], summary["standard_errors"],
+        summary["error_before"], summary["error_refitted"], summary["error_after"], summary["noise_floor_error"],
+        summary["p_value"], summary["helps"], numbers, model_of(bench.model_with(found)))
 
 
 def _bench(

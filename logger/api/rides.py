@@ -110,6 +110,6 @@ def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_h
         found = ride_comfort(ride.by_axis, ride.rate_hz, used, weightings.get(used.horizontal), daily_hours)
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
-    told, vertical = as_json(found), found.vertical
-    return Comfort("\n".join(lines(found, Path(name).name)), told, weighting, vertical.a_w_mps2, vertical.mtvv_mps2,
-                   vertical.vdv_mps175, vertical.crest_factor, told["comfort"])
+    summary, vertical = as_json(found), found.vertical
+    return Comfort("\n".join(lines(found, Path(name).name)), summary, weighting, vertical.a_w_mps2, vertical.mtvv_mps2,
+                   vertical.vdv_mps175, vertical.crest_factor, summary["comfort"])

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.likelihood.distance_error import unusual_m
-from logger.lab.likelihood.map_fit import MapFit, aligned, effect_slopes, fit
+from logger.lab.likelihood.map_fit import MapFit, aligned, fit
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
@@ -197,22 +197,14 @@ def _conflicts(posterior: Posterior, state: State) -> dict[str, float]:
         prior.names, state.logs, prior.deviations, strict=True) if abs(log) > CONFLICT_SIGMA * deviation}
 
 
-def _held_out(found: MapFit) -> HoldOut:
-    """A fitted model on what its fit did not see."""
-    linear, state = found.linear(), found.state
-    moves = moves_of(state.effects)
-    own = effect_slopes(linear, state.effects, state.logs, moves, state.predictions) if moves else None
-    return held_out(linear, own)
-
-
 def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
     """The models on the way."""
     steps = [Step("the vehicle as its file says", nominal_error),
-             Step("its numbers refitted", _held_out(selection.before.found).error)]
-    steps += [Step(f"with {name}", _held_out(model.found).error) for name, model in selection.steps]
+             Step("its numbers refitted", selection.before.hold_out.error)]
+    steps += [Step(f"with {name}", model.hold_out.error) for name, model in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before
     if selection.now is not last:
-        steps.append(Step("as it ends", _held_out(selection.now.found).error))
+        steps.append(Step("as it ends", selection.now.hold_out.error))
     return tuple(steps)
 
 
@@ -220,11 +212,11 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
     """Those that are missing before the others, of which the least probable by chance come first."""
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
-    before = _held_out(selection.before.found)
+    before = selection.before.hold_out
     stages = dict(selection.steps)
     found = []
     for name, gain in selection.gains.items():
-        there = _held_out(stages.get(name, selection.now).found)
+        there = stages.get(name, selection.now).hold_out
         found.append(Candidate(effects[name], values[name], there.error, probability_by_chance(gain, count), gain,
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
@@ -235,7 +227,7 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
 
 
 def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> Candidate:
-    there = _held_out(one.found)
+    there = one.hold_out
     p_value = probability_by_chance(one.gain, count)
     alike = tuple(other.effect.name for other in fits
                   if other is not one and abs(other.gain - one.gain) < CONFUSED and p_value < FALSE_ALARM)

@@ -190,6 +190,13 @@ def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, m
     return found
 
 
+def own_slopes(linear: LinearModel) -> list[Array] | None:
+    """What the numbers of a model's own effects do to its predictions: (m, n) per run; None where none moves."""
+    state = linear.state
+    moves = moves_of(state.effects)
+    return effect_slopes(linear, state.effects, state.logs, moves, state.predictions) if moves else None
+
+
 def _fine_steps(linear: LinearModel) -> Array:
     """Of the logarithms of the car's numbers (p,), by how well they are known."""
     sizes = np.sqrt(np.diag(linear.information(linear.state.logs)))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import MapFit, effect_slopes
+from logger.lab.likelihood.map_fit import MapFit, own_slopes
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
 
@@ -28,9 +28,8 @@ def standard_errors(found: MapFit) -> tuple[tuple[Chosen, ...], Array]:
     Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
     linear, state = found.linear().without_wall(), found.state
-    moves = moves_of(state.effects)
-    own = linear.whitened(effect_slopes(linear, state.effects, state.logs, moves, state.predictions)) if moves else None
-    information = linear.information(state.logs, own)
+    moves, slopes = moves_of(state.effects), own_slopes(linear)
+    information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
     scale = np.where(seen, size, 1.0)

@@ -20,8 +20,9 @@ from logger.runs import Run
 Array = npt.NDArray[np.float64]
 
 DISCREPANCY = 0.003
-"""By what share of the signal in a band two right simulations of one car differ: measured between this simulation and
-one by Newton's laws in fine steps, of cars with dry friction, which differ most."""
+"""By what share of the signal in a band two right simulations of one car may differ. They differ most where a car has
+dry friction, whose force comes late by part of a step. A judgement: with 1 %, searches called right models unexplained.
+"""
 _BLOCK_S = 3.0
 _HIGHEST_OF_RATE = 0.37
 _TINY = 1e-12  # [m2/s4]

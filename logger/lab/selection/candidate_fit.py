@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, fit, laid_out, minimised
+from logger.lab.likelihood.map_fit import MapFit, fit, laid_out, minimised, own_slopes
 from logger.lab.likelihood.posterior import State
+from logger.lab.selection.holdout import HoldOut, held_out
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
@@ -33,6 +34,12 @@ class CandidateFit:
     def chosen(self) -> Chosen:
         """The effect with its values."""
         return self.found.state.effects[-1]
+
+    @property
+    def hold_out(self) -> HoldOut:
+        """The model on what its fit did not see."""
+        linear = self.found.linear()
+        return held_out(linear, own_slopes(linear))
 
 
 def roughly_fitted(score: float, base: Baseline, screened: Screened) -> list[CandidateFit]:

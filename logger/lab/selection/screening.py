@@ -10,14 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, aligned
+from logger.lab.likelihood.map_fit import MapFit, aligned, own_slopes
 from logger.lab.likelihood.noise_floor import gain_of_an_explanation
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.selection.holdout import HoldOut, held_out
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, Misalignment, Scale, chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved
@@ -103,6 +105,11 @@ class Baseline:
     def state(self) -> State:
         """The model."""
         return self.found.state
+
+    @cached_property
+    def hold_out(self) -> HoldOut:
+        """The model on what its fit did not see."""
+        return held_out(self.linear, own_slopes(self.linear))
 
     def gain(self, objective: float, logs: Array, linear: LinearModel) -> float:
         """By how much an objective is below this model's own; it was found under the prior of ``linear``, at these

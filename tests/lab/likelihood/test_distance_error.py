@@ -15,17 +15,9 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, chosen
 
-from ...support.lab.noisy_runs import (
-    EFFECTS,
-    drawn,
-    noisy_runs,
-    off_m,
-    posterior_of,
-    tire_damping,
-    with_wrong_speed,
-    worst_rms,
-)
+from ...support.lab.noisy_runs import drawn, noisy_runs, off_m, posterior_of, tire_damping, with_wrong_speed, worst_rms
 from ...support.lab.runs_with_residual import a_run
+from ...support.lab.secret_runs import EFFECTS
 
 RATE_HZ = 100.0
 INNER = slice(50, -50)

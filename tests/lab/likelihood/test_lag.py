@@ -15,8 +15,8 @@ from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
 
-from ...support.lab.noisy_runs import FINE_HZ, NOISE_MPS2
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, measuring
+from ...support.lab.secret_runs import FINE_HZ, NOISE_MPS2
 
 Array = npt.NDArray[np.float64]
 

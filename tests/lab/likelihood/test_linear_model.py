@@ -19,7 +19,8 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.effect import chosen
 from logger.vehicle.effect_parameters import moves_of
 
-from ...support.lab.noisy_runs import EFFECTS, drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.secret_runs import EFFECTS
 
 Array = npt.NDArray[np.float64]
 

@@ -17,8 +17,9 @@ from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effect_parameters import coordinates_of, moved, moves_of
 from logger.vehicle.named_parameters import changed, read
 
-from ...support.lab.noisy_runs import EFFECTS, FINE_HZ, NOISE_MPS2, drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.runs_with_residual import CAR
+from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2
 
 
 def from_start(posterior: Posterior, *effects: Chosen) -> MapFit:

@@ -16,7 +16,8 @@ from logger.lab.likelihood.standard_errors import standard_errors, with_errors
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import moves_of
 
-from ...support.lab.noisy_runs import EFFECTS, drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
+from ...support.lab.secret_runs import EFFECTS
 
 Array = npt.NDArray[np.float64]
 NAME = "tire_damping_n_s_per_m"

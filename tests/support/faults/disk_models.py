@@ -28,16 +28,15 @@ from drivers.disk import FileSystem
 SECTOR = 512
 
 
-class RefusingFiles(FileSystem):
+class Refusing(FileSystem):
     """A disk that refuses changes with ``error`` while ``refuses`` says so of their kind (``write``, ``sync`` ...).
 
-    A write that is refused has left its first half. Nothing waits for the disk.
+    A write that is refused has left its first half.
     """
 
-    def __init__(self) -> None:
-        self.error = errno.EIO
-        self.refuses: Callable[[str], bool] = lambda kind: False
-        self.refused = 0
+    error = errno.EIO
+    refused = 0
+    refuses: Callable[[str], bool] = staticmethod(lambda kind: False)
 
     def _ask(self, kind: str) -> None:
         if self.refuses(kind):
@@ -58,14 +57,7 @@ class RefusingFiles(FileSystem):
 
     def sync(self, descriptor: int) -> None:
         self._ask("sync")
-
-    def close(self, descriptor: int) -> None:
-        super().close(descriptor)
-        self._ask("close")
-
-    def cut(self, path: Path, size: int) -> None:
-        self._ask("cut")
-        os.truncate(path, size)
+        super().sync(descriptor)
 
     def rename(self, source: Path, target: Path) -> None:
         self._ask("rename")
@@ -74,6 +66,25 @@ class RefusingFiles(FileSystem):
     def remove(self, path: Path) -> None:
         self._ask("remove")
         super().remove(path)
+
+    def sync_directory(self, directory: Path) -> None:
+        self._ask("sync_directory")
+        super().sync_directory(directory)
+
+
+class RefusingFiles(Refusing):
+    """The same, which refuses to close and to cut as well. Nothing waits for the disk."""
+
+    def sync(self, descriptor: int) -> None:
+        self._ask("sync")
+
+    def close(self, descriptor: int) -> None:
+        super().close(descriptor)
+        self._ask("close")
+
+    def cut(self, path: Path, size: int) -> None:
+        self._ask("cut")
+        os.truncate(path, size)
 
     def sync_directory(self, directory: Path) -> None:
         self._ask("sync_directory")
@@ -149,45 +160,8 @@ class RecordingFiles(FileSystem):
         self._log("sync_names")
 
 
-class RefusingJournal(RecordingFiles):
-    """The same, of a disk that refuses changes with EIO while ``refuses`` says so of their kind. Half of a write that
-    is refused is done all the same."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        self.refuses: Callable[[str], bool] = lambda kind: False
-
-    def _ask(self, kind: str) -> None:
-        if self.refuses(kind):
-            raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-    def create(self, path: Path, new: bool = False) -> int:
-        self._ask("create")
-        return super().create(path, new)
-
-    def write(self, descriptor: int, data: bytes) -> None:
-        try:
-            self._ask("write")
-        except OSError:
-            super().write(descriptor, data[: len(data) // 2])
-            raise
-        super().write(descriptor, data)
-
-    def sync(self, descriptor: int) -> None:
-        self._ask("sync")
-        super().sync(descriptor)
-
-    def rename(self, source: Path, target: Path) -> None:
-        self._ask("rename")
-        super().rename(source, target)
-
-    def remove(self, path: Path) -> None:
-        self._ask("remove")
-        super().remove(path)
-
-    def sync_directory(self, directory: Path) -> None:
-        self._ask("sync_directory")
-        super().sync_directory(directory)
+class RefusingJournal(Refusing, RecordingFiles):
+    """A disk with a journal that refuses changes. Half of a write that is refused is done all the same."""
 
 
 @dataclass

@@ -13,21 +13,18 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.store.formats.effect_file import shipped_effects
-from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect import Chosen
 
 from .runs_with_residual import CAR, a_run, measuring
+from .secret_runs import FINE_HZ, NOISE_MPS2, hidden
 
 Array = npt.NDArray[np.float64]
 
-NOISE_MPS2 = 0.05
-FINE_HZ = 500.0
-EFFECTS = shipped_effects()
 
 
 def tire_damping(value: float) -> Chosen:
     """A linear effect, quick to simulate."""
-    return chosen(EFFECTS["tire_damping"], {"tire_damping_n_s_per_m": value})
+    return hidden("tire_damping", tire_damping_n_s_per_m=value)
 
 
 def posterior_of(runs: Sequence[Run]) -> Posterior:

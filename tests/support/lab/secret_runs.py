@@ -23,6 +23,7 @@ Array = npt.NDArray[np.float64]
 
 EFFECTS = shipped_effects()
 NOISE_MPS2 = 0.05
+FINE_HZ = 500.0
 SPEEDS_MPS = (7.0, 14.0)
 
 
@@ -38,7 +39,7 @@ def secret_runs(effects: Sequence[Chosen] = (), car: Vehicle = CAR, lasts_s: flo
     plain = [a_run(f"run{i}", speed, lasts_s, i) for i, speed in enumerate(SPEEDS_MPS)]
     plain = [replace(one, track=replace(one.track, elevation_m=rougher * one.track.elevation_m)) for one in plain]
     return SimulatedRuns([measuring(run, one + rng.normal(0, noise_mps2, run.count)) for run, one in zip(
-        plain, SimulatedRuns(plain).predict(compose(car, effects)), strict=True)], 500.0)
+        plain, SimulatedRuns(plain).predict(compose(car, effects)), strict=True)], FINE_HZ)
 
 
 def posterior_of(runs: SimulatedRuns, stands: Vehicle | None = None) -> Posterior:
