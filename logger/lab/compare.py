@@ -104,7 +104,7 @@ def _refitted(
     no better than the plain model is the plain one: the fit weighs every frequency by its noise, and may buy a better
     top with a worse body bounce."""
     names, deviations = posterior.prior.names, posterior.prior.deviations
-    state = fit(posterior, aligned(posterior, posterior.start(effects))).state
+    state = fit(aligned(posterior, posterior.start(effects))).state
     if posterior.error(state) > plain.error:
         return plain, dict.fromkeys(names, 0.0), (), 0.0
     car = posterior.car(state.effects, state.logs)

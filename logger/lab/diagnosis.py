@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.likelihood.distance_error import unusual_m
-from logger.lab.likelihood.map_fit import MapFit, aligned, fit
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
@@ -161,7 +162,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 def refitted(posterior: Posterior, nominal: State) -> Baseline:
     """The car's own numbers and the distance errors fitted."""
-    return Baseline.of(fit(posterior, aligned(posterior, nominal)))
+    return Baseline.of(fit(aligned(posterior, nominal)))
 
 
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -176,14 +177,14 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     return found
 
 
-def _finely_fitted(posterior: Posterior, search: Search, selection: Selection) -> tuple[Selection, MapFit]:
+def _finely_fitted(posterior: Posterior, search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, finely simulated, in a car that may bend as far as the runs ask: so that it shows when
     it has to bend too far. What is nothing then, or something else, is left out."""
     fine = posterior.without_wall(fine=True)
     while True:
         state = selection.now.state
         start = fine.at(state.effects, state.logs, state.record, state.size)
-        after = fit(fine, aligned(fine, start), selection.now.found.numbers)
+        after = fit(aligned(fine, start), selection.now.linear.numbers)
         ended = [one.effect.name for one in after.state.effects[search.present:] if one.at_an_end]
         if not ended:
             return selection, after

@@ -2,7 +2,8 @@
 
 Problem: one recorder's distance is right to millimetres after a minute, another integrates a speed that is off by some
 centimetres a second, now more and now less. Solution: the error begins with a start, grows with a factor, and walks at
-random in between; what of the distance is rougher than any car drives is the recorder's as well. How large each of the
+random in between, as a smooth curve (a spline whose coefficients are a random walk: P. Eilers and B. Marx, Statistical
+Science 11, 1996); what of the distance is rougher than any car drives is the recorder's as well. How large each of the
 first three is, the evidence of the runs says: the likelihood with the error integrated out (D. J. C. MacKay, Neural
 Computation 4, 1992), under a prior around what a good recorder does.
 """
@@ -23,8 +24,9 @@ from logger.runs import Run
 Array = npt.NDArray[np.float64]
 
 _SLOWEST_MPS = 0.5
-_KNOT_S, _MOST_KNOTS = 0.25, 480
+_KNOT_S, _MOST_KNOTS = 0.5, 240
 """Knots lie so far apart; a run that would have more has them farther apart."""
+_CUBIC = 3
 _SMOOTH_S = 1.0
 """No car's speed changes by more than a cubic curve within so short a time."""
 _RECORDER = 2
@@ -71,10 +73,10 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 
 @dataclass(frozen=True, eq=False)
 class RecordError:
-    """How the record of one run may be off, by numbers k: those of its distance (knots, the factor, the share of its
-    roughness), then two of its recorder (gain, droop).
+    """How the record of one run may be off, by numbers k: those of its distance (coefficients of the curve, the factor,
+    the share of its roughness), then two of its recorder (gain, droop).
 
-    basis    (n, k - 2) of the distance [m]
+    basis    (k - 2, n) of the distance [m]
     """
 
     run: Run
@@ -84,66 +86,66 @@ class RecordError:
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
         """That of a run."""
-        time_s = np.arange(run.count) / run.rate_hz
-        knots = min(max(2, round(time_s[-1] / _KNOT_S) + 1), _MOST_KNOTS)
-        place = time_s / time_s[-1] * (knots - 1)
-        hats = np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(knots)))
-        return RecordError(run, np.column_stack([hats, run.distance_m - run.distance_m[0], -_roughness(run)]),
-                           tolerance)
+        from scipy.interpolate import BSpline
+
+        pieces = min(max(1, round((run.count - 1) / run.rate_hz / _KNOT_S)), _MOST_KNOTS)
+        curves = BSpline.design_matrix(np.linspace(0, pieces, run.count), np.arange(-_CUBIC, pieces + _CUBIC + 1.0),
+                                       _CUBIC).toarray()
+        return RecordError(run, np.vstack([curves.T, run.distance_m - run.distance_m[0], -_roughness(run)]), tolerance)
 
     @property
     def count(self) -> int:
         """How many numbers there are."""
-        return self.basis.shape[1] + _RECORDER
+        return len(self.basis) + _RECORDER
 
     @property
-    def knots(self) -> int:
-        """How many of them, the first ones, are of knots."""
-        return self.basis.shape[1] - 2
+    def coefficients(self) -> int:
+        """How many of them, the first ones, are of the curve."""
+        return len(self.basis) - 2
 
     @property
     def _knot_s(self) -> float:
-        return (self.run.count - 1) / self.run.rate_hz / (self.knots - 1)
+        return (self.run.count - 1) / self.run.rate_hz / (self.coefficients - _CUBIC)
 
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
-        found = self._steps / (size.walk_m**2 * self._knot_s)
-        diagonal = np.einsum("ii->i", found)
-        diagonal[0] += size.start_m**-2
-        diagonal[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
+        walk, start = self._precisions
+        found = walk / (size.walk_m**2 * self._knot_s) + start / size.start_m**2
+        np.einsum("ii->i", found)[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
         return found
 
     @cached_property
-    def _steps(self) -> Array:
-        """The walk's precision (k, k) if each of its steps had a deviation of one."""
-        found = np.zeros((self.count, self.count))
-        steps = np.diff(np.eye(self.knots), axis=0)
-        found[: self.knots, : self.knots] = steps.T @ steps
-        return found
+    def _precisions(self) -> tuple[Array, Array]:
+        """The precision (k, k) of the walk, if each of its steps had a deviation of one, and that of the start."""
+        walk, start = np.zeros((2, self.count, self.count))
+        count = self.coefficients
+        steps = np.diff(np.eye(count), axis=0)
+        walk[:count, :count] = steps.T @ steps
+        start[:count, :count] = np.outer(self.basis[:count, 0], self.basis[:count, 0])
+        return walk, start
 
     def log_determinant(self, size: ErrorSize) -> float:
         """Of the precision."""
-        walk = -(self.knots - 1) * np.log(size.walk_m**2 * self._knot_s)
+        walk = -(self.coefficients - 1) * np.log(size.walk_m**2 * self._knot_s)
         return float(walk - 2 * np.log([size.start_m, size.scale, self.tolerance.gain, self.tolerance.droop]).sum())
 
     def moved_m(self, k: Array) -> Array:
         """By how much the car was farther than its distance signal said (n,)."""
-        samples = np.arange(self.run.count)
-        at = np.linspace(0, self.run.count - 1, self.knots)
-        return np.asarray(np.interp(samples, at, k[: self.knots]) + self.basis[:, -2:] @ k[self.knots : -_RECORDER])
+        return np.asarray(k[:-_RECORDER] @ self.basis)
 
     def without_trend(self, k: Array) -> Array:
         """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
         moved, way = self.moved_m(k), self.run.distance_m - self.run.distance_m[0]
         trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
         found = self.through(moved - trend)
-        found[self.knots + 1 :] = k[self.knots + 1 :]
+        found[self.coefficients + 1 :] = k[self.coefficients + 1 :]
         return found
 
     def through(self, moved_m: Array) -> Array:
-        """The numbers (k,) with which the distance is farther by this (n,) at the knots [m], its recorder as it is."""
-        at = np.linspace(0, self.run.count - 1, self.knots)
-        return np.concatenate([np.interp(at, np.arange(self.run.count), moved_m), np.zeros(2 + _RECORDER)])
+        """The numbers (k,) of the curve that comes nearest to a distance farther by this (n,) [m], its recorder as it
+        is."""
+        curve, *_ = np.linalg.lstsq(self.basis[: self.coefficients].T, moved_m, rcond=None)
+        return np.concatenate([curve, np.zeros(2 + _RECORDER)])
 
     def recorded(self, prediction: Array, k: Array) -> Array:
         """A prediction (n,) as such a recorder has it."""
@@ -154,7 +156,7 @@ class RecordError:
         """What each of k does to a prediction (n,): (k, n) [m/s2 per unit]."""
         rise = rate_of_change(prediction, self.run.rate_hz)
         by_place = rise / np.maximum(self.run.speed_mps, _SLOWEST_MPS)
-        return np.vstack([self.basis.T * by_place, _by_recorder(prediction, rise, self.run)])
+        return np.vstack([self.basis * by_place, _by_recorder(prediction, rise, self.run)])
 
 
 def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:

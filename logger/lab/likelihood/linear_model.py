@@ -8,20 +8,21 @@ sizes of the distance errors are those with the most evidence.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import ErrorSize, RecordError
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 
 _SIZE_STEP, _LEAST_SIZE_STEP = 0.8, 0.1  # of the logarithms of sizes
+_TREND = (10.0, 1.0, 10.0)  # times the usual size: start, walk, factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class LinearModel:
     """
 
     def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
-        self.posterior, self.prior, self.numbers = posterior, posterior.prior, numbers
+        self.posterior, self.prior = posterior, posterior.prior
         residuals = posterior.residuals(state)
         self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
         self._records = []
@@ -80,11 +81,20 @@ class LinearModel:
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
         self._precisions = [one.error.precision(self.size) for one in self._records]
         self._roots = [one.root(self.size) for one in self._records]
-        count = len(posterior.prior.names) if numbers is not None else 0
-        self.white = [whitener(one) for whitener, one in zip(self.whiteners, numbers, strict=True)] if (
-            numbers is not None) else [np.empty((0, one.white.shape[1])) for one in self._records]
+        self._take(numbers)
+
+    def _take(self, numbers: Sequence[Array] | None) -> None:
+        self.numbers = numbers
+        self.count = 0 if numbers is None else len(self.prior.names)
+        self.white = [np.empty((0, one.white.shape[1])) for one in self._records] if numbers is None else (
+            self.whitened(numbers))
         self._taken = self.taken(self.white)
-        self.count = count
+
+    def by(self, numbers: Sequence[Array] | None) -> LinearModel:
+        """The same with other slopes by the car's numbers (p, n) per run."""
+        found = copy(self)
+        found._take(numbers)
+        return found
 
     def holding(self, names: Sequence[str]) -> LinearModel:
         """The same with some of the car's numbers held where they are."""
@@ -106,24 +116,16 @@ class LinearModel:
         return found
 
     def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
-        """Coordinate by coordinate, in steps of its logarithm that become smaller."""
+        """By evidence, from a size or from one with a start and a factor that are unusual: what these explain, a walk
+        explains as well, and there may be an optimum at either."""
         def lack(logs: Array) -> float:
             found = ErrorSize.of(logs)
             return sum(one.lack(found) for one in self._records) + found.cost
 
-        here = size.logs
-        least, step = lack(here), _SIZE_STEP
-        while step > _LEAST_SIZE_STEP:
-            before = least
-            for index in (1, 0, 2):
-                for way in (step, -step):
-                    there = here.copy()
-                    there[index] += way
-                    if (now := lack(there)) < least:
-                        here, least = there, now
-                        break
-            if least > before - 1.0:
-                step *= 0.4
+        here, least = _descended(lack, size.logs)
+        trend = USUAL.logs + np.log(_TREND)
+        if lack(trend) < least:
+            here, _ = _descended(lack, trend)
         return ErrorSize.of(here)
 
     @property
@@ -198,6 +200,23 @@ class LinearModel:
         mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
             self.white, self._taken, columns, taken, strict=True)), np.zeros(self.count))
         return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, taken, strict=True))
+
+
+def _descended(lack: Callable[[Array], float], here: Array) -> tuple[Array, float]:
+    """The least of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
+    least, step = lack(here), _SIZE_STEP
+    while step > _LEAST_SIZE_STEP:
+        before = least
+        for index in (1, 0, 2):
+            for way in (step, -step):
+                there = here.copy()
+                there[index] += way
+                if (now := lack(there)) < least:
+                    here, least = there, now
+                    break
+        if least > before - 1.0:
+            step *= 0.4
+    return here, least
 
 
 def _log_determinant(root: Array) -> float:

@@ -38,7 +38,7 @@ places."""
 
 @dataclass(frozen=True, eq=False)
 class MapFit:
-    """A fitted model.
+    """What is kept of a fitted model; the linear model beside it takes much memory.
 
     state      laid out
     numbers    slopes by the car's numbers (p, n) per run, taken near it
@@ -52,7 +52,7 @@ class MapFit:
 
     @staticmethod
     def of(linear: LinearModel) -> MapFit:
-        """The state that a model is linear beside; the linear model itself, which takes much memory, is let go."""
+        """The state that a model is linear beside."""
         return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
 
     def linear(self) -> LinearModel:
@@ -60,22 +60,21 @@ class MapFit:
         return LinearModel(self.posterior, self.state, self.numbers)
 
 
-def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, rounds: int = _ROUNDS,
-        worth: float = 0.0) -> MapFit:
-    """A model fitted in full from a state, which is laid out.
+def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = _ROUNDS,
+        worth: float = 0.0) -> LinearModel:
+    """A model fitted in full, beside its state.
 
-    numbers    slopes by the car's numbers taken near the state; None: they are taken now
+    numbers    slopes by the car's numbers taken near the start; None: they are taken now
     worth      what a round has to gain to be worth another one, if that is more than ``CONVERGED``
     """
-    fresh = numbers is None
-    numbers = posterior.number_slopes(state, posterior.prior.steps) if numbers is None else numbers
-    moves = moves_of(state.effects)
-    best = now = LinearModel(posterior, state, numbers)
+    posterior, fresh = start.posterior, numbers is None
+    numbers = posterior.number_slopes(start.state, posterior.prior.steps) if numbers is None else numbers
+    moves = moves_of(start.state.effects)
+    best = now = start.by(numbers)
     least = best.score
     enough = max(CONVERGED, worth)
     for done in range(1, rounds + 1):
-        trial = minimised(now, now.state, moves, _STEPS)
-        now = laid_out(posterior, trial, numbers, least)
+        now = laid_out(posterior, minimised(now, now.state, moves, _STEPS), numbers, least)
         gained = least - now.score
         if gained > 0:
             best, least = now, now.score
@@ -83,50 +82,54 @@ def fit(posterior: Posterior, state: State, numbers: list[Array] | None = None, 
             break
         if gained < enough or done == 1:
             fresh, numbers = True, posterior.number_slopes(best.state, _fine_steps(best))
-            now = best = LinearModel(posterior, best.state, numbers)
-    return MapFit.of(best)
-
-
-def laid_out(posterior: Posterior, state: State, numbers: list[Array] | None, least: float) -> LinearModel:
-    """A state that was fitted to first order, laid out where its distances are; aligned anew where that is not as good
-    as the least score so far, because they are far from where they were."""
-    found = LinearModel(posterior, posterior.at(state.effects, state.logs, state.record, state.size), numbers)
-    if found.score < least:
-        return found
-    there, _ = _aligned_from(posterior, found.state, _WORTH_ALIGNING)
-    return LinearModel(posterior, there, numbers)
-
-
-def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> State:
-    """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
-    road from there, whichever is likelier."""
-    best, least = _aligned_from(posterior, state, worth)
-    for _ in range(2):
-        farther_m = [followed_m(run, one) for run, one in zip(posterior.runs.runs, best.predictions, strict=True)]
-        if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
-            break
-        record = [error.through(error.moved_m(k) + more) for error, k, more in zip(
-            posterior.record_errors, best.record, farther_m, strict=True)]
-        there, score = _aligned_from(posterior, posterior.at(state.effects, state.logs, record, best.size), worth)
-        if score > least - CONVERGED:
-            break
-        best, least = there, score
+            now = best = best.by(numbers)
     return best
 
 
-def _aligned_from(posterior: Posterior, state: State, worth: float) -> tuple[State, float]:
-    now = LinearModel(posterior, state)
-    best, least = now.state, now.score
-    first = least
+def laid_out(posterior: Posterior, state: State, numbers: Sequence[Array] | None, least: float) -> LinearModel:
+    """A state that was fitted to first order, laid out where its distances are; aligned anew where that is not as good
+    as the least score so far, because they are far from where they were."""
+    found = LinearModel(posterior, posterior.at(state.effects, state.logs, state.record, state.size), numbers)
+    return found if found.score < least else _aligned_from(found.by(None), _WORTH_ALIGNING).by(numbers)
+
+
+def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> LinearModel:
+    """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
+    road, from there or from where they lie after that, whichever is likeliest."""
+    best = _aligned_from(LinearModel(posterior, state), worth)
+    for start in (state, None, None):
+        followed = _followed(posterior, start or best.state)
+        if followed is None:
+            break
+        found = _aligned_from(LinearModel(posterior, followed), worth)
+        if start is None and found.score > best.score - CONVERGED:
+            break
+        best = min(best, found, key=lambda one: one.score)
+    return best
+
+
+def _followed(posterior: Posterior, state: State) -> State | None:
+    """A state with the runs followed along the road; None where they lie as near as an alignment needs."""
+    farther_m = [followed_m(run, one) for run, one in zip(posterior.runs.runs, state.predictions, strict=True)]
+    if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
+        return None
+    record = [error.through(error.moved_m(k) + more) for error, k, more in zip(
+        posterior.record_errors, state.record, farther_m, strict=True)]
+    return posterior.at(state.effects, state.logs, record, state.size)
+
+
+def _aligned_from(start: LinearModel, worth: float) -> LinearModel:
+    best = now = start
+    first = least = start.score
     for _ in range(_ALIGNING_ROUNDS):
-        found = now.eliminated(now.state.predictions)
-        now = LinearModel(posterior, posterior.at(state.effects, state.logs, found.record, now.size))
+        state, found = now.state, now.eliminated(now.state.predictions)
+        now = LinearModel(now.posterior, now.posterior.at(state.effects, state.logs, found.record, now.size))
         gained = least - now.score
         if gained > 0:
-            best, least = now.state, now.score
+            best, least = now, now.score
         if gained < max(CONVERGED, worth * (first - least)):
             break
-    return best, least
+    return best
 
 
 @dataclass(frozen=True, eq=False)

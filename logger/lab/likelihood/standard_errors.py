@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.map_fit import MapFit, own_slopes
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import own_slopes
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
 
@@ -22,12 +23,12 @@ _TINY_STEP = 1e-4
 _SINGULAR = 1e-10
 
 
-def standard_errors(found: MapFit) -> tuple[tuple[Chosen, ...], Array]:
+def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
 
     Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
-    linear, state = found.linear().without_wall(), found.state
+    linear, state = found.without_wall(), found.state
     moves, slopes = moves_of(state.effects), own_slopes(linear)
     information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))

@@ -94,17 +94,31 @@ class Whitener:
     """Weighs each band of one run by its level."""
 
     def __init__(self, bands: Bands, levels: Array) -> None:
+        from scipy.fft import next_fast_len
+
         self._first, self._count = bands.first, bands.count - bands.first
-        f_hz = np.fft.rfftfreq(self._count, 1 / bands.rate_hz)
+        self._padded = next_fast_len(self._count, real=True)
+        f_hz = np.fft.rfftfreq(self._padded, 1 / bands.rate_hz)
         edges = bands.edges_hz
+        self._inside = slice(*np.searchsorted(f_hz, edges[[0, -1]]))
         middle = 0.5 * (edges[1:] + edges[:-1])
-        level = np.exp(np.interp(f_hz, middle, np.log(levels)))
-        self._gain = np.where((f_hz >= edges[0]) & (f_hz < edges[-1]), 1 / np.sqrt(level), 0.0)
+        self._gain = np.exp(-0.5 * np.interp(f_hz[self._inside], middle, np.log(levels)))
 
     def __call__(self, samples: Array) -> Array:
-        """(n,) or (columns, n), whole, to the samples that count (..., kept), in units of the noise."""
-        part = samples[..., self._first:]
-        return np.asarray(np.fft.irfft(np.fft.rfft(part, axis=-1) * self._gain, self._count, axis=-1))
+        """(n,) or (columns, n), whole, to numbers (..., kept) whose products are those of the whitened samples that
+        count, in units of the noise: Parseval's theorem, without the frequencies that no band has."""
+        both_sides = np.sqrt(2 / self._padded)
+        return (self._spectrum(samples) * (both_sides * self._gain)).view(float)
+
+    def in_time(self, samples: Array) -> Array:
+        """(n,) or (columns, n), whole, to the samples that count (..., n - first), in units of the noise."""
+        spectrum = np.zeros((*samples.shape[:-1], self._padded // 2 + 1), complex)
+        spectrum[..., self._inside] = self._spectrum(samples) * self._gain
+        return np.fft.irfft(spectrum, self._padded, axis=-1)[..., : self._count]
+
+    def _spectrum(self, samples: Array) -> npt.NDArray[np.complex128]:
+        """Of the samples that count, where there are bands."""
+        return np.fft.rfft(samples[..., self._first:], self._padded, axis=-1)[..., self._inside]
 
 
 def deviance(bands: Sequence[Bands], residuals: Sequence[Array]) -> float:

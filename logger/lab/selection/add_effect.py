@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, aligned, fit
+from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.noise_floor import floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.standard_errors import standard_errors
@@ -121,7 +121,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    before = fit(posterior, aligned(posterior, posterior.start(present)))
+    before = fit(aligned(posterior, posterior.start(present)))
     after = _with(posterior, before, (*before.state.effects, *added), (*present, *added))
     loose = posterior.without_wall()
     (bent, spread_before), (freed, spread_after) = (_freed(loose, one) for one in (before, after))
@@ -144,17 +144,18 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         distance_error_m=unusual_m(posterior.record_errors, state.record))
 
 
-def _with(posterior: Posterior, before: MapFit, beside: tuple[Chosen, ...], anew: tuple[Chosen, ...]) -> MapFit:
+def _with(posterior: Posterior, before: LinearModel, beside: tuple[Chosen, ...],
+          anew: tuple[Chosen, ...]) -> LinearModel:
     """The model with more effects. A car that was refitted without what is missing may be bent too far, or lie too
     wrong, to begin with."""
     state = before.state
-    starts = [LinearModel(posterior, aligned(posterior, one)) for one in (
+    starts = [aligned(posterior, one) for one in (
         posterior.at(beside, state.logs, state.record, state.size), posterior.start(anew))]
-    return fit(posterior, min(starts, key=lambda one: one.score).state)
+    return fit(min(starts, key=lambda one: one.score))
 
 
-def _freed(loose: Posterior, found: MapFit) -> tuple[MapFit, Array]:
+def _freed(loose: Posterior, found: LinearModel) -> tuple[LinearModel, Array]:
     """The model fitted without holding on to the car's numbers, and standard errors of their logarithms (p,)."""
     if found.posterior.prior.at_the_wall(found.state.logs):
-        found = fit(loose, found.state, found.numbers)
+        found = fit(LinearModel(loose, found.state), found.numbers)
     return found, standard_errors(found)[1]

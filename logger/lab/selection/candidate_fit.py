@@ -52,12 +52,12 @@ def roughly_fitted(score: float, base: Baseline, screened: Screened) -> list[Can
 
 def refined(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = _ROUNDS) -> CandidateFit:
     """The same with slopes of its own."""
-    found = fit(one.found.posterior, one.found.state, one.found.numbers, rounds, worth)
+    found = MapFit.of(fit(one.found.linear(), one.found.numbers, rounds, worth))
     return CandidateFit(found, score - found.score)
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
-    posterior, numbers = base.posterior, base.found.numbers
+    posterior, numbers = base.posterior, base.linear.numbers
     if trial.start is not None:
         linear, state = LinearModel(posterior, trial.start, numbers), trial.start
     else:
@@ -65,5 +65,6 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         state = State((*base.state.effects, trial.one), posterior.prior.within_wall(trial.logs), linear.state.record,
                       linear.size, [])
     state = minimised(linear, state, moves_of(state.effects), _STEPS)
-    there = laid_out(posterior, state, list(linear.numbers or ()), score)
-    return CandidateFit(MapFit.of(there), score - there.score)
+    there = laid_out(posterior, state, linear.numbers, score)
+    found = MapFit.of(there)
+    return CandidateFit(found, score - found.score)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.likelihood.map_fit import MapFit
+from logger.lab.likelihood.linear_model import LinearModel
 from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 
 DETECTABLE_SIGMA = 6.0
@@ -30,7 +30,7 @@ class Undetectable:
     deviations: float
 
 
-def undetectable_effects(found: MapFit, effects: Sequence[Effect]) -> tuple[Undetectable, ...]:
+def undetectable_effects(found: LinearModel, effects: Sequence[Effect]) -> tuple[Undetectable, ...]:
     """Those of the effects that the runs could not show beside a fitted model, the most hidden first."""
     sensitivity = _Sensitivity(found)
     all_of_them = [Undetectable(effect, sensitivity.of(effect)) for effect in effects]
@@ -41,8 +41,8 @@ def undetectable_effects(found: MapFit, effects: Sequence[Effect]) -> tuple[Unde
 class _Sensitivity:
     """By how much effects would stand out beside a fitted model."""
 
-    def __init__(self, found: MapFit) -> None:
-        self._linear, self._state = found.linear().without_wall(), found.state
+    def __init__(self, found: LinearModel) -> None:
+        self._linear, self._state = found.without_wall(), found.state
         self._covariance = np.linalg.inv(self._linear.information(self._state.logs))
         self._here = self._predicted(self._state.effects)
 

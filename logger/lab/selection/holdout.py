@@ -47,7 +47,8 @@ def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut
     columns = linear.numbers or [np.empty((0, len(one))) for one in residuals]
     if own is not None:
         columns = [np.vstack([first, more]) for first, more in zip(columns, own, strict=True)]
-    white, ones = linear.whitened(columns), linear.whitened(residuals)
+    white, ones = ([whitener.in_time(one) for whitener, one in zip(linear.whiteners, some, strict=True)]
+                   for some in (columns, residuals))
     sets = [folds(run) for run in posterior.runs.runs]
     own_count = len(columns[0]) - linear.count
     prior = np.concatenate([posterior.prior.curvature(state.logs)[: linear.count], np.zeros(own_count)])

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, aligned, own_slopes
+from logger.lab.likelihood.map_fit import aligned, own_slopes
 from logger.lab.likelihood.noise_floor import gain_of_an_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, held_out
@@ -67,7 +67,6 @@ class _Quadratic:
 class Baseline:
     """A fitted model that effects are tried on.
 
-    found          the fit
     score          minus twice the log of its evidence
     explanation    what a full explanation of the residuals would gain
     rough          predictions of a rough simulation, for comparing with others
@@ -75,26 +74,25 @@ class Baseline:
                    hides what effects do
     """
 
-    found: MapFit
     score: float
     explanation: float
     rough: list[Array]
     quadratics: tuple[_Quadratic, ...]
 
     @staticmethod
-    def of(found: MapFit) -> Baseline:
-        """From a fit."""
-        linear, state = found.linear(), found.state
+    def of(linear: LinearModel) -> Baseline:
+        """Of a model beside its state."""
+        state = linear.state
         quadratics = [_Quadratic.of(linear)]
         if linear.prior.at_the_wall(state.logs):
             quadratics.append(_Quadratic.of(linear.without_wall()))
-        return Baseline(found, linear.score, gain_of_an_explanation(found.posterior, state),
+        return Baseline(linear.score, gain_of_an_explanation(linear.posterior, state),
                         _roughly(linear, state.effects, state.logs), tuple(quadratics))
 
     @property
     def posterior(self) -> Posterior:
         """That which was fitted."""
-        return self.found.posterior
+        return self.linear.posterior
 
     @property
     def linear(self) -> LinearModel:
@@ -104,7 +102,7 @@ class Baseline:
     @property
     def state(self) -> State:
         """The model."""
-        return self.found.state
+        return self.linear.state
 
     @cached_property
     def hold_out(self) -> HoldOut:
@@ -124,7 +122,7 @@ def as_recorded(base: Baseline) -> Baseline:
     record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
     there = posterior.at(state.effects, np.zeros_like(state.logs), record)
     numbers = posterior.number_slopes(there, posterior.prior.steps)
-    return Baseline.of(MapFit.of(LinearModel(posterior, there, numbers)))
+    return Baseline.of(LinearModel(posterior, there, numbers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +242,7 @@ def _as_predicted(base: Baseline, linear: LinearModel, trial: Trial) -> Trial:
     state = base.state
     there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
     step = trial.logs - state.logs
-    moved_there = [one + step @ columns for one, columns in zip(there, base.found.numbers, strict=True)]
+    moved_there = [one + step @ columns for one, columns in zip(there, linear.numbers or (), strict=True)]
     return replace(trial, gain=base.gain(linear.objective(moved_there, trial.logs), trial.logs, linear))
 
 
@@ -270,7 +268,7 @@ def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
     record = [error.through(error.moved_m(k) - _shift_m(one, error.run)) for error, k in zip(
         posterior.record_errors, state.record, strict=True)]
     starts = [posterior.at(effects, state.logs), posterior.at(effects, state.logs, record, state.size)]
-    models = [LinearModel(posterior, aligned(posterior, start, _WORTH_ALIGNING)) for start in starts]
+    models = [aligned(posterior, start, _WORTH_ALIGNING) for start in starts]
     best = min(models, key=lambda model: model.score)
     return replace(trial, one=one, gain=base.score - best.score, logs=state.logs, start=best.state)
 

@@ -15,6 +15,7 @@ from functools import partial
 
 import numpy as np
 
+from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
@@ -74,6 +75,7 @@ class Search:
     progress: Progress = lambda words: None
     workers: int = 2
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _reduced: tuple[Baseline | None, dict[str, Baseline]] = (None, {})
 
     def run(self, before: Baseline) -> Selection:
         """From a model without effects that it lacks."""
@@ -153,18 +155,26 @@ class Search:
                    key=lambda one: len(moves_of([one.chosen])), default=None)
 
     def without(self, now: Baseline, name: str) -> Baseline:
-        """A model without one of its effects, fitted."""
+        """A model without one of its effects, fitted; kept as long as this is the model."""
+        if self._reduced[0] is not now:
+            self._reduced = now, {}
+        kept = self._reduced[1]
+        if name not in kept:
+            kept[name] = self._fitted_without(now, name)
+        return kept[name]
+
+    def _fitted_without(self, now: Baseline, name: str) -> Baseline:
         rest = tuple(one for one in now.state.effects if one.effect.name != name)
         away = next(one for one in now.state.effects if one.effect.name == name)
         posterior = now.posterior
         if away.effect.realigns:
-            return Baseline.of(fit(posterior, aligned(posterior, posterior.at(rest, now.state.logs))))
-        start = posterior.at(rest, now.state.logs, now.state.record, now.state.size)
-        return Baseline.of(fit(posterior, start, now.found.numbers, worth=_WORTH_A_ROUND * now.explanation))
+            return Baseline.of(fit(aligned(posterior, posterior.at(rest, now.state.logs))))
+        start = LinearModel(posterior, posterior.at(rest, now.state.logs, now.state.record, now.state.size))
+        return Baseline.of(fit(start, now.linear.numbers, worth=_WORTH_A_ROUND * now.explanation))
 
     def _refit(self, one: CandidateFit) -> Baseline:
         posterior = one.found.posterior
-        return Baseline.of(fit(posterior, aligned(posterior, one.found.state), one.found.numbers))
+        return Baseline.of(fit(aligned(posterior, one.found.state), one.found.numbers))
 
     def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
         """The model with whatever gains most in the place of an effect, which may be the same effect elsewhere; and

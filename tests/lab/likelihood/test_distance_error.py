@@ -29,14 +29,14 @@ SPEED_SCALE, TIME_OFFSET = EFFECTS["speed_scale"], EFFECTS["time_offset"]
 def laid(runs: list[Run], effects: tuple[Chosen, ...] = ()) -> tuple[Posterior, State]:
     """Runs with their distance errors fitted."""
     posterior = posterior_of(runs)
-    return posterior, aligned(posterior, posterior.start(effects))
+    return posterior, aligned(posterior, posterior.start(effects)).state
 
 
 def gain_of(runs: list[Run], one: Chosen) -> tuple[float, Chosen]:
     """By how much an effect makes a model more evident whose numbers and distance errors are all fitted; and it."""
-    posterior, without = laid(runs)
-    found = fit(posterior, aligned(posterior, posterior.start([one])))
-    return fit(posterior, without).score - found.score, found.state.effects[0]
+    posterior = posterior_of(runs)
+    without, found = (fit(aligned(posterior, posterior.start(effects))) for effects in ([], [one]))
+    return without.score - found.score, found.state.effects[0]
 
 
 # --- the numbers of a record's error ---
@@ -74,14 +74,14 @@ def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
     assert np.abs(found - expected)[INNER].max() < 0.01 * np.abs(expected).max()
 
 
-def test_knots_go_through_what_is_straight_between_them() -> None:
+def test_the_curve_goes_through_a_straight_line() -> None:
     line_m = 0.3 - 0.002 * np.arange(RUN.count)
     assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
 
 
-@pytest.mark.parametrize(("lasts_s", "knots"), [(20.0, 81), (100.0, 401), (150.0, 480), (400.0, 480)])
-def test_longer_runs_have_more_knots_up_to_a_limit(lasts_s: float, knots: int) -> None:
-    assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).knots == knots
+@pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 43), (100.0, 203), (150.0, 243), (400.0, 243)])
+def test_longer_runs_have_more_coefficients_up_to_a_limit(lasts_s: float, coefficients: int) -> None:
+    assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).coefficients == coefficients
 
 
 # --- the prior ---
@@ -99,7 +99,7 @@ def test_the_prior_has_the_deviations_that_it_was_given() -> None:
     driven_m = np.ptp(RUN.distance_m)
     assert deviation_m(0) == pytest.approx(0.01, rel=1e-6)
     expected_m = np.sqrt(0.01**2 + 0.02**2 * RUN.time_s[-1] + (0.001 * driven_m) ** 2)
-    assert deviation_m(-1) == pytest.approx(expected_m, rel=1e-6)
+    assert deviation_m(-1) == pytest.approx(expected_m, rel=0.01)  # a curve is smoother than a walk, by half a knot
 
 
 @pytest.mark.parametrize("size", [USUAL, ErrorSize(0.05, 0.001, 0.01)])
@@ -150,14 +150,20 @@ def test_a_start_that_is_far_off_is_no_walk() -> None:
 
 
 # As far as a real signal is off (0.08 m/s), from one reading to the next or for seconds.
-@pytest.fixture(scope="module", params=[(0.08, 0.02), (0.08, 1.0), (0.08, 5.0)], ids=["rough", "1 s", "5 s"])
-def wrong(request: pytest.FixtureRequest) -> tuple[float, float]:
+@pytest.fixture(scope="module", params=[(0.08, 0.02, 3), (0.08, 1.0, 3), (0.08, 5.0, 3), (0.08, 5.0, 33)],
+                ids=["rough", "1 s", "5 s", "5 s, far"])
+def wrong(request: pytest.FixtureRequest) -> tuple[float, float, int]:
     return request.param  # type: ignore[no-any-return]
 
 
-def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> None:
+def wrong_speed(run: Run, wrong: tuple[float, float, int], number: int) -> Run:
+    *wander, seed = wrong
+    return with_wrong_speed(run, *wander, seed + number)
+
+
+def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float, int]) -> None:
     true = noisy_runs()
-    runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(true)]
+    runs = [wrong_speed(run, wrong, i) for i, run in enumerate(true)]
     posterior, state = laid(runs)
     truth_m = off_m(runs, true)
     left_m = [found - one for found, one in zip(posterior.moved_m(state.record), truth_m, strict=True)]
@@ -168,8 +174,8 @@ def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float]) -> Non
 
 
 @pytest.mark.parametrize("true", [0.0, 300.0])
-def test_a_distance_that_wanders_hides_no_physics_and_makes_none(wrong: tuple[float, float], true: float) -> None:
-    runs = [with_wrong_speed(run, *wrong, 3 + i) for i, run in enumerate(noisy_runs([tire_damping(true)]))]
+def test_a_distance_that_wanders_hides_no_physics_and_makes_none(wrong: tuple[float, float, int], true: float) -> None:
+    runs = [wrong_speed(run, wrong, i) for i, run in enumerate(noisy_runs([tire_damping(true)]))]
     gain, tires = gain_of(runs, tire_damping(150.0))
     assert gain > 50 if true else gain < 2
     assert tires.p.tire_damping_n_s_per_m == pytest.approx(true, abs=80.0)

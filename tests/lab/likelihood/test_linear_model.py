@@ -143,7 +143,7 @@ def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> Non
 
 def test_the_sizes_are_those_with_the_most_evidence() -> None:
     """Against the density of the whitened residual with all distance errors integrated out, as a matrix."""
-    posterior = drawn([], 3, ErrorSize(0.01, 0.02, 0.0003), lasts_s=6.0).posterior
+    posterior = drawn([], 3, ErrorSize(0.01, 0.04, 0.0003), lasts_s=6.0).posterior
     linear = LinearModel(posterior, posterior.start())
     white = linear.whitened(posterior.residuals(linear.state))
     slopes = [whitener(error.slopes(each)) for whitener, error, each in zip(

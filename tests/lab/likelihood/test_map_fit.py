@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, MapFit, aligned, fit
+from logger.lab.likelihood.map_fit import CONVERGED, aligned, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -22,18 +22,18 @@ from ...support.lab.runs_with_residual import CAR
 from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2
 
 
-def from_start(posterior: Posterior, *effects: Chosen) -> MapFit:
-    return fit(posterior, aligned(posterior, posterior.start(effects)))
+def from_start(posterior: Posterior, *effects: Chosen) -> LinearModel:
+    return fit(aligned(posterior, posterior.start(effects)))
 
 
 @cache
-def plain() -> MapFit:
+def plain() -> LinearModel:
     """A car as its file says, in every respect."""
     return from_start(posterior_of(noisy_runs()))
 
 
 @cache
-def damped() -> MapFit:
+def damped() -> LinearModel:
     """A car with damped tires, and a model with them."""
     return from_start(posterior_of(noisy_runs([tire_damping(300.0)])), tire_damping(150.0))
 
@@ -77,8 +77,7 @@ def test_a_fit_ends_in_the_same_place_wherever_it_begins(start: float) -> None:
 def test_nothing_near_a_fit_is_likelier() -> None:
     """Numbers of the car and of the effect moved by half of what they are known to, truly predicted, the distance
     errors made up for."""
-    found, posterior, state = damped(), damped().posterior, damped().state
-    linear = found.linear()
+    linear, posterior, state = damped(), damped().posterior, damped().state
     here = linear.objective(state.predictions, state.logs)
     known = 1 / np.sqrt(np.diag(linear.information(state.logs)))
     moves = moves_of(state.effects)
@@ -109,7 +108,7 @@ def test_a_car_bends_no_farther_than_the_wall_and_without_it_as_far_as_the_runs_
     heavy = changed(CAR, {"sprung_mass_kg": 1.12 * CAR.sprung_mass_kg})
     posterior = Posterior(SimulatedRuns(noisy_runs(), FINE_HZ), heavy, Tolerance())
     firm = from_start(posterior)
-    loose = fit(posterior.without_wall(), firm.state, firm.numbers)
+    loose = fit(LinearModel(posterior.without_wall(), firm.state), firm.numbers)
     assert posterior.prior.at_the_wall(firm.state.logs)
     held, free = (read(one.posterior.prior.vehicle(heavy, one.state.logs), "sprung_mass_kg") for one in (firm, loose))
     assert held > 1.04 * CAR.sprung_mass_kg and free < held - 0.02 * CAR.sprung_mass_kg
@@ -129,9 +128,9 @@ def test_a_fit_begins_where_the_car_stands_and_its_prior_stays_where_it_was() ->
 def test_aligning_moves_no_number_of_the_car_and_makes_nothing_worse() -> None:
     posterior = drawn([], 4, plain().state.size).posterior
     start = posterior.start()
-    state = aligned(posterior, start)
-    assert state.logs.tolist() == start.logs.tolist()
-    assert LinearModel(posterior, state).score <= LinearModel(posterior, start).score
+    found = aligned(posterior, start)
+    assert found.state.logs.tolist() == start.logs.tolist()
+    assert found.score <= LinearModel(posterior, start).score
 
 
 def test_a_round_that_is_not_worth_it_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,12 +138,12 @@ def test_a_round_that_is_not_worth_it_is_the_last(monkeypatch: pytest.MonkeyPatc
     start = aligned(posterior, posterior.start())
     predict, asked = Posterior.predict, []
     monkeypatch.setattr(Posterior, "predict", lambda *given, **named: (asked.append(1), predict(*given, **named))[1])
-    whole = fit(posterior, start)
+    whole = fit(start)
     thoroughly = len(asked)
     asked.clear()
-    early = fit(posterior, start, rounds=1)
+    early = fit(start, rounds=1)
     assert len(asked) < thoroughly
-    assert whole.score <= early.score <= LinearModel(posterior, start).score
+    assert whole.score <= early.score <= start.score
 
 
 def test_slopes_by_the_cars_numbers_are_differences_of_predictions() -> None:

@@ -70,10 +70,18 @@ def test_every_band_has_a_power_whatever_the_rate_and_the_length(rate_hz: float,
 def test_weighed_noise_of_any_colour_has_the_power_of_its_bands() -> None:
     samples = 12_200
     residual, bands = coloured(samples), Bands(run_of(samples))
-    whitened = bands.whitener(residual)(residual)
+    whitened = bands.whitener(residual).in_time(residual)
     assert whitened.shape == (12_000,)
     in_bands = (bands.edges_hz[-1] - bands.edges_hz[0]) / 50.0
     assert (whitened**2).mean() == pytest.approx(in_bands, rel=0.03)
+
+
+@pytest.mark.parametrize("samples", [12_200, 4473])  # of 4273, which count, a transform is slow: more are transformed
+def test_products_are_those_of_the_whitened_samples(samples: int) -> None:
+    one, other = white(samples, 1), coloured(samples, 2)
+    whitener = Bands(run_of(samples)).whitener(other)
+    rows, times = whitener(np.stack([one, other])), whitener.in_time(np.stack([one, other]))
+    assert rows @ rows.T == pytest.approx(times @ times.T, rel=2e-3, abs=2e-3 * (times[0] @ times[0]))
 
 
 def test_columns_are_weighed_like_a_residual_and_the_beginning_counts_nowhere() -> None:

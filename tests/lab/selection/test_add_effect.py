@@ -55,7 +55,7 @@ def test_errors_are_those_that_simulations_of_the_vehicles_have(runs: SimulatedR
 
 def test_how_often_noise_would_gain_as_much_is_by_the_evidence_of_both_models(runs: SimulatedRuns) -> None:
     posterior, one = posterior_of(secret_runs(noise_mps2=0.3, lasts_s=12.0)), hidden("sensor_offset", offset_m=0.1)
-    without, there = (fit(posterior, aligned(posterior, posterior.start(some))) for some in ([], [one]))
+    without, there = (fit(aligned(posterior, posterior.start(some))) for some in ([], [one]))
     gain = without.score - there.score
     found = add(posterior, [], [one], candidates=3)
     assert found.p_value == pytest.approx(probability_by_chance(gain, 3), abs=1e-3)

@@ -7,7 +7,6 @@ import pytest
 
 from logger.lab.diagnosis import refitted
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, undetectable_effects
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -18,35 +17,35 @@ from ...support.lab.secret_runs import EFFECTS, Dense, posterior_of, secret_runs
 
 
 @pytest.fixture(scope="module")
-def loud() -> MapFit:
+def loud() -> LinearModel:
     """The right model beside runs so loud that much is hidden."""
     posterior = posterior_of(secret_runs(noise_mps2=1.0, lasts_s=12.0))
-    return refitted(posterior, posterior.start()).found
+    return refitted(posterior, posterior.start()).linear
 
 
 @pytest.mark.parametrize("name", ["sensor_offset", "sensor_gain", "tire_damping", "damper_asymmetry"])
-def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: MapFit, name: str) -> None:
+def test_deviations_are_those_that_dense_least_squares_cannot_absorb(loud: LinearModel, name: str) -> None:
     (hidden,) = undetectable_effects(loud, [EFFECTS[name]])
     posterior, state = loud.posterior, loud.state
     one = chosen(EFFECTS[name], EFFECTS[name].usual)
     there, here = (posterior.predict(effects, state.logs, state.record, rough=True) for effects in ((one,), ()))
-    dense = Dense(loud.linear())
+    dense = Dense(loud)
     change = dense.white([new - old for new, old in zip(there, here, strict=True)])
     left, _ = dense.least(change, np.zeros(len(dense.here)))
     assert hidden.effect is EFFECTS[name]
     assert hidden.deviations == pytest.approx(np.sqrt(left), rel=1e-5)
 
 
-def test_the_most_hidden_come_first_and_none_that_stands_out(loud: MapFit) -> None:
+def test_the_most_hidden_come_first_and_none_that_stands_out(loud: LinearModel) -> None:
     found = undetectable_effects(loud, list(EFFECTS.values()))
     deviations = [one.deviations for one in found]
     assert deviations == sorted(deviations) and max(deviations) < DETECTABLE_SIGMA
     assert {"wheel_lift", "bump_stop", "progressive_spring"} <= {one.effect.name for one in found}
 
 
-def test_quieter_runs_hide_less(loud: MapFit) -> None:
+def test_quieter_runs_hide_less(loud: LinearModel) -> None:
     quiet_runs = posterior_of(secret_runs(noise_mps2=0.02, lasts_s=12.0))
-    quiet = refitted(quiet_runs, quiet_runs.start()).found
+    quiet = refitted(quiet_runs, quiet_runs.start()).linear
     effects = [EFFECTS[name] for name in ("sensor_offset", "damper_asymmetry", "tire_damping", "wheel_lift")]
     before, after = ({one.effect.name: one.deviations for one in undetectable_effects(found, effects)}
                      for found in (loud, quiet))
@@ -64,13 +63,13 @@ def slow_run(noise_mps2: float, of_motion: float = 0.0) -> SimulatedRuns:
     return SimulatedRuns([measuring(run, model + np.random.default_rng(1).normal(0, size, run.count))])
 
 
-def beside(runs: SimulatedRuns, patch: float = 0.0) -> MapFit:
+def beside(runs: SimulatedRuns, patch: float = 0.0) -> LinearModel:
     """A car with a patch that is longer by a share, not fitted."""
     posterior = posterior_of(runs)
     logs = np.where(np.array(posterior.prior.names) == "contact_patch_m", patch, 0.0)
     state = posterior.at((), logs)
     numbers = posterior.number_slopes(state, posterior.prior.steps)
-    return MapFit.of(LinearModel(posterior, state, numbers))
+    return LinearModel(posterior, state, numbers)
 
 
 def test_another_contact_length_than_the_cars_own_shows_on_a_rough_road_driven_slowly() -> None:

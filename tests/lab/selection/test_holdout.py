@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from logger.lab.diagnosis import refitted
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, aligned, effect_slopes, fit
+from logger.lab.likelihood.map_fit import aligned, effect_slopes, fit
 from logger.lab.likelihood.whittle import deviance
 from logger.lab.selection.holdout import folds, held_out
 from logger.runs import Run, normalised_rms
@@ -29,7 +29,7 @@ SETS = 3
 def plain() -> LinearModel:
     """The right model, fitted."""
     posterior = posterior_of(secret_runs(lasts_s=15.0))
-    return refitted(posterior, posterior.start()).found.linear()
+    return refitted(posterior, posterior.start()).linear
 
 
 def test_each_sample_that_counts_is_held_out_once_in_stretches_of_seconds(plain: LinearModel) -> None:
@@ -55,7 +55,7 @@ def test_a_long_run_is_held_out_in_many_stretches_and_a_short_one_in_three(plain
 # --- against fits ---
 
 
-def unseen_when_refitted(found: MapFit) -> tuple[float, float]:
+def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     """Error and deviance of models whose numbers were fitted to convergence, by true predictions, without each set of
     stretches in turn; distances stay as they are."""
     posterior, state = found.posterior, found.state
@@ -72,8 +72,8 @@ def unseen_when_refitted(found: MapFit) -> tuple[float, float]:
     for held in range(SETS):
         def seen(z: Array, held: int = held) -> Array:
             x = here + z * scale
-            parts = [white[folds(run) != held] for run, white in zip(
-                runs, found.linear().whitened(residuals(x)), strict=True)]
+            parts = [whitener.in_time(one)[folds(run) != held] for run, whitener, one in zip(
+                runs, found.whiteners, residuals(x), strict=True)]
             beyond = np.maximum(np.abs(x[:p] / posterior.prior.deviations) - 2.0, 0.0)  # the wall of the prior
             return np.concatenate([*parts, x[:p] / posterior.prior.deviations, 10.0 * beyond**2])
 
@@ -89,12 +89,11 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
     there = [hidden("sensor_offset", offset_m=0.3)] if model == "with one that is there" else []
     tried = [] if model == "right" else [hidden("sensor_offset", offset_m=0.2)]
     posterior = posterior_of(secret_runs(there, lasts_s=12.0))
-    found = fit(posterior, aligned(posterior, posterior.start(tried)))
-    state = found.state
-    linear = found.linear()
+    linear = fit(aligned(posterior, posterior.start(tried)))
+    state = linear.state
     own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.predictions) if tried else None
     quick = held_out(linear, own)
-    error, lack = unseen_when_refitted(found)
+    error, lack = unseen_when_refitted(linear)
     seen_error, seen_lack = posterior.error(state), posterior.deviance(state)
     assert quick.error > seen_error and quick.deviance > seen_lack
     assert quick.error - seen_error == pytest.approx(error - seen_error, rel=0.1)

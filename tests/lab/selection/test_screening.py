@@ -10,6 +10,7 @@ import pytest
 from logger.lab.diagnosis import refitted
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.candidate_fit import refined, roughly_fitted
+from logger.lab.selection.evidence import least_gain
 from logger.lab.selection.screening import Baseline, as_recorded, misalignment, scaled_by, screened
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Misalignment
@@ -116,7 +117,7 @@ def test_a_wrong_speed_is_tried_where_the_runs_then_lie() -> None:
     best = found.trials[0]
     assert best.start is not None and best.start.effects[-1] == best.one
     assert best.one.values["scale"] == pytest.approx(1.02, abs=2e-3)
-    assert best.gain > 100
+    assert best.gain > 2 * least_gain(len(EFFECTS))
 
 
 # --- how the runs lie ---

@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from logger.lab.diagnosis import diagnose, refitted
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import MapFit, aligned, fit
 from logger.lab.selection.candidate_fit import refined, roughly_fitted
 from logger.lab.selection.evidence import IMITATION, least_gain
 from logger.lab.selection.screening import Baseline, misalignment, screened
@@ -123,7 +124,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> 
     state = posterior.at([at_an_end], offset_base.state.logs)
     one = roughly_fitted(offset_base.score, offset_base, screened(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
     model = refined(offset_base.score, one, rounds=1).found
-    ended = replace(one, found=fit(posterior, state, model.numbers, rounds=0), gain=1e9)
+    ended = replace(one, found=MapFit.of(fit(LinearModel(posterior, state), model.numbers, rounds=0)), gain=1e9)
     assert at_an_end.at_an_end and ended.effect.name == "occupant"
     assert not search(FEW).accepted(offset_base, ended)
 
@@ -137,7 +138,7 @@ def test_without_an_effect_the_model_is_what_it_was_before(offset_base: Baseline
 def test_what_is_not_needed_beside_the_others_is_dropped(offset_base: Baseline) -> None:
     posterior = offset_base.posterior
     effects = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.0), hidden("tire_damping")]
-    now = Baseline.of(fit(posterior, aligned(posterior, posterior.start(effects))))
+    now = Baseline.of(fit(aligned(posterior, posterior.start(effects))))
     chosen_too_many = Selection(offset_base, now, {}, {}, Round((), ()), ())
     rest = search(FEW).left_out(chosen_too_many, "tire_damping")
     assert rest.now.state.names == ("sensor_offset",) and [*rest.gains] == ["sensor_offset"]
