@@ -14,11 +14,13 @@ import logger
 import ridelog
 
 ROOT = Path(__file__).parents[1]
-TREES = {
-    ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts)): ast.parse(path.read_text("utf-8"))
+FILES = {
+    path: ".".join((package.__name__, *path.relative_to(root).with_suffix("").parts))
     for package in (drivers, logger, ridelog) for root in [Path(str(package.__file__)).parent]
     for path in root.rglob("*.py")
 }
+"""Sources and their modules; the public package, which in a repository lies inside ``logger``, by its own name."""
+TREES = {module: ast.parse(path.read_text("utf-8")) for path, module in FILES.items()}
 FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
