@@ -45,9 +45,9 @@ def write_text(path: Path | str, text: str, encoding: str = "utf-8") -> None:
         Path(path).write_text(text, encoding)
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file that is there whole, in place of the old one, or not at all, also if the power goes or others write
-    it too. Raises OSError, with nothing left behind."""
+def replace_bytes(path: Path, data: bytes) -> None:
+    """Write a file that is there whole, in place of the old one, or not at all, also if the power goes or another
+    process writes it too. Raises OSError, with nothing left behind."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
     with naming(path):
         try:

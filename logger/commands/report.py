@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
-from logger.files import replace_file
+from logger.files import replace_bytes
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
 from logger.store.log.log_reader import LoggedFile, find_logs, read_logged
@@ -47,7 +47,7 @@ def write_report(logs: Sequence[Path], out: Path, place: Path | None = None) -> 
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(map(str, logs))}: expected a log with at least one intact row")
     try:
-        replace_file(out, page(files).encode("utf-8", "xmlcharrefreplace"))
+        replace_bytes(out, page(files).encode("utf-8", "xmlcharrefreplace"))
     except OSError as error:
         raise BadInput(f"{out}: expected a place where a page can be written ({error.strerror})") from None
     return files

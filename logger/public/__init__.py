@@ -1,4 +1,4 @@
-"""ridelog in Python: read, simulate, compare, diagnose, identify, estimate.
+"""ridelog in Python: read, simulate, compare, diagnose, identify, estimate, calibrate.
 
     import ridelog
 
