@@ -92,8 +92,8 @@ def lab(
                     none; without it all that is missing is added
     candidates, effect_files, progress    as in ``diagnose``
 
-    Raises BadInput as ``diagnose`` and ``add_effect``, and for a folder that there cannot be; OSError for files that
-    cannot be written.
+    Raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer that is no
+    effect; OSError for files that cannot be written.
 
     >>> story = lab(car, runs, folder / "lab", candidates=["sensor_gain", "time_offset"])
     >>> [one.effect for one in story.additions], story.comparisons[-1].missing

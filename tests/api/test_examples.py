@@ -188,3 +188,30 @@ def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> Non
     with pytest.raises(ridelog.BadInput, match="expected one of sensor_gain, time_offset"):
         ridelog.lab(names["car"], names["runs"], tmp_path, candidates=["sensor_gain", "time_offset"],
                     ask=lambda _: "rust")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [["diagnose", "--same-road", "--all"], ["lab"]], ids=["same road", "lab"])
+def test_a_search_is_the_commands(
+    more: list[str], names: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from logger.commands.main import main
+    from logger.store.formats.effect_file import shipped_effects
+
+    few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset")}
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
+    folders = [tmp_path / "slow", tmp_path / "fast"]
+    for folder, run in zip(folders, names["runs"], strict=True):
+        ridelog.write_run(folder, run)
+    out = [] if "--same-road" in more else ["--out", str(tmp_path / "lab")]
+    assert main([*more, "--vehicle", "rav4-2009", *map(str, folders), *out, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose_same_road(
+        "rav4-2009", folders)
+    assert json.loads(json.dumps(found.as_json())) == printed
+    assert found.figures() and found._repr_html_().count("<svg") == 1
+    if not out:
+        assert list(found.run_errors) == list(map(str, folders)) and found.cannot_tell
+        assert main([*more, "--vehicle", "rav4-2009", *map(str, folders)]) == 0
+        assert capsys.readouterr().out.rstrip() == repr(found)
