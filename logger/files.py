@@ -43,3 +43,19 @@ def write_text(path: Path | str, text: str, encoding: str = "utf-8") -> None:
     """Write a whole file of text. Raises OSError with the file's name, on a full disk too."""
     with naming(path):
         Path(path).write_text(text, encoding)
+
+
+def replace_bytes(path: Path, data: bytes) -> None:
+    """Write a file that is there whole, in place of the old one, or not at all, also if the power goes or another
+    process writes it too. Raises OSError, with nothing left behind."""
+    new = path.with_name(f".{path.name}.{os.getpid()}")
+    with naming(path):
+        try:
+            with new.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            new.replace(path)
+        except OSError:
+            new.unlink(missing_ok=True)
+            raise

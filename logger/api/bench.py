@@ -237,6 +237,15 @@ def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect]
     return effects, own
 
 
+def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:
+    """Those of these names, None: all. BadInput for a name that there is not."""
+    if names is None:
+        return dict(effects)
+    if unknown := set(names) - set(effects):
+        raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
+    return {name: effects[name] for name in sorted(names)}
+
+
 def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Tell = unsaid) -> None:
     """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
     the road moves no car, or the sensor was upside down or reads in another unit.

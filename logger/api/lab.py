@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from logger.api.bench import Bench, Tell, bench_of, deviation_of, unsaid
+from logger.api.bench import Bench, Tell, among, bench_of, deviation_of, unsaid
 from logger.api.drives import Run, read_run
 from logger.api.ranges import USUAL_TOLERANCE
 from logger.api.run_checks import checked_runs
@@ -18,6 +18,9 @@ from logger.store.formats import drive_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
+    from logger.lab import compare as compare_results
+    from logger.lab import diagnosis as diagnosis_results
+    from logger.lab.selection import add_effect as add_results
     from logger.report.html import Html
 
 Runs = Run | Path | str | Sequence[Run | Path | str]
@@ -64,11 +67,15 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     >>> found.refitted_error < found.error, found.missing
     (True, True)
     """
+    return comparison_of(bench_with(vehicle, runs, (), tolerance, thin=False).compared())
+
+
+def comparison_of(found: compare_results.Comparison) -> Comparison:
+    """What the lab found, as it is shown."""
     from logger.report.comparison_text import as_json
     from logger.report.lab_page import spectra
     from logger.report.lab_text import comparison_lines
 
-    found = _bench(vehicle, runs, (), tolerance, thin=False).compared()
     summary = as_json(found)
     return Comparison(
         "\n".join(comparison_lines(found)), summary, summary["error"], summary["refitted"]["error"],
@@ -140,22 +147,28 @@ def diagnose(
     >>> found.candidates[0].effect, round(found.candidates[0].parameters["gain"], 1)
     ('sensor_gain', 1.1)
     """
+    bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose")
+    return diagnosis_of(replace(bench, effects=among(bench.effects, candidates)).diagnosed(progress))
+
+
+def diagnosis_of(found: diagnosis_results.Diagnosis) -> Diagnosis:
+    """What the lab found, as it is shown."""
     from logger.report.diagnosis_text import as_json
     from logger.report.lab_text import diagnosis_lines
 
-    bench = _bench(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose")
-    if candidates is not None:
-        if unknown := set(candidates) - set(bench.effects):
-            raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(bench.effects)}")
-        bench = replace(bench, effects={name: bench.effects[name] for name in sorted(candidates)})
-    found = bench.diagnosed(progress)
     summary = as_json(found)
-    return Diagnosis(
-        "\n".join(diagnosis_lines(found, None)), summary, summary["baseline_error"], summary["noise_floor_error"],
-        tuple(Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
-                        tuple(one["confused_with"])) for one in summary["candidates"]),
-        tuple(summary["verdict"]), summary["unexplained"],
-        tuple((one["step"], one["error"]) for one in summary["steps"]))
+    return Diagnosis("\n".join(diagnosis_lines(found, None)), summary, **diagnosis_fields(summary))
+
+
+def diagnosis_fields(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a ``Diagnosis`` beside its text, out of the object that the command prints."""
+    return {
+        **{name: summary[name] for name in ("baseline_error", "noise_floor_error", "unexplained")},
+        "candidates": tuple(
+            Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
+                      tuple(one["confused_with"])) for one in summary["candidates"]),
+        "verdict": tuple(summary["verdict"]), "steps": tuple((one["step"], one["error"]) for one in summary["steps"]),
+    }
 
 
 @dataclass(frozen=True)
@@ -229,15 +242,20 @@ def add_effect(
     >>> [one.effect.name for one in found.model.effects]
     ['sensor_gain']
     """
-    from logger.report.add_effect_text import as_json
-    from logger.report.lab_text import addition_lines
-
     values = dict(start or {})
-    bench = _bench(vehicle, runs, (), tolerance)
+    bench = bench_with(vehicle, runs, (), tolerance)
     effect, file = bench.asked_for(str(name), values, str(name))
     bench = bench.with_effect(effect, file)
     is_given = set(values) >= {one.name for one in effect.parameters}
     found = bench.added(bench.searched(effect, values, progress), 1 if is_given else len(effect.trials()), progress)
+    return addition_of(found, model_of(bench.model_with(found)))
+
+
+def addition_of(found: add_results.AddedEffects, model: Model) -> AddedEffect:
+    """What the lab found, as it is shown; the model with it."""
+    from logger.report.add_effect_text import as_json
+    from logger.report.lab_text import addition_lines
+
     summary = as_json(found)
     numbers = tuple(
         ShiftedNumber(one["name"], one["nominal"], one["without"], one["without_standard_error"], one["with"],
@@ -245,24 +263,35 @@ def add_effect(
     return AddedEffect(
         "\n".join(addition_lines(found)), summary, summary["effect"], summary["parameters"], summary["standard_errors"],
         summary["error_before"], summary["error_refitted"], summary["error_after"], summary["noise_floor_error"],
-        summary["p_value"], summary["helps"], numbers, model_of(bench.model_with(found)))
+        summary["p_value"], summary["helps"], numbers, model)
 
 
-def _bench(
+def bench_with(
     vehicle: Model | Path | str, runs: Runs, effect_files: Sequence[Path | str], tolerance: float,
     searches: str | None = None, thin: bool = True,
 ) -> Bench:
     """All that a question needs, checked together."""
     numbers, model = deviation_of(tolerance), model_of(vehicle)
-    word = str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
+    drives = [_on_a_road(one) for one in given_runs(runs)]
+    return bench_of(word_of(vehicle, model), model, checked_runs(drives, thin), list(map(str, effect_files)), numbers,
+                    searches)
+
+
+def word_of(vehicle: Model | Path | str, model: Model) -> str:
+    """By which the user knows a vehicle."""
+    return str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
+
+
+def given_runs(runs: Runs) -> list[Run]:
+    """One run or several, read. BadInput for none, and for two of one name."""
     given = [runs] if isinstance(runs, Run | Path | str) else list(runs)
-    drives = [_on_a_road(one if isinstance(one, Run) else read_run(one)) for one in given]
+    drives = [one if isinstance(one, Run) else read_run(one) for one in given]
     names = [str(one.path) for one in drives]
     if not drives:
         raise BadInput("expected a run, found none")
     if again := next((name for number, name in enumerate(names) if name in names[:number]), None):
         raise BadInput(f"{again}: expected each run once, and under a name of its own")
-    return bench_of(word, model, checked_runs(drives, thin), list(map(str, effect_files)), numbers, searches)
+    return drives
 
 
 def _on_a_road(run: Run) -> drive_file.DriveOnRoad:

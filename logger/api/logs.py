@@ -88,9 +88,9 @@ def read_log(path: Path | str) -> Log:
     True
     >>> moving = ~log.flagged("stationary", "slow")
     """
-    from logger.api.log_files import find_logs, read_logged
     from logger.report.summary import summarise
     from logger.report.terminal import screen
+    from logger.store.log.log_reader import find_logs, read_logged
 
     place = Path(path)
     files = [logged for log in find_logs(place) if (logged := read_logged(log, place)) is not None]

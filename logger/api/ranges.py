@@ -37,3 +37,10 @@ MOST_ROAD_SAMPLES = 20_000_000
 TRIES, WAVINESS = Range(0, 1000), Range(1.0, 3.5)
 """Of an identification: further starts, waviness of a road that was not measured."""
 NOISE_MODELS = ("auto", "white", "ar", "road")
+SPECTRUM, DECREMENT = "fft", "decrement"
+MODAL_METHODS = ("era", "ssi", "ssi-cov", "n4sid", "ar", "arx", "armax", SPECTRUM, DECREMENT)
+RESPONSES = ("decay", "random")
+"""Of modes: the methods, of which the last two know no poles, and what a record may be."""
+PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
+LOW_PASS = Range(1.0, 45.0, "Hz")
+"""Of a calibration: people more in the car, times the body's mass, and the recorder's low pass."""

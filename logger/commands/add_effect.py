@@ -16,7 +16,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress, tell_slow
+from logger.api.outputs import check_out
+from logger.commands.lab_model import add_bench_arguments, bench, progress, tell_slow
 from logger.commands.numbers import named_numbers
 from logger.errors import EXIT_DONE
 

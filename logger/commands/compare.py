@@ -16,7 +16,8 @@ import argparse
 import json
 from pathlib import Path
 
-from logger.commands.lab_model import add_tolerance, check_out, warned
+from logger.api.outputs import check_out
+from logger.commands.lab_model import add_tolerance, warned
 from logger.errors import EXIT_DONE
 from logger.files import write_text
 

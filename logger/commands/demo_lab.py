@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from zipfile import ZipFile
 
-from logger.commands.lab import STORY, say, silent, take, walk
+from logger.commands.lab import say, take, walk
 from logger.commands.lab_model import bench_from
 from logger.errors import BadInput
 from logger.files import naming
@@ -38,6 +38,7 @@ _EXPLAINED = {
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.bench import require_compiler
+    from logger.api.lab_loop import STORY, unsaid_lines
     from logger.demo.lab_drives import VEHICLE
     from logger.report.session_text import as_json as story_json
     from logger.store.formats.effect_file import shipped_effects
@@ -53,7 +54,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     if not as_json:
         print(paragraphs([_INTRODUCTION]))
     given = bench_from(VEHICLE, folders)
-    story = walk(given, out, take, silent if as_json else say, _EXPLAINED)
+    story = walk(given, out, take, unsaid_lines if as_json else say, _EXPLAINED)
     if as_json:
         print(json.dumps(story_json(story) | {"story": str(out / STORY)}, allow_nan=False))
     else:

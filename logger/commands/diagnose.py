@@ -17,7 +17,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.commands.lab_model import add_bench_arguments, bench, check_out, progress
+from logger.api.outputs import check_out
+from logger.commands.lab_model import add_bench_arguments, bench, progress
 from logger.errors import EXIT_DONE
 from logger.files import write_text
 from logger.report.text_layout import paragraphs
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
     given = bench(args, searches="ridelog diagnose")
     if args.out is not None:
         check_out(args.out, args.runs, given.files_read)
-    found = diagnosed(given)
+    with progress() as tell:
+        found = given.diagnosed(tell)
     if args.out is not None:
         from logger.report.diagnosis_page import page
 
@@ -64,12 +66,6 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         print(f"\nPage: {args.out}")
     return EXIT_DONE
-
-
-def diagnosed(given: Bench, left_out: frozenset[str] = frozenset()) -> Diagnosis:
-    """The diagnosis of a model, without some effects, with its progress on the screen."""
-    with progress() as tell:
-        return given.diagnosed(tell, left_out)
 
 
 def _compared(given: Bench) -> str:

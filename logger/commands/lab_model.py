@@ -1,9 +1,8 @@
-"""What the lab's commands share: their arguments, files to write, and progress on the screen."""
+"""What the lab's commands share: their arguments, and progress on the screen."""
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from logger.api.ranges import TOLERANCE, USUAL_TOLERANCE
 from logger.commands.numbers import add_number
-from logger.errors import BadInput
 from logger.report.text_layout import WIDTH
 
 if TYPE_CHECKING:
@@ -53,36 +51,6 @@ def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str
 
     numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
     return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned)
-
-
-def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option: str = "--out") -> None:
-    """Raise BadInput where a file to write is one of a run or another that is read, or cannot be written.
-
-    runs    their folders
-    """
-    from logger.store.formats.drive_file import DRIVE, PROFILE
-
-    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
-        raise BadInput(f"{option} {out}: expected a file that is none of a run's")
-    if out.resolve() in {path.resolve() for path in read}:
-        raise BadInput(f"{option} {out}: expected another file than those that are read")
-    if not out.parent.is_dir() or out.is_dir():
-        raise BadInput(f"{option} {out}: expected a file in a folder that there is")
-    if not _may_be_written(out):
-        raise BadInput(f"{option} {out}: expected a file that may be written")
-
-
-def _may_be_written(path: Path) -> bool:
-    """Whether a file can be written, as far as that shows without writing. What is there stays as it is; one that is
-    not there is made and taken away: permissions alone do not tell of all that root, or a file system, cannot do."""
-    if path.exists():
-        return os.access(path, os.W_OK)
-    try:
-        path.touch(exist_ok=False)
-        path.unlink()
-    except OSError:
-        return False
-    return True
 
 
 def warned(words: str) -> None:

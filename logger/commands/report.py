@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from logger.api.log_files import find_logs, read_logged
 from logger.errors import EXIT_DONE, BadInput
-from logger.report.page import LoggedFile, page
+from logger.files import replace_bytes
+from logger.report.page import page
 from logger.report.summary import summarise, summary_json
+from logger.store.log.log_reader import LoggedFile, find_logs, read_logged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,13 +46,8 @@ def write_report(logs: Sequence[Path], out: Path, place: Path | None = None) -> 
     files = [logged for log in logs if (logged := read_logged(log, place)) is not None]
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(map(str, logs))}: expected a log with at least one intact row")
-    new = out.with_name(out.name + ".new")
     try:
-        with new.open("w", encoding="utf-8", errors="xmlcharrefreplace") as file:
-            file.write(page(files))
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(out)
+        replace_bytes(out, page(files).encode("utf-8", "xmlcharrefreplace"))
     except OSError as error:
         raise BadInput(f"{out}: expected a place where a page can be written ({error.strerror})") from None
     return files

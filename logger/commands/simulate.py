@@ -22,8 +22,8 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.outputs import check_out
 from logger.api.ranges import ADDED, RATE, SPEED
-from logger.commands.lab_model import check_out
 from logger.commands.numbers import add_number, named_numbers
 from logger.errors import EXIT_DONE, BadInput
 

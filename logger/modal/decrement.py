@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.modal.mode import Array
+from logger.modal.mode import Array, FoundMode, ModalResult
 
 _BAND = (0.6, 1.4)  # of the strongest frequency
 _FADED = 0.1  # of the first peak: what is below is left to the noise
@@ -55,6 +55,14 @@ def log_decrement(samples: Array, rate_hz: float) -> Decrement:
     ratio = decrement / np.hypot(2 * np.pi, decrement)
     return Decrement(float(ratio), float(decrement_std / (2 * np.pi)), float(damped_hz / np.sqrt(1 - ratio**2)),
                      float(period_std_s * damped_hz**2), time_s, height)
+
+
+def decrement_mode(samples: Array, rate_hz: float) -> ModalResult:
+    """The same as the only mode of a record of one channel. ValueError as ``log_decrement``."""
+    found = log_decrement(samples, rate_hz)
+    mode = FoundMode(found.frequency_hz, found.damping_ratio, found.frequency_std_hz, found.damping_std,
+                     np.ones(1, np.complex128))
+    return ModalResult((mode,), (), 0, f"logarithmic decrement (Eq 5.2) over {len(found.peak_s)} peaks")
 
 
 def _alone(samples: Array, rate_hz: float) -> tuple[Array, float]:

@@ -83,6 +83,13 @@ def damping_ratio(poles: Complex) -> Array:
     return -poles.real / np.abs(poles)
 
 
+def pole_rows(result: ModalResult) -> Array:
+    """Order, frequency [Hz] and damping ratio of every pole of the diagram, (k, 3)."""
+    rows = [np.stack([np.full(len(one.poles), float(one.order)), frequency_hz(one.poles), damping_ratio(one.poles)], 1)
+            for one in result.diagram]
+    return np.concatenate([np.empty((0, 3)), *rows])
+
+
 def errors_of(pole: complex, covariance: Array) -> tuple[float, float]:
     """Standard deviations of frequency [Hz] and damping ratio from the covariance (2, 2) of Re s and Im s [rad/s]."""
     size = abs(pole)

@@ -1,9 +1,8 @@
 """The way on the ground as one SVG picture, coloured by class; no tiles, no network.
 
 Degrees become metres around the middle of the way (a degree of longitude shrinks with the cosine of the latitude),
-which is right to a part in a thousand for a day's drive. Rows are joined when the next begins where the last ended
-and lies near it; what is not joined is a gap, and stays one. Rows of one class in a row are one line, whose points are
-left out where they lie within a third of a pixel of it.
+which is right to a part in a thousand for a day's drive. Between rows that are not joined there is a gap. Rows of one
+class in a row are one line, whose points are left out where they lie within a third of a pixel of it.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from logger.geodesy import east_and_north_m
 from logger.records import WindowRecord
 from logger.report.charts import WIDTH, nice_step, numbered_mark
 from logger.report.html import Html, concatenated, html
-from logger.report.summary import Place, apart_m, length_m
+from logger.report.summary import Place
+from logger.store.log.log_reader import joined
 
 _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
 _LEAST_SPAN_M = 50.0
 _TOLERANCE = 0.3
-_JOIN_M = 0.5
 
 Point = tuple[float, float]
 
@@ -55,29 +54,6 @@ def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], 
     parts += [_scale_bar(projection), _north()]
     return html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the way">{}</svg>', WIDTH,
                 projection.height, concatenated(parts))
-
-
-def joined(records: Sequence[WindowRecord]) -> list[list[WindowRecord]]:
-    """Rows with a position, in stretches without a gap."""
-    pieces: list[list[WindowRecord]] = []
-    last: WindowRecord | None = None
-    for record in records:
-        if record.lat_deg is None or record.lon_deg is None:
-            last = None
-            continue
-        if last is None or not _follows(last, record):
-            pieces.append([])
-        pieces[-1].append(record)
-        last = record
-    return pieces
-
-
-def _follows(last: WindowRecord, record: WindowRecord) -> bool:
-    if last.distance_end_m is None or record.distance_start_m is None or last.drive != record.drive:
-        return False
-    ground_m = apart_m(last, record)
-    near_m = 5 * max(length_m(last), length_m(record))
-    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and ground_m is not None and ground_m < near_m
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
@@ -25,11 +24,8 @@ from logger.report.summary import (
     DriveSummary,
     Place,
     Share,
-    along_m,
     class_limits_m_per_km,
-    split_drives,
     summarise,
-    utc,
 )
 from logger.report.terminal import (
     class_words,
@@ -40,6 +36,7 @@ from logger.report.terminal import (
     place_words,
     span_words,
 )
+from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
 MAX_TABLE_ROWS = 5000
 _MAX_SIDECARS = 10
@@ -63,16 +60,6 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
-
-
-@dataclass(frozen=True)
-class LoggedFile:
-    """One log file as it was read. ``sidecar`` None: it is missing or cannot be read."""
-
-    name: str
-    records: Sequence[WindowRecord]
-    damaged_lines: int
-    sidecar: Mapping[str, Any] | None
 
 
 def page(files: Sequence[LoggedFile]) -> Html:

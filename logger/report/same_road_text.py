@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from logger.lab.unknown_road.diagnosis import Found
 from logger.report.quantities import chance, finite, numbers_of
+from logger.report.text_layout import columns, paragraphs
 
 
 def summary(found: Found) -> list[str]:
@@ -43,6 +45,18 @@ def cannot_tell(found: Found) -> list[str]:
               "deviations."
               for name, deviations in found.hidden.items()]
     return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
+
+
+def same_road_lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
+    """What a person reads; ``most`` so many candidates, None: all."""
+    rows = [("Effect", "Error", "Chance", "Numbers")]
+    rows += [(one.one.effect.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
+              numbers_of(one.one)) for one in found.candidates[:most]]
+    by_run = [("Run", "Error before", "after"),
+              *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
+                zip(runs, found.by_run, strict=True))]
+    return [paragraphs(summary(found)), "", "Each tried by itself, those that are missing first:", *columns(rows), "",
+            *columns(by_run), "", "What these drives cannot tell:", paragraphs(cannot_tell(found), "- ")]
 
 
 def as_json(found: Found) -> dict[str, Any]:

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime, timedelta
-from itertools import accumulate
 from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
-from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
+from logger.store.log.log_reader import along_m, apart_m, end_utc_us, iso_utc, length_m, split_drives
 
 APART_M = 50.0
 PLACES = 5
@@ -32,7 +30,6 @@ COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 """ISO 2631 words, best first."""
 
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -124,53 +121,6 @@ def summary_json(summary: DriveSummary) -> dict[str, Any]:
         for key in [key for key in entry if key.endswith("utc_us")]:
             entry[key.removesuffix("_us")] = iso_utc(entry.pop(key))
     return fields
-
-
-def split_drives(records: Iterable[WindowRecord]) -> list[list[WindowRecord]]:
-    """Rows drive by drive. A new drive begins where its number changes or the rows are counted anew."""
-    drives: list[list[WindowRecord]] = []
-    last: WindowRecord | None = None
-    for record in records:
-        if last is None or record.drive != last.drive or record.segment <= last.segment:
-            drives.append([])
-        drives[-1].append(record)
-        last = record
-    return drives
-
-
-def length_m(record: WindowRecord) -> float:
-    """Length of a window [m]; 0 for one by time."""
-    if record.distance_start_m is None or record.distance_end_m is None:
-        return 0.0
-    return record.distance_end_m - record.distance_start_m
-
-
-def along_m(records: Sequence[WindowRecord]) -> list[float]:
-    """Distance from the first row's start to each row's middle, through all rows [m]."""
-    lengths_m = [length_m(record) for record in records]
-    return [end - length / 2 for end, length in zip(accumulate(lengths_m), lengths_m, strict=True)]
-
-
-def apart_m(one: WindowRecord | Place, other: WindowRecord | Place) -> float | None:
-    """Distance on the ground between two places some kilometres apart at most [m]; None when one has no position."""
-    if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
-        return None
-    return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
-
-
-def end_utc_us(record: WindowRecord) -> int | None:
-    """UTC at the end of a window [us]."""
-    return None if record.utc_us is None else record.utc_us + round(record.duration_s * 1e6)
-
-
-def utc(utc_us: int) -> datetime:
-    """An instant as a date and time."""
-    return _EPOCH + timedelta(microseconds=utc_us)
-
-
-def iso_utc(utc_us: int | None) -> str | None:
-    """An instant as ISO 8601 with milliseconds."""
-    return None if utc_us is None else utc(utc_us).replace(tzinfo=None).isoformat(timespec="milliseconds") + "Z"
 
 
 def class_limits_m_per_km(letter: str) -> tuple[float | None, float | None]:

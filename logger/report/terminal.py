@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from logger.report.summary import IRI_CLASSES, DriveSummary, Place, Share, class_limits_m_per_km, utc
+from logger.report.summary import IRI_CLASSES, DriveSummary, Place, Share, class_limits_m_per_km
+from logger.store.log.log_reader import utc
 
 _BAR_CELLS = 30
 _EIGHTHS = " ▏▎▍▌▋▊▉█"

@@ -20,6 +20,7 @@ import logger.api
 import ridelog
 
 MODULES = [importlib.import_module(f"logger.api.{one.name}") for one in pkgutil.iter_modules(logger.api.__path__)]
+SLOW = ("logger.api.lab_loop", "logger.api.same_road")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,8 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
     return {"folder": folder, "recording": short_dump, "car": car, "runs": runs, "np": np, **vars(ridelog)}
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [
+    pytest.param(one, marks=pytest.mark.slow if one.__name__ in SLOW else (), id=one.__name__) for one in MODULES])
 def test_examples(module: ModuleType, names: dict[str, Any]) -> None:
     found = doctest.testmod(module, extraglobs=names, optionflags=doctest.ELLIPSIS)
     assert found.failed == 0
@@ -66,6 +68,8 @@ def test_what_is_wrong_is_one_line_and_nothing_is_printed(
     car, run = names["car"], names["runs"][0]
     bare = ridelog.make_run(run.accel_z_mps2, run.speed_mps, rate_hz=100.0, name="bare")
     (tmp_path / "wrong.csv").write_text("nothing\n", "ascii")
+    ridelog.write_vehicle(tmp_path / "vehicle-1.yaml", car)
+    channels = ridelog.make_channels({"a": np.arange(200.0) % 7}, rate_hz=100.0)
     asked: list[Callable[[], object]] = [
         lambda: ridelog.read_vehicle("nobody"), lambda: ridelog.read_run(tmp_path), lambda: ridelog.read_log(tmp_path),
         lambda: ridelog.read_dump(tmp_path / "wrong.csv"), lambda: ridelog.read_profile(tmp_path / "wrong.csv"),
@@ -78,6 +82,17 @@ def test_what_is_wrong_is_one_line_and_nothing_is_printed(
         lambda: ridelog.compare(car, run, tolerance=2.0),
         lambda: ridelog.diagnose(car, run, candidates=["magic"]),
         lambda: ridelog.add_effect("payload", car.with_effect("payload"), run),
+        lambda: ridelog.calibrate(car, window_m=0.0), lambda: ridelog.calibrate(car, low_pass_hz=60.0),
+        lambda: ridelog.calibrate(car.with_effect("wheel_lift")), lambda: ridelog.read_channels(tmp_path / "wrong.csv"),
+        lambda: ridelog.make_channels({"a": [1.0, 2.0], "b": [1.0]}, rate_hz=100.0),
+        lambda: ridelog.make_channels({"a": [1.0, 2.0]}, rate_hz=0.0),
+        lambda: ridelog.modes(channels, "magic"), lambda: ridelog.modes(channels, columns=["c"]),
+        lambda: ridelog.modes(channels, "n4sid", input_column="c"), lambda: ridelog.modes(channels, from_s=9.0),
+        lambda: ridelog.modes(channels, "fft", order=4), lambda: ridelog.modes(channels, response="loud"),
+        lambda: ridelog.diagnose_same_road(car, run),
+        lambda: ridelog.diagnose_same_road(car, [run, names["runs"][1]], candidates=["magic"]),
+        lambda: ridelog.lab(car, run, tmp_path / "wrong.csv", candidates=["payload"]),
+        lambda: ridelog.lab(tmp_path / "vehicle-1.yaml", run, tmp_path, candidates=["payload"]),
     ]
     for ask in asked:
         with pytest.raises(ridelog.BadInput) as refused:
@@ -101,7 +116,9 @@ def test_each_record_shows_itself(names: dict[str, Any]) -> None:
     run, folder = names["runs"][0], names["folder"]
     shown = [run, run.profile, names["car"], ridelog.iri(run.profile), ridelog.estimate(run, "rav4-2009"),
              ridelog.comfort(run), ridelog.read_log(folder), ridelog.read_dump(names["recording"]),
-             ridelog.effects(), ridelog.effects()["roll"], ridelog.compare(names["car"], names["runs"])]
+             ridelog.effects(), ridelog.effects()["roll"], ridelog.compare(names["car"], names["runs"]),
+             ridelog.calibrate(names["car"]), ridelog.read_channels(folder / "drive.csv", ["accel_z_mps2"]),
+             ridelog.modes(folder / "drive.csv", columns=["accel_z_mps2"])]
     for one in shown:
         assert 2 <= len(repr(one).splitlines()) <= 60
         html = one._repr_html_()
@@ -120,20 +137,81 @@ def test_a_long_run_is_drawn_with_its_peaks_and_few_points() -> None:
     assert len(run._repr_html_()) < 200_000
 
 
-@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare"])
+@pytest.mark.parametrize("command", ["iri", "comfort", "estimate", "identify", "compare", "modes"])
 def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     from logger.commands.main import main
 
     folder = names["folder"]
-    file = {"iri": folder / "profile.csv", "comfort": folder / "drive.csv"}.get(command, folder)
-    more = {"iri": [], "comfort": [], "identify": ["--vehicle", "rav4-2009", "--free", "sprung_mass_kg"]}.get(
-        command, ["--vehicle", "rav4-2009"])
+    file = {"iri": folder / "profile.csv", **dict.fromkeys(("comfort", "modes"), folder / "drive.csv")}.get(
+        command, folder)
+    more = {"iri": [], "comfort": [], "modes": ["--columns", "accel_z_mps2"],
+            "identify": ["--vehicle", "rav4-2009", "--free", "sprung_mass_kg"]}.get(command, ["--vehicle", "rav4-2009"])
     assert main([command, str(file), *more, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     found = {"iri": lambda: ridelog.iri(file), "comfort": lambda: ridelog.comfort(file),
              "estimate": lambda: ridelog.estimate(file, "rav4-2009"),
              "identify": lambda: ridelog.identify("rav4-2009", file, ["sprung_mass_kg"]),
-             "compare": lambda: ridelog.compare("rav4-2009", file)}[command]()
+             "compare": lambda: ridelog.compare("rav4-2009", file),
+             "modes": lambda: ridelog.modes(file, columns=["accel_z_mps2"])}[command]()
     assert json.loads(json.dumps(found.as_json())) == printed
     assert main([command, str(file), *more]) == 0
     assert capsys.readouterr().out.rstrip() == repr(found).rstrip()
+
+
+def test_a_calibration_is_the_commands(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from logger.commands.main import main
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    told: list[str] = []
+    found = ridelog.calibrate("rav4-2009", passengers=2, progress=told.append)
+    again = ridelog.calibrate("rav4-2009", passengers=2, progress=told.append)
+    assert ["computed in" in words for words in told] == [True, True, False, False]
+    assert "found in" in told[2] and again.as_json() == found.as_json()
+    assert main(["calibrate", "--vehicle", "rav4-2009", "--passengers", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found.as_json()
+    plain = ridelog.calibrate(ridelog.read_vehicle("rav4-2009"), progress=told.append)
+    assert told[-1].endswith("not kept") and [path.name for path in tmp_path.iterdir()] == ["ridelog"]
+    assert (found.accel_rms_per_root_gd.slope < plain.accel_rms_per_root_gd.slope).all()
+    assert found.sprung_mass_kg > plain.sprung_mass_kg
+
+
+@pytest.mark.slow
+def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> None:
+    asked: list[str] = []
+    story = ridelog.lab(names["car"], names["runs"], tmp_path, candidates=["sensor_gain", "time_offset"],
+                        ask=asked.append)
+    assert asked == ["sensor_gain"] and story.refused == ("sensor_gain",) and story.additions == ()
+    assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
+    assert "left out as you wished" in repr(story) and story.model.effects == ()
+    with pytest.raises(ridelog.BadInput, match="expected one of sensor_gain, time_offset"):
+        ridelog.lab(names["car"], names["runs"], tmp_path, candidates=["sensor_gain", "time_offset"],
+                    ask=lambda _: "rust")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [["diagnose", "--same-road", "--all"], ["lab"]], ids=["same road", "lab"])
+def test_a_search_is_the_commands(
+    more: list[str], names: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from logger.commands.main import main
+    from logger.store.formats.effect_file import shipped_effects
+
+    few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset")}
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
+    folders = [tmp_path / "slow", tmp_path / "fast"]
+    for folder, run in zip(folders, names["runs"], strict=True):
+        ridelog.write_run(folder, run)
+    out = [] if "--same-road" in more else ["--out", str(tmp_path / "lab")]
+    assert main([*more, "--vehicle", "rav4-2009", *map(str, folders), *out, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = ridelog.lab("rav4-2009", folders, tmp_path / "lab") if out else ridelog.diagnose_same_road(
+        "rav4-2009", folders)
+    assert json.loads(json.dumps(found.as_json())) == printed
+    assert found.figures() and found._repr_html_().count("<svg") == 1
+    if not out:
+        assert list(found.run_errors) == list(map(str, folders)) and found.cannot_tell
+        assert main([*more, "--vehicle", "rav4-2009", *map(str, folders)]) == 0
+        assert capsys.readouterr().out.rstrip() == repr(found)

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.outputs import check_out
 from logger.api.run_checks import lab_runs
-from logger.commands.lab_model import check_out
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track

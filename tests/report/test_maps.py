@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from logger.report.maps import Colouring, joined, simplified, track_map
+from logger.report.maps import Colouring, simplified, track_map
 from logger.report.summary import summarise
 
 BY_CLASS = Colouring("by-iri", lambda record: f"s{'ABCDEFGH'.find(record.iri_class or '?')}")
@@ -46,23 +46,9 @@ def test_the_scale_bar_is_as_long_as_it_says(drive) -> None:
     assert float(bar[1]) / said_m == pytest.approx(abs(bottom - top) / 3990.0, rel=0.005)
 
 
-@pytest.mark.parametrize(("changes", "pieces"), [
-    ({}, [20]),
-    ({7: {"lat_deg": None}}, [7, 12]),
-    ({7: {"distance_start_m": 75.0}}, [7, 13]),
-    ({7: {"distance_end_m": None, "distance_start_m": None}}, [7, 1, 12]),
-    ({7: {"lon_deg": 7.5}}, [7, 1, 12]),
-])
-def test_gaps_are_not_joined(drive, changes, pieces: list[int]) -> None:
-    rows = drive(20, changes)
-    assert [len(piece) for piece in joined(rows)] == pieces
-    assert len(lines(track_map(rows, (BY_CLASS,), ()))) == len(pieces)
-
-
-def test_another_drive_is_not_joined(drive) -> None:
-    first = drive(5)
-    second = drive(10, number=2)[5:]
-    assert [len(piece) for piece in joined([*first, *second])] == [5, 5]
+@pytest.mark.parametrize(("changes", "pieces"), [({}, 1), ({7: {"lat_deg": None}}, 2)])
+def test_gaps_are_not_drawn(drive, changes, pieces: int) -> None:
+    assert len(lines(track_map(drive(20, changes), (BY_CLASS,), ()))) == pieces
 
 
 def test_each_row_has_the_colour_of_its_class(drive) -> None:

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from logger.commands import main
 from logger.commands import report as report_command
 from logger.errors import BadInput
-from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, LoggedFile, page
+from logger.report.page import FLAG_MEANINGS, MAX_TABLE_ROWS, page
+from logger.store.log.log_reader import LoggedFile
 from logger.store.log.row_format import COLUMNS, HEADER, format_row
 
 SIDECAR: dict[str, Any] = {"ridelog_version": "1.2", "sensor": {"driver": "bma220", "verified": True},

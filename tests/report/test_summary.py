@@ -5,15 +5,7 @@ from math import inf, sqrt
 
 import pytest
 
-from logger.report.summary import (
-    IRI_CLASSES,
-    along_m,
-    apart_m,
-    class_limits_m_per_km,
-    split_drives,
-    summarise,
-    summary_json,
-)
+from logger.report.summary import IRI_CLASSES, class_limits_m_per_km, summarise, summary_json
 from logger.roads.iso8608 import iri_class
 
 
@@ -47,7 +39,6 @@ def test_a_window_by_time_has_no_length(drive) -> None:
     assert (summary.distance_m, summary.duration_s, summary.blind_s) == (20.0, 6.0, 5.0)
     assert summary.mean_speed_mps == 20.0
     assert summary.flags == {"blind": 1}
-    assert along_m(drive(3, {1: blind})) == [5.0, 10.0, 15.0]
 
 
 def test_times_are_of_the_first_and_last_row_that_have_one(drive) -> None:
@@ -84,7 +75,6 @@ def test_a_doubtful_window_is_no_rough_place(drive, flag: str) -> None:
 
 def test_drives_are_told_apart_by_their_number_or_a_new_count(drive) -> None:
     rows = [*drive(3), *drive(2, number=2), *drive(4, number=2)]
-    assert [len(rows) for rows in split_drives(rows)] == [3, 2, 4]
     assert summarise(rows).drives == 3
 
 
@@ -92,13 +82,6 @@ def test_nothing_at_all_is_a_summary_too() -> None:
     summary = summarise([])
     assert (summary.windows, summary.distance_m, summary.mean_iri_m_per_km, summary.iri_classes) == (0, 0, None, ())
     assert summary_json(summary)["start_utc"] is None
-
-
-def test_ground_distance_is_that_of_the_sphere(drive) -> None:
-    one, other = drive(2, {0: {"lat_deg": 60.0, "lon_deg": 179.9}, 1: {"lat_deg": 60.0, "lon_deg": -179.9}})
-    quarter_degree_m = 2 * 3.141592653589793 * 6_371_008.8 * 0.2 / 360 * 0.5
-    assert apart_m(one, other) == pytest.approx(quarter_degree_m, rel=1e-5)
-    assert apart_m(*drive(2)) == pytest.approx(10.0, rel=1e-4)
 
 
 @pytest.mark.parametrize("letter", IRI_CLASSES)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from logger.errors import BadInput
 from logger.profiles.track import Track
+from logger.report.quantities import unit_of
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import check_on, shipped_effects
@@ -29,8 +30,8 @@ from logger.vehicle.vehicle import Vehicle
 from logger.vehicle.watched_effect import watched
 
 EFFECTS = shipped_effects()
-UNITS = ("_m", "_kg", "_hz", "_s", "_n", "_n_per_m", "_n_per_m3", "_n_s_per_m", "_m_per_s", "_kg_m2")
-BARE = ("ratio", "gain", "scale", "order", "participation", "move")  # without a unit
+BARE = ("ratio", "gain", "scale", "order", "participation", "move")
+"""Last words of numbers without a unit; any other name has to end in one that people can be shown."""
 HALF = read_vehicle(vehicle_file("rav4-2009"))
 QUARTER = Vehicle("one", "quarter_car", 430.0, None, replace(HALF.front, cg_distance_m=0.0), None, 0.25)
 CARS = {"quarter": QUARTER, "half": HALF, "full": read_vehicle(vehicle_file("rav4-2009-full"))}
@@ -64,7 +65,7 @@ def test_it_says_what_it_is(name: str) -> None:
     assert len(effect.shown_by.split()) >= 5
     assert len(effect.source.split()) >= 4
     for one in effect.parameters:
-        assert one.name.endswith(UNITS) or one.name.split("_")[-1] in BARE
+        assert unit_of(one.name) or one.name.split("_")[-1] in BARE
         assert one.null is None or one.low <= one.null <= one.high or one.null == np.inf
         assert one.null != np.inf or one.scale is Scale.RECIPROCAL
         assert one.start != one.null

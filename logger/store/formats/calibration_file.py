@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalibration
-from logger.files import read_bounded
+from logger.files import read_bounded, replace_bytes
 from logger.shipped import shipped
 from logger.store.formats.checksum import json_sha256
 from logger.vehicle.vehicle import Vehicle
@@ -112,13 +112,4 @@ def _speed(stored: dict[str, Any]) -> SpeedCalibration:
 def _replace(path: Path, stored: dict[str, tuple[SpeedCalibration, ...]]) -> None:
     calibrations = {key: [asdict(speed) for speed in speeds] for key, speeds in stored.items()}
     content = {"format": FORMAT, "sha256": json_sha256(calibrations), "calibrations": calibrations}
-    new = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with new.open("w", encoding="ascii") as file:
-            file.write(json.dumps(content, indent=1, allow_nan=False) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
-    except OSError:
-        new.unlink(missing_ok=True)
-        raise
+    replace_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode("ascii"))

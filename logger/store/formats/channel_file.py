@@ -56,7 +56,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     for column, name in enumerate(wanted[1:]):
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
             raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
-                           f"choose columns with --columns")
+                           "leave its column out")
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 

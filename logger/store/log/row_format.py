@@ -57,7 +57,8 @@ class Column:
     largest: float = 0.0
 
 
-def _write_utc(utc_us: int | None) -> str:
+def write_utc(utc_us: int | None) -> str:
+    """An instant [us since 1970] as ISO 8601 with milliseconds; nothing where it is not known, or from 2200 on."""
     if utc_us is None or not 0 <= utc_us < _LATEST_US:
         return ""
     return (_EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds") + "Z"
@@ -144,7 +145,7 @@ def _word(name: str) -> Column:
 
 COLUMNS = (
     _count("segment"),
-    Column("t_utc", "utc_us", _write_utc, _read_utc),
+    Column("t_utc", "utc_us", write_utc, _read_utc),
     _seconds_of_us("t_s", "t_us"),
     _number("distance_start_m", 3),
     _number("distance_end_m", 3),

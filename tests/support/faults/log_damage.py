@@ -8,9 +8,9 @@ import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from logger.api.log_files import read_logged
 from logger.records import WindowRecord
 from logger.store.log.disk_quota import DiskQuota, Limits
+from logger.store.log.log_reader import read_logged
 from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
 

@@ -1,4 +1,4 @@
-"""ridelog in Python: read, simulate, compare, diagnose, identify, estimate.
+"""ridelog in Python: read, simulate, compare, diagnose, identify, estimate, calibrate.
 
     import ridelog
 
@@ -11,12 +11,16 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 ``docs/notebook.md`` goes through the lab.
 """
 
+from logger.api.calibration import Calibration, Slopes, calibrate
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
 from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
+from logger.api.lab_loop import LabStory, lab
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
+from logger.api.modal import Channels, Modes, make_channels, modes, read_channels
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
+from logger.api.same_road import SameRoadDiagnosis, diagnose_same_road
 from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
@@ -24,7 +28,9 @@ from logger.identification.identifiability import NotIdentifiable
 __all__ = [
     "AddedEffect",
     "BadInput",
+    "Calibration",
     "Candidate",
+    "Channels",
     "Comfort",
     "Comparison",
     "Diagnosis",
@@ -34,26 +40,36 @@ __all__ = [
     "Estimate",
     "Identification",
     "Iri",
+    "LabStory",
     "Log",
     "Model",
+    "Modes",
     "NotIdentifiable",
     "Profile",
     "Record",
     "RoadClass",
     "Run",
+    "SameRoadDiagnosis",
     "Samples",
     "ShiftedNumber",
+    "Slopes",
     "add_effect",
+    "calibrate",
     "classify",
     "comfort",
     "compare",
     "diagnose",
+    "diagnose_same_road",
     "effects",
     "estimate",
     "identify",
     "iri",
+    "lab",
+    "make_channels",
     "make_run",
+    "modes",
     "random_road",
+    "read_channels",
     "read_dump",
     "read_log",
     "read_profile",

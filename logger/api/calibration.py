@@ -1,0 +1,195 @@
+"""How much a vehicle shakes on roads of known roughness."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.bench import Tell, unsaid
+from logger.api.ranges import LOW_PASS, MASS_FACTOR, PASSENGERS, SEED
+from logger.api.shown import CommandResult
+from logger.api.vehicles import Model
+from logger.errors import BadInput
+from logger.shipped import vehicle_path
+from logger.store.formats import vehicle_file
+from logger.units import WINDOW_M
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.estimation.rms_calibration import Settings, SpeedCalibration
+    from logger.report.calibration_text import Calibrated
+    from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Lines through the origin, one for each of s speeds.
+
+    slope             (s,)
+    standard_error    (s,) of the slope, from how the roads differ among themselves
+    spread            (s,) 68 of 100 points lie within this share of the line
+    r2                (s,) share of the variance that the line explains
+    """
+
+    slope: Array
+    standard_error: Array
+    spread: Array
+    r2: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(CommandResult):
+    """A vehicle's relations between roughness and vibration at s speeds.
+
+    sprung_mass_kg              of the car as it was driven, with its load [kg]
+    speed_mps                   (s,) 10, 20 ... 70 mph [m/s]
+    iri_per_accel_rms           whole roads: IRI per r.m.s. acceleration [m/km per m/s2]
+    window_iri_per_accel_rms    the same for windows: their own IRI and their own r.m.s.
+    accel_rms_per_root_gd       whole roads: r.m.s. per root of Gd(n0) [m/s2 per cm^1.5]
+    a_w_per_iri                 whole roads: Wk-weighted r.m.s. per IRI [m/s2 per m/km]
+    """
+
+    sprung_mass_kg: float
+    speed_mps: Array
+    iri_per_accel_rms: Slopes
+    window_iri_per_accel_rms: Slopes
+    accel_rms_per_root_gd: Slopes
+    a_w_per_iri: Slopes
+
+    def charts(self) -> Sequence[Chart]:
+        """IRI per r.m.s. acceleration over the speed, of whole roads and of windows."""
+        from logger.chart_data import Curves, Line
+
+        return [Curves("Calibration", "speed [m/s]", "IRI per r.m.s. [m/km per m/s2]", tuple(
+            Line(name, self.speed_mps, one.slope, one.slope * one.spread)
+            for name, one in (("roads", self.iri_per_accel_rms), ("windows", self.window_iri_per_accel_rms))))]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a vehicle; as of ``calibrate``.
+
+    said    how a window's length is written in a complaint
+    """
+
+    window_m: float = WINDOW_M
+    low_pass_hz: float | None = None
+    passengers: int = 0
+    sprung_mass_factor: float = 1.0
+    seed: int = 1
+    recompute: bool = False
+    said: str = "window_m"
+
+
+def calibrate(
+    vehicle: Model | Path | str, *, window_m: float = WINDOW_M, low_pass_hz: float | None = None, passengers: int = 0,
+    sprung_mass_factor: float = 1.0, seed: int = 1, recompute: bool = False, progress: Tell = unsaid,
+) -> Calibration:
+    """How much a vehicle shakes on roads of known roughness: its model drives over random roads of IRI 1 to 10 m/km, at
+    10 to 70 mph.
+
+    vehicle               without effects; a model, or a name or file as in ``read_vehicle``. What is found of a name or
+                          a file is kept beside the file or in the user's cache, and taken from there the next time
+    window_m              length of a window, 2 to 200 [m]; 25 ft by default
+    low_pass_hz           of the recorder's settings, 1 to 45 [Hz]; None: none
+    passengers            people of 75 kg more in the car; a half car gets half of their mass, a quarter car a quarter
+    sprung_mass_factor    so many times the body's mass, 0.2 to 10
+    seed                  another number, other roads
+    recompute             do not look for a stored result
+    progress              told where the result is from
+
+    Raises BadInput for numbers out of range, a vehicle with effects, and as ``read_vehicle``. Source: Blum 2015,
+    section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
+
+    >>> found = calibrate(car)
+    >>> found.iri_per_accel_rms.slope.round(1).tolist()
+    [27.9, 18.2, 13.3, 10.9, 9.5, 7.9, 7.1]
+    """
+    from logger.report.calibration_text import as_json, lines
+
+    LOW_PASS.check("low_pass_hz", LOW_PASS.low if low_pass_hz is None else low_pass_hz)
+    PASSENGERS.check("passengers", passengers)
+    MASS_FACTOR.check("sprung_mass_factor", sprung_mass_factor)
+    SEED.check("seed", seed)
+    question = Question(window_m, low_pass_hz, passengers, sprung_mass_factor, seed, recompute)
+    if isinstance(vehicle, Model):
+        if vehicle.effects:
+            raise BadInput(f"{vehicle.vehicle.name}: expected a vehicle without effects")
+        found = calibrated(vehicle.vehicle, None, question, progress)
+    else:
+        path = vehicle_path(str(vehicle))
+        found = calibrated(vehicle_file.read_vehicle(path), path, question, progress)
+    summary, speeds = as_json(found), found.speeds
+    return Calibration(
+        "\n".join(lines(found)), summary, summary["sprung_mass_kg"], np.array([one.speed_mps for one in speeds]),
+        *(_slopes(speeds, name) for name in (
+            "iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri")))
+
+
+def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
+    lines = [getattr(one, name) for one in speeds]
+    return Slopes(*(np.array([getattr(line, one.name) for line in lines]) for one in fields(Slopes)))
+
+
+def calibrated(vehicle: Vehicle, path: Path | None, question: Question, tell: Tell = unsaid) -> Calibrated:
+    """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has.
+
+    path    of the vehicle's file, beside which they are kept; None: nowhere
+    tell    told where they are from
+    """
+    from logger.estimation.rms_calibration import Settings, loaded
+    from logger.report.calibration_text import Calibrated, Load
+    from logger.service.signal_chain import recorder_gain
+
+    try:
+        settings = Settings(window_m=question.window_m, seed=question.seed)
+    except ValueError as error:
+        raise BadInput(f"{question.said}: {error}") from None
+    ask = _Ask(path, recorder_gain(question.low_pass_hz), settings, question.recompute, tell)
+    plain = _answer(ask, vehicle, vehicle.name)
+    people, factor = question.passengers, question.sprung_mass_factor
+    if not people and factor == 1.0:
+        return Calibrated(vehicle, settings, plain, None)
+    heavy = loaded(vehicle, people, factor)
+    with_load = _answer(ask, heavy, f"{vehicle.name} with its load")
+    return Calibrated(vehicle, settings, plain,
+                      Load(people, factor, vehicle.sprung_mass_kg, heavy.sprung_mass_kg, with_load))
+
+
+@dataclass(frozen=True)
+class _Ask:
+    """What is asked of a vehicle, where an answer may lie, and who is told where it was."""
+
+    path: Path | None
+    gain: Callable[[Array], Array]
+    settings: Settings
+    recompute: bool
+    tell: Tell
+
+
+def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, ...]:
+    """The stored calibration of this vehicle, or a new one, which is then stored."""
+    from logger.estimation import rms_calibration
+    from logger.store.formats.calibration_file import find, fingerprint, keep, places
+
+    kept_in, key = () if ask.path is None else places(ask.path), fingerprint(vehicle, ask.gain, ask.settings)
+    found = None if ask.recompute else find(kept_in, key)
+    if found is not None:
+        ask.tell(f"{title}: found in {found.path}")
+        return found.speeds
+    started_s = time.perf_counter()
+    speeds = rms_calibration.calibrate(vehicle, ask.gain, ask.settings)
+    took_s = time.perf_counter() - started_s
+    path = keep(kept_in, key, speeds)
+    where = (f"kept in {path}" if path else "not kept" if not kept_in else
+             f"not kept: {' or '.join(map(str, kept_in))} cannot be written")
+    ask.tell(f"{title}: computed in {took_s:.1f} s, {where}")
+    return speeds

@@ -1,0 +1,239 @@
+"""The lab's whole loop: compare, diagnose, add what is missing, compare again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from logger.api.bench import Bench, Tell, among, unsaid
+from logger.api.lab import (
+    AddedEffect,
+    Comparison,
+    Diagnosis,
+    Runs,
+    addition_of,
+    bench_with,
+    comparison_of,
+    diagnosis_of,
+)
+from logger.api.outputs import check_out
+from logger.api.ranges import USUAL_TOLERANCE
+from logger.api.shown import CommandResult
+from logger.api.vehicles import Model, model_of, read_vehicle
+from logger.errors import BadInput
+from logger.files import write_text
+from logger.report.text_layout import columns, paragraphs
+from logger.store.formats import vehicle_file as vehicle_format
+
+if TYPE_CHECKING:
+    from logger.lab import compare, diagnosis
+    from logger.lab.session import Round, Story
+    from logger.report.html import Html
+    from logger.vehicle.effect import Chosen
+
+STORY = "story.html"
+MOST_ROUNDS = 6
+_SHOWN = 5
+
+Say = Callable[[Iterable[str]], None]
+Ask = Callable[[Bench, str], str | None]
+"""Which effect to add where one was found missing: its name or another's, or None for none."""
+Progress = Callable[[], AbstractContextManager[Tell]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LabStory(CommandResult):
+    """What the loop came to.
+
+    model                with all that was added, as the last file has it
+    first                comparison of the model as it was given
+    diagnoses            at least one
+    additions            effects that were added, in order, and ``comparisons`` with them
+    refused              effects that were found missing and not wanted
+    error_before         of the model as it was given; ``error_after`` of the last one, refitted
+    noise_floor_error    that the sensor's noise alone makes
+    steps                models on the way, each with its error on all samples
+    page                 the file that tells all of it
+    """
+
+    model: Model
+    first: Comparison
+    diagnoses: tuple[Diagnosis, ...]
+    additions: tuple[AddedEffect, ...]
+    comparisons: tuple[Comparison, ...]
+    refused: tuple[str, ...]
+    error_before: float
+    error_after: float
+    noise_floor_error: float
+    steps: tuple[tuple[str, float], ...]
+    page: Path
+
+    def figures(self) -> list[Html]:
+        """How the error fell."""
+        from logger.report.diagnosis_page import falling
+
+        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+
+
+def lab(
+    vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
+    candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
+    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
+) -> LabStory:
+    """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is, six effects at
+    most. It takes minutes, and the compiler of the ``lab`` extra.
+
+    vehicle, runs, tolerance    as in ``compare``
+    out             folder for a vehicle file of each step (``vehicle-1.yaml``) and the page ``story.html``
+    ask             given the name of an effect that was found missing, gives that of the one to be added, or None for
+                    none; without it all that is missing is added
+    candidates, effect_files, progress    as in ``diagnose``
+
+    Raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer that is no
+    effect; OSError for files that cannot be written.
+
+    >>> story = lab(car, runs, folder / "lab", candidates=["sensor_gain", "time_offset"])
+    >>> [one.effect for one in story.additions], story.comparisons[-1].missing
+    (['sensor_gain'], False)
+    >>> [one.effect.name for one in read_vehicle(folder / "lab" / "vehicle-1.yaml").effects]
+    ['sensor_gain']
+    """
+    from logger.report.session_text import as_json, ending
+
+    place = Path(out)
+    bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab")
+    bench = replace(bench, effects=among(bench.effects, candidates))
+    make_ready(bench, place)
+    story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress))
+    rows = [(words, f"{error:.3f}") for words, error in story.steps]
+    summary = as_json(story) | {"story": str(place / STORY)}
+    return LabStory(
+        "\n".join([*columns([("Model", "Error"), *rows]), "", paragraphs(ending(story))]), summary, model_of(model),
+        comparison_of(story.first), tuple(map(diagnosis_of, story.diagnoses)),
+        tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
+        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused, summary["error_before"],
+        summary["error_after"], summary["noise_floor_error"], tuple(story.steps), place / STORY)
+
+
+def _asking(ask: Callable[[str], str | None]) -> Ask:
+    def wanted(given: Bench, name: str) -> str | None:
+        answer = ask(name)
+        if answer is not None and answer != name:
+            if answer not in given.effects:
+                raise BadInput(f"{answer}: expected one of {', '.join(given.effects)}")
+            given.asked_for(answer, {}, answer)
+        return answer
+
+    return wanted
+
+
+def unsaid_lines(_lines: Iterable[str]) -> None:
+    """Lines that nobody is told."""
+
+
+def make_ready(given: Bench, out: Path, option: str = "") -> None:
+    """Make the folder for the files. BadInput where there cannot be one, and for files that are read, or cannot be
+    written; ``option``: how the folder was asked for."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise BadInput(f"{option} {out}: expected a folder".lstrip()) from None
+    for file in (out / STORY, *(_vehicle_file(out, number + 1) for number in range(MOST_ROUNDS))):
+        check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
+
+
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
+         explained: Mapping[str, str] | None = None) -> tuple[Story, vehicle_format.Model]:
+    """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
+
+    tell         told what was found
+    progress     around whatever takes its time, told what is under way
+    explained    what to tell of compare, diagnose, add and again, beside what they find
+    """
+    from logger.lab.session import Story
+    from logger.report.lab_text import addition_lines, diagnosis_lines
+    from logger.report.session_text import ending
+    from logger.report.story_page import page
+
+    why = explained or {}
+    tell(_chapter("Compare", why.get("compare")))
+    first = _compared(given, progress)
+    tell(_comparison_lines(first))
+    diagnoses: list[diagnosis.Diagnosis] = []
+    rounds: list[Round] = []
+    refused: list[str] = []
+    going = True
+    while going and len(rounds) < MOST_ROUNDS:
+        going = False
+        tell(_chapter("Diagnose", why.get("diagnose")))
+        diagnoses.append(_diagnosed(given, frozenset(refused), progress))
+        tell(diagnosis_lines(diagnoses[-1], _SHOWN))
+        for one in diagnoses[-1].missing:
+            if len(rounds) == MOST_ROUNDS:
+                break
+            wanted = ask(given, one.effect.name)
+            if wanted is None:
+                refused.append(one.effect.name)
+                continue
+            tell(_chapter(f"Add {wanted}", why.get("add")))
+            same = wanted == one.effect.name
+            start = one if same else _searched(given, wanted, progress)
+            made, model = _round(given, start, _vehicle_file(out, len(rounds) + 1), progress)
+            rounds.append(made)
+            tell([*addition_lines(rounds[-1].addition), "", f"Vehicle: {rounds[-1].file}"])
+            tell(_chapter("Compare again", why.get("again")))
+            tell(_comparison_lines(rounds[-1].comparison))
+            given = replace(given, model=model)
+            if not same:  # what is missing beside another effect is to be found anew
+                going = True
+                break
+    story = Story(first, tuple(diagnoses), tuple(rounds), tuple(refused))
+    write_text(out / STORY, page(story))
+    tell(_chapter("The end", why.get("end")))
+    tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
+    return story, given.model
+
+
+def _round(given: Bench, start: Chosen, file: Path, progress: Progress) -> tuple[Round, vehicle_format.Model]:
+    """Add an effect, write the vehicle and compare it; the model with it."""
+    from logger.lab.session import Round
+
+    with progress() as tell:
+        addition = given.added(start, len(start.effect.trials()), tell)
+    model = given.model_with(addition)
+    vehicle_format.write_model(file, model)
+    return Round(addition, _compared(replace(given, model=model), progress), str(file)), model
+
+
+def _vehicle_file(out: Path, number: int) -> Path:
+    return out / f"vehicle-{number}.yaml"
+
+
+def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
+    with progress() as tell:
+        return given.searched(given.effects[name], {}, tell)
+
+
+def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.Diagnosis:
+    with progress() as tell:
+        return given.diagnosed(tell, left_out)
+
+
+def _compared(given: Bench, progress: Progress) -> compare.Comparison:
+    with progress() as tell:
+        tell("comparing")
+        return given.compared()
+
+
+def _chapter(title: str, explained: str | None) -> list[str]:
+    return ["", f"=== {title} ===", *([paragraphs([explained])] if explained else []), ""]
+
+
+def _comparison_lines(found: compare.Comparison) -> list[str]:
+    from logger.report.comparison_text import conclusion, evidence, headline
+
+    return [paragraphs(headline(found)), "", "After the refit:", paragraphs(evidence(found), "- "), "",
+            paragraphs([conclusion(found).partition(" Next: ")[0]])]

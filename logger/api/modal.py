@@ -1,0 +1,285 @@
+"""Vibration records of many sensors, and the modes of the structure that they were on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.ranges import DECREMENT, MODAL_METHODS, RESPONSES, SPECTRUM
+from logger.api.shown import CommandResult, Shown, line, table
+from logger.errors import BadInput
+from logger.store.formats import channel_file
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.modal.mode import ModalResult
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+USUAL_METHOD, _SEGMENTS = "ssi", 8
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Channels(channel_file.ChannelRecord, Shown):
+    """A record of c sensors, evenly sampled.
+
+    names      of the channels
+    start_s    time of the first sample [s]; ``rate_hz`` samples a second
+    samples    (n, c), in any unit
+    """
+
+    def __repr__(self) -> str:
+        deviations = self.samples.std(axis=0).tolist()
+        return table("Channels", [
+            ("time", len(self.samples) / self.rate_hz, "s"), ("rate", self.rate_hz, "Hz"),
+            ("samples", len(self.samples), ""),
+            *((f"{name}, standard deviation", one, "") for name, one in zip(self.names, deviations, strict=True))])
+
+    def charts(self) -> Sequence[Chart]:
+        """The channels over time."""
+        from logger.chart_data import Curves
+
+        time_s = self.start_s + np.arange(len(self.samples)) / self.rate_hz
+        return [Curves("Channels", "time [s]", "reading", tuple(
+            line(name, time_s, one) for name, one in zip(self.names, self.samples.T, strict=True)))]
+
+
+def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
+    """Read a CSV record with ``t_s`` and one column per sensor: these columns, or all.
+
+    Raises BadInput (``file:line: expected ..., found ...``) for anything else, and for a column that never moves.
+
+    >>> read_channels(folder / "drive.csv", ["accel_z_mps2"]).samples.shape
+    (1115, 1)
+    """
+    return Channels(**vars(channel_file.read_channels(path, columns)))
+
+
+def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
+    """A record out of arrays (n,) by the names of their channels.
+
+    rate_hz    samples a second; the first was taken at ``start_s`` [s]
+
+    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
+
+    >>> make_channels({"top": [0.0, 1.0, 0.0], "middle": [0.0, 0.5, 0.0]}, rate_hz=100.0).samples.shape
+    (3, 2)
+    """
+    arrays = [np.asarray(one, dtype=np.float64) for one in samples.values()]
+    if not arrays or arrays[0].ndim != 1 or any(one.shape != arrays[0].shape for one in arrays):
+        raise BadInput("channels: expected arrays of one length and one axis")
+    if not (len(arrays[0]) > 1 and rate_hz > 0 and np.isfinite(start_s) and np.isfinite(arrays).all()):
+        raise BadInput("channels: expected two finite values or more in each, and a rate above 0 Hz")
+    return Channels(tuple(samples), start_s, rate_hz, np.stack(arrays, axis=1))
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a record; as of ``modes``.
+
+    said    how an option is written in a complaint
+    """
+
+    method: str = USUAL_METHOD
+    columns: Sequence[str] | None = None
+    input_column: str | None = None
+    order: int | None = None
+    response: str | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+    segments: int | None = None
+    said: Callable[[str], str] = str
+
+    def wrong(self, option: str, words: str) -> BadInput:
+        """The complaint about an option."""
+        return BadInput(f"{self.said(option)}{words}")
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found; ``record``: of the sensors alone, the stretch that was looked at."""
+
+    result: ModalResult
+    record: Channels
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(CommandResult):
+    """Natural frequencies, damping ratios and shapes of m modes, slowest first, at c channels.
+
+    channels              names of those
+    frequency_hz          (m,) natural frequencies without regard to damping, ``frequency_std_hz`` (m,) their standard
+                          deviations [Hz]
+    damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be told
+    shapes                (m, c) motion of the channels, the largest 1; complex where they are not in step
+    rejected              frequencies that were found and not believed [Hz], each with the reason
+    how                   the way that it was done, in words; ``order`` of the model, 0 where there is none
+    poles                 (k, 3) of every order that was tried: order, frequency [Hz], damping ratio
+    """
+
+    channels: tuple[str, ...]
+    frequency_hz: Array
+    frequency_std_hz: Array
+    damping_ratio: Array
+    damping_std: Array
+    shapes: Complex
+    rejected: tuple[tuple[float, str], ...]
+    how: str
+    order: int
+    poles: Array
+
+    def charts(self) -> Sequence[Chart]:
+        """The stabilisation diagram: the poles of every order that was tried; nothing where there are none."""
+        from logger.chart_data import Curves, Line
+
+        if not len(self.poles):
+            return ()
+        return [Curves("Stabilisation diagram", "frequency [Hz]", "order", (
+            Line("poles", self.poles[:, 1], self.poles[:, 0], dots=True),))]
+
+
+def modes(
+    record: Channels | Path | str, method: str = USUAL_METHOD, *, columns: Sequence[str] | None = None,
+    input_column: str | None = None, order: int | None = None, response: str | None = None,
+    from_s: float | None = None, to_s: float | None = None, segments: int | None = None,
+) -> Modes:
+    """Natural frequencies, damping ratios and mode shapes of a free decay or of a response to random forces, each with
+    its standard deviation. The order and the modes are chosen by rule.
+
+    record          100 samples or more; or its CSV file, as ``read_channels``
+    method          era, for a free decay; ssi, ssi-cov, ar, for a random response; n4sid, arx, armax, beside a measured
+                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode
+    columns         of the sensors; None: all but the input
+    input_column    of a force or motion that was measured, for n4sid, arx and armax
+    order           states of the model (lags for ar, arx and armax), 2 or more; None: chosen by rule
+    response        "decay" or "random"; None: the record is looked at
+    from_s, to_s    stretch to be looked at [s]; None: as long as the record
+    segments        of an fft; None: 8
+
+    Raises BadInput for what does not fit together, a record that is too short for it, and as ``read_channels``. Source:
+    P. van Overschee and B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
+
+    >>> t_s = np.arange(1000) / 100
+    >>> top = np.exp(-0.02 * 2 * np.pi * 1.5 * t_s) * np.cos(2 * np.pi * 1.5 * t_s)
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(1000)
+    >>> found = modes(make_channels({"top": top + noise}, rate_hz=100.0), "era")
+    >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
+    ([1.5], [0.02])
+    """
+    from logger.modal.mode import pole_rows
+    from logger.report.modal_text import as_json, lines
+
+    found = found_modes(record, Question(method, columns, input_column, order, response, from_s, to_s, segments))
+    result, kept, many = found.result, found.record, found.result.modes
+    name = "record" if isinstance(record, Channels) else Path(record).name
+    frequency_hz, frequency_std_hz, damping_ratio, damping_std = (
+        np.array([getattr(one, column) for one in many], dtype=np.float64)
+        for column in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"))
+    return Modes(
+        "\n".join(lines(result, kept, name)), as_json(result, kept, method), kept.names, frequency_hz,
+        frequency_std_hz, damping_ratio, damping_std,
+        np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
+        tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
+
+
+def found_modes(given: channel_file.ChannelRecord | Path | str, question: Question) -> Found:
+    """The modes of a record or of a file. BadInput as ``modes``."""
+    _check(question)
+    record, inputs = _asked(given, question)
+    try:
+        return Found(_find(question, record, inputs), record)
+    except ValueError as error:
+        raise BadInput(f"{_name(given)}: {error}") from None
+
+
+def _name(given: channel_file.ChannelRecord | Path | str) -> str:
+    return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+
+
+def _check(question: Question) -> None:
+    """BadInput for an option that the method has no use for, or does not know."""
+    from logger.modal.analysis import NEED_INPUT, TAKE_INPUT
+
+    method, said = question.method, question.said("method")
+    for option, word, known in (("method", method, MODAL_METHODS), ("response", question.response, (None, *RESPONSES))):
+        if word not in known:
+            raise question.wrong(option, f" {word}: expected one of {', '.join(filter(None, known))}")
+    if method in (SPECTRUM, DECREMENT):
+        for option in ("order", "response"):
+            if getattr(question, option) is not None:
+                raise question.wrong(option, f": expected a method with poles, not {said} {method}")
+    if question.segments is not None and method != SPECTRUM:
+        raise question.wrong("segments", f": expected {said} {SPECTRUM} with it, found {method}")
+    if question.response is not None and question.input_column is not None:
+        raise question.wrong("response", f": expected no {question.said('input_column')}, which says what moves the "
+                                         "structure")
+    if question.input_column is not None and method not in TAKE_INPUT:
+        raise question.wrong("input_column", f": expected {said} {', '.join(TAKE_INPUT[:-1])} or {TAKE_INPUT[-1]} with "
+                                             f"it, found {method}")
+    if question.input_column is None and method in NEED_INPUT:
+        raise question.wrong("method", f" {method}: expected {question.said('input_column')} COLUMN with it")
+
+
+def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -> tuple[Channels, Array | None]:
+    """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
+    pushed, name = question.input_column, _name(given)
+    at = name if isinstance(given, channel_file.ChannelRecord) else f"{name}:1"
+    wished = () if question.columns is None else tuple(question.columns)
+    if question.columns is not None and (
+            not wished or not all(wished) or len(set(wished)) < len(wished) or pushed in wished):
+        raise question.wrong("columns", f" {','.join(wished)}: expected names with commas between them, each once, the "
+                                        "input not among them")
+    wanted = (*wished, pushed) if wished and pushed else wished
+    record = _picked(given, wanted) if isinstance(given, channel_file.ChannelRecord) else read_channels(given, wanted)
+    if pushed is not None and pushed not in record.names:
+        raise BadInput(f"{at}: expected a column {pushed}, found {','.join(record.names)[:80]}")
+    t_s = record.start_s + np.arange(len(record.samples)) / record.rate_hz
+    inside = (t_s >= (t_s[0] if question.from_s is None else question.from_s)) & (
+        t_s <= (t_s[-1] if question.to_s is None else question.to_s))
+    if not inside.any():
+        raise BadInput(f"{name}: expected {question.said('from_s')} before {question.said('to_s')}, within {t_s[0]:g} "
+                       f"to {t_s[-1]:g} s")
+    samples = record.samples[inside]
+    outputs = [place for place, one in enumerate(record.names) if one != pushed]
+    if not outputs:
+        raise BadInput(f"{at}: expected a column beside the input {pushed}")
+    if not (samples.std(axis=0) > 0).all():
+        raise BadInput(f"{name}: expected every column to move between {question.said('from_s')} and "
+                       f"{question.said('to_s')}")
+    inputs = None if pushed is None else samples[:, [record.names.index(pushed)]]
+    names = tuple(record.names[place] for place in outputs)
+    return replace(record, names=names, start_s=float(t_s[inside][0]), samples=samples[:, outputs]), inputs
+
+
+def _picked(given: channel_file.ChannelRecord, wanted: Sequence[str]) -> Channels:
+    """These channels of a record, or all. BadInput for one that there is not."""
+    if unknown := set(wanted) - set(given.names):
+        raise BadInput(f"record: expected a channel {sorted(unknown)[0]}, found {','.join(given.names)[:80]}")
+    places = [given.names.index(one) for one in wanted] or list(range(len(given.names)))
+    return Channels(tuple(given.names[place] for place in places), given.start_s, given.rate_hz,
+                    given.samples[:, places])
+
+
+def _find(question: Question, record: Channels, inputs: Array | None) -> ModalResult:
+    """ValueError for a record that is too short, or an order that it cannot carry."""
+    from logger.modal.analysis import find_modes
+    from logger.modal.decrement import decrement_mode
+    from logger.modal.spectral_peaks import peak_modes
+
+    if question.method == SPECTRUM:
+        return peak_modes(record.samples, record.rate_hz, _SEGMENTS if question.segments is None else question.segments)
+    if question.method == DECREMENT:
+        if len(record.names) > 1:
+            raise ValueError(f"expected one column for the decrement ({question.said('columns')}), found "
+                             f"{','.join(record.names)}")
+        return decrement_mode(record.samples[:, 0], record.rate_hz)
+    if question.order is not None and question.order < 2:
+        raise ValueError(f"expected an order of 2 or more, found {question.order}")
+    decay = None if question.response is None else question.response == "decay"
+    return find_modes(record.samples, record.rate_hz, question.method, inputs, question.order, decay)

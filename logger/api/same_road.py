@@ -1,0 +1,115 @@
+"""The lab without a profile: which physical effect a model lacks, from drives over one road that nobody measured."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from logger.api.bench import Tell, among, deviation_of, known_effects, unsaid
+from logger.api.lab import Diagnosis, Runs, diagnosis_fields, given_runs, word_of
+from logger.api.ranges import USUAL_TOLERANCE
+from logger.api.run_checks import check_record, thinned_runs
+from logger.api.vehicles import Model, model_of
+from logger.errors import BadInput
+from logger.runs import Run as Record
+from logger.store.formats import drive_file, vehicle_file
+
+if TYPE_CHECKING:
+    from logger.lab.unknown_road.diagnosis import Found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SameRoadDiagnosis(Diagnosis):
+    """Which physical effects a model lacks, as far as drives over an unmeasured road tell.
+
+    An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives tell.
+
+    run_errors       by name of the run: error before, and with the effects that were found
+    taken_by_road    effects that another road would imitate, and the share of their information that is left beside it
+    not_tried        effects that could not be tried, and why
+    cannot_tell      sentences: what these drives do not tell
+    """
+
+    run_errors: Mapping[str, tuple[float, float]]
+    taken_by_road: Mapping[str, float]
+    not_tried: Mapping[str, str]
+    cannot_tell: tuple[str, ...]
+
+
+def diagnose_same_road(
+    vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
+    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
+) -> SameRoadDiagnosis:
+    """Which physical effect a model lacks, where no profile is known: from two drives or more over one road, at
+    different speeds. Only effects that keep the car linear are tried; profiles are not read. It takes from seconds to
+    minutes.
+
+    vehicle, tolerance    as in ``compare``
+    runs                  as in ``compare``, without profiles; their distances count from the same place, to about 3 m
+    candidates, effect_files, progress    as in ``diagnose``
+
+    Raises BadInput for fewer than two runs, drives that are plainly over two roads, and as ``diagnose``. Source: the
+    road is random as ISO 8608 lets expect it, and its waves are found with the car (``logger.lab.unknown_road``).
+
+    >>> found = diagnose_same_road(car, runs, candidates=["sensor_offset", "sensor_gain"])
+    >>> found.verdict, list(found.taken_by_road)
+    ((), ['sensor_gain'])
+    """
+    from logger.report.same_road_text import as_json, cannot_tell, same_road_lines
+
+    model, drives = model_of(vehicle), given_runs(runs)
+    names = [str(one.path) for one in drives]
+    records = records_of(list(zip(drives, names, strict=True)))
+    found = diagnosed(word_of(vehicle, model), model, records, list(map(str, effect_files)), tolerance, candidates,
+                      progress)
+    summary = as_json(found)
+    return SameRoadDiagnosis(
+        "\n".join(same_road_lines(found, names, None)), summary, **diagnosis_fields(summary),
+        run_errors=dict(zip(names, found.by_run, strict=True)), taken_by_road=summary["taken_by_road"],
+        not_tried=summary["not_tried"], cannot_tell=tuple(cannot_tell(found)))
+
+
+def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
+    """Drives and their names, checked together; on a flat road, for none is known. BadInput for fewer than two, or one
+    that the others cannot be used with."""
+    from logger.profiles.track import Track
+
+    if len(drives) < 2:
+        raise BadInput("expected two runs or more over one road, found one")
+    flat = Track(1.0, np.zeros(2))
+    for number, (drive, _) in enumerate(drives):
+        file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
+        check_record(drive, file, [one for one, _ in drives[:number]])
+    return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat)
+                         for one, name in drives])
+
+
+def diagnosed(
+    word: str, model: vehicle_file.Model, records: Sequence[Record], effect_files: Sequence[str], tolerance: float,
+    candidates: Collection[str] | None = None, tell: Tell = unsaid,
+) -> Found:
+    """Which effects the model lacks. BadInput as ``diagnose_same_road``.
+
+    word    by which the user knows the vehicle
+    """
+    from logger.lab.likelihood.priors import Tolerance
+    from logger.lab.unknown_road import diagnosis
+    from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
+
+    off = Tolerance(numbers=deviation_of(tolerance))
+    for one in model.effects:
+        if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
+            raise BadInput(f"{word}: its effect {one.effect.name} needs a road that is known under the right wheels "
+                           "too")
+    effects, _ = known_effects(model, effect_files)
+    try:
+        problem = SameRoad(records, model.given or model.vehicle, off, model.vehicle)
+        return diagnosis.diagnose_same_road(problem, among(effects, candidates), model.effects, tell)
+    except NotOneRoad as error:
+        raise BadInput(str(error)) from None
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None

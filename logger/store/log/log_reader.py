@@ -1,0 +1,155 @@
+"""Segment logs for those who read them: found in a folder, read damaged or not, and their rows as drives and ways.
+
+Rows are joined when the next begins where the last ended and lies near it; what is not joined is a gap, and stays one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, Protocol
+
+from logger.errors import BadInput
+from logger.geodesy import ground_distance_m
+from logger.records import WindowRecord
+from logger.store.log.log_folder import inside_of
+from logger.store.log.log_name import LogName, finished_path
+from logger.store.log.row_format import read_log, write_utc
+from logger.store.log.sidecar import read_sidecar
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_JOIN_M = 0.5
+
+
+class Placed(Protocol):
+    """Something with a position, or None for it [degrees]."""
+
+    @property
+    def lat_deg(self) -> float | None: ...
+
+    @property
+    def lon_deg(self) -> float | None: ...
+
+
+@dataclass(frozen=True)
+class LoggedFile:
+    """One log file as it was read. ``sidecar`` None: it is missing or cannot be read."""
+
+    name: str
+    records: Sequence[WindowRecord]
+    damaged_lines: int
+    sidecar: Mapping[str, Any] | None
+
+
+def find_logs(place: Path) -> list[Path]:
+    """The logs in a folder at any depth, open ones too, folder by folder in order of their writing; or the one file.
+    Raises BadInput for none."""
+    if place.is_file() or finished_path(place).is_file():
+        return [place]
+    if not place.is_dir():
+        raise BadInput(f"{place}: expected a folder of segment logs, or one log file")
+    found: dict[tuple[Path, int, int], Path] = {}
+    for path in sorted(inside_of(place)):
+        name = LogName.of(path)
+        if name is None or path.is_dir():
+            continue
+        if name.finished or (path.parent, name.session, name.part) not in found:
+            found[path.parent, name.session, name.part] = path
+    if not found:
+        raise BadInput(f"{place}: expected segment logs (such as 00001-001.csv), found none")
+    return [found[key] for key in sorted(found)]
+
+
+def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:
+    """Read a log, damaged or not, and what lies beside it; None for one that is there no more. Raises BadInput for a
+    file that cannot be opened."""
+    if not log.exists():
+        log = finished_path(log)
+    try:
+        content = read_log(log)
+    except FileNotFoundError:
+        return None if finished_path(log) == log else read_logged(log, place)
+    except OSError as error:
+        raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
+    try:
+        sidecar = read_sidecar(log)
+    except (ValueError, OSError):
+        sidecar = None
+    name = str(log.relative_to(place)) if place is not None and place in log.parents else log.name
+    return LoggedFile(name, content.records, content.damaged_lines, sidecar)
+
+
+# --- rows ---
+
+
+def split_drives(records: Iterable[WindowRecord]) -> list[list[WindowRecord]]:
+    """Rows drive by drive. A new drive begins where its number changes or the rows are counted anew."""
+    drives: list[list[WindowRecord]] = []
+    last: WindowRecord | None = None
+    for record in records:
+        if last is None or record.drive != last.drive or record.segment <= last.segment:
+            drives.append([])
+        drives[-1].append(record)
+        last = record
+    return drives
+
+
+def joined(records: Sequence[WindowRecord]) -> list[list[WindowRecord]]:
+    """Rows with a position, in stretches without a gap."""
+    pieces: list[list[WindowRecord]] = []
+    last: WindowRecord | None = None
+    for record in records:
+        if record.lat_deg is None or record.lon_deg is None:
+            last = None
+            continue
+        if last is None or not _follows(last, record):
+            pieces.append([])
+        pieces[-1].append(record)
+        last = record
+    return pieces
+
+
+def _follows(last: WindowRecord, record: WindowRecord) -> bool:
+    if last.distance_end_m is None or record.distance_start_m is None or last.drive != record.drive:
+        return False
+    ground_m = apart_m(last, record)
+    near_m = 5 * max(length_m(last), length_m(record))
+    return abs(record.distance_start_m - last.distance_end_m) < _JOIN_M and ground_m is not None and ground_m < near_m
+
+
+def length_m(record: WindowRecord) -> float:
+    """Length of a window [m]; 0 for one by time."""
+    if record.distance_start_m is None or record.distance_end_m is None:
+        return 0.0
+    return record.distance_end_m - record.distance_start_m
+
+
+def along_m(records: Sequence[WindowRecord]) -> list[float]:
+    """Distance from the first row's start to each row's middle, through all rows [m]."""
+    lengths_m = [length_m(record) for record in records]
+    return [end - length / 2 for end, length in zip(accumulate(lengths_m), lengths_m, strict=True)]
+
+
+def apart_m(one: Placed, other: Placed) -> float | None:
+    """Distance on the ground between two places some kilometres apart at most [m]; None when one has no position."""
+    if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
+        return None
+    return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
+
+
+def end_utc_us(record: WindowRecord) -> int | None:
+    """UTC at the end of a window [us]."""
+    return None if record.utc_us is None else record.utc_us + round(record.duration_s * 1e6)
+
+
+def utc(utc_us: int) -> datetime:
+    """An instant [us since 1970] as a date and time."""
+    return _EPOCH + timedelta(microseconds=utc_us)
+
+
+def iso_utc(utc_us: int | None) -> str | None:
+    """An instant [us since 1970] as ISO 8601 with milliseconds."""
+    return write_utc(utc_us) or None
