@@ -12,6 +12,7 @@ from logger.lab.compare import FAR_SIGMA, Comparison, Standing
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
 from logger.report.quantities import distance_error
+from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error
 
 Array = npt.NDArray[np.float64]
@@ -50,7 +51,7 @@ def evidence(found: Comparison) -> list[str]:
                 "evidence."]
     if not found.tests_found:
         return ["No test finds more than noise in the residual."]
-    return [test.sentence for test in found.tests_found]
+    return [sentence(test) for test in found.tests_found]
 
 
 def conclusion(found: Comparison) -> str:

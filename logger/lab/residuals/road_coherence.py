@@ -21,10 +21,6 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
-# Segments that overlap by half, with a Hann taper, are worth so much of their number (P. D. Welch 1967).
-_WORTH = 0.947
-_EVERY = 2
-
 
 @dataclass(frozen=True, eq=False)
 class Coherence:
@@ -43,6 +39,10 @@ class Coherence:
     segments: float
     power: Array
 
+    def power_between(self, low_hz: float, high_hz: float) -> float:
+        """Of the residual [m2/s4]."""
+        return float(self.power[(self.f_hz >= low_hz) & (self.f_hz < high_hz)].sum())
+
     def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
         """Between two frequencies: the share of the residual power, and how probable it would be by chance."""
         from scipy.special import digamma, polygamma
@@ -54,7 +54,7 @@ class Coherence:
         if not power > 0 or n <= q + 1:
             return 0.0, float("nan")
         share = float((self.share[inside] * self.power[inside]).sum() / power)
-        tested = self.raw[inside[::_EVERY]]
+        tested = self.raw[inside[::2]]
         statistic = -float(np.log1p(-np.minimum(tested, 1 - 1e-12)).sum())
         mean = len(tested) * float(digamma(n) - digamma(n - q))
         variance = len(tested) * float(polygamma(1, n - q) - polygamma(1, n))
@@ -86,7 +86,8 @@ def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> 
     gain = np.einsum("fij,fj->fi", np.linalg.pinv(own, rcond=1e-6, hermitian=True), cross)
     found = np.einsum("fi,fi->f", cross.conj(), gain).real
     raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)
-    q, n = len(inputs), _WORTH * count
+    # Segments that overlap by half, with a Hann taper, are worth 18 / 19 of their number (P. D. Welch 1967).
+    q, n = len(inputs), 0.947 * count
     chance = q / n
     share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
     return Coherence(frequencies(residuals), share, raw, q, n, power)
