@@ -86,7 +86,7 @@ def _lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
     from logger.report.same_road_text import cannot_tell, summary
 
     rows = [("Effect", "Error", "Chance", "Numbers")]
-    rows += [(one.one.effect.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
+    rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
               numbers_of(one.one)) for one in found.candidates[:most]]
     by_run = [("Run", "Error before", "after"),
               *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
