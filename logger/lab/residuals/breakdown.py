@@ -86,7 +86,7 @@ class ModelResiduals:
 
     @property
     def rate_hz(self) -> float:
-        """The same in all runs."""
+        """Samples a second, the same in all runs."""
         return self.runs[0].rate_hz
 
     @cached_property
@@ -96,12 +96,12 @@ class ModelResiduals:
 
     @cached_property
     def measured(self) -> list[Array]:
-        """The samples that count, per run [m/s2]."""
+        """What was measured, the samples that count, per run [m/s2]."""
         return [run.measured_mps2[run.first:] for run in self.runs]
 
     @cached_property
     def model(self) -> list[Array]:
-        """The samples that count, per run [m/s2]."""
+        """What the model predicts, the samples that count, per run [m/s2]."""
         return [one[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
     def kept(self, of: Callable[[Run], Array]) -> list[Array]:

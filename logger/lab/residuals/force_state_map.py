@@ -73,8 +73,8 @@ class ForceMap:
 
 
 def force_map(residuals: ModelResiduals) -> ForceMap:
-    """The force that is missing in the suspensions, the same law in each."""
-    regression = _Regression(residuals)
+    """The force that is missing in the suspensions of a model, by its residuals; the same law in each suspension."""
+    regression = _Regression.of(residuals)
 
     def term(shape: Shape) -> Term:
         coefficients, covariance, p_value, share = regression.fitted(_through(residuals, [shape]))
@@ -98,65 +98,64 @@ def _whitening(residual: Sequence[Array], order: int = 12) -> Array:
     return np.concatenate([[1.0], -np.linalg.solve(table, lags[1:])])
 
 
+@dataclass(frozen=True, eq=False)
 class _Regression:
-    """The residual, and what is never physics, whitened."""
+    """Residuals (n,) and what is never physics (n, m), per run, and the filter that whitens them."""
 
-    def __init__(self, residuals: ModelResiduals) -> None:
-        self._filter = _whitening(residuals.residual)
+    residual: Sequence[Array]
+    nuisance: Sequence[Array]
+    whitening: Array
+
+    @staticmethod
+    def of(residuals: ModelResiduals) -> _Regression:
+        """With each linear damper and spring, the gain and a small shift in time as what is never physics."""
         wheels = range(residuals.responses[0].rate_mps.shape[1])
-        linear = [_through(residuals, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
+        dampers, springs = (_through(residuals, [_straight(wheel, of_rate) for wheel in wheels])
+                            for of_rate in (True, False))
         rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
-        nuisance = [np.column_stack([*(one[index] for one in linear), model, rate])
-                    for index, (model, rate) in enumerate(zip(residuals.model, rates, strict=True))]
-        pairs = ((residuals.residual, nuisance), (self._whitened(residuals.residual), self._whitened(nuisance)))
-        self._plain, self._white = (_Without(np.concatenate(one), np.concatenate(columns)) for one, columns in pairs)
+        nuisance = [np.column_stack(one) for one in zip(dampers, springs, residuals.model, rates, strict=True)]
+        return _Regression(residuals.residual, nuisance, _whitening(residuals.residual))
 
     def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
-        """Coefficients (k,), their covariance (k, k), the p-value of all together, and the share that they explain."""
+        """Of columns (n, k) per run: their coefficients (k,), the covariance (k, k) of these, the p-value of all
+        together, by what is whitened, and the share of the residual that they explain, as it is."""
         from scipy.stats import f
 
-        coefficients, covariance, rank, power, residual = self._white.fit(np.concatenate(self._whitened(columns)))
-        freedom = self._white.freedom - rank
-        if rank == 0 or not residual > 0:
+        coefficients, covariance, rank, freedom, power, rest = _fit(
+            *(self._whitened(one) for one in (self.residual, self.nuisance, columns)))
+        if rank == 0 or not rest > 0:
             return coefficients, covariance, float("nan"), 0.0
-        variance = residual / freedom
-        p_value = float(f.sf((power - residual) / rank / variance, rank, freedom))
-        _, _, rank, power, residual = self._plain.fit(np.concatenate(columns))
-        share = 1 - residual / power * self._plain.freedom / (self._plain.freedom - rank) if power > 0 else 0.0
+        variance = rest / freedom
+        p_value = float(f.sf((power - rest) / rank / variance, rank, freedom))
+        _, _, rank, freedom, power, rest = _fit(self.residual, self.nuisance, columns)
+        share = 1 - rest / power * (freedom + rank) / freedom if power > 0 else 0.0
         return coefficients, covariance * variance, p_value, max(share, 0.0)
 
     def _whitened(self, signals: Sequence[Array]) -> list[Array]:
-        order = len(self._filter) - 1
-        return [sum((weight * one[order - lag : len(one) - lag] for lag, weight in enumerate(self._filter)),
+        order = len(self.whitening) - 1
+        return [sum((weight * one[order - lag : len(one) - lag] for lag, weight in enumerate(self.whitening)),
                     np.zeros_like(one[order:])) for one in signals]
 
 
-class _Without:
-    """A target (n,) and columns without what other columns (n, m) explain."""
-
-    def __init__(self, target: Array, others: Array) -> None:
-        scaled = others / np.maximum(np.sqrt((others**2).sum(axis=0)), 1e-300)
-        residual, values, _ = np.linalg.svd(scaled, full_matrices=False)
-        self._basis = residual[:, values > 1e-9 * values[0]]
-        self._target = self._removed(target)
-        self.freedom = len(target) - self._basis.shape[1]
-
-    def _removed(self, values: Array) -> Array:
-        return np.asarray(values - self._basis @ (self._basis.T @ values))
-
-    def fit(self, columns: Array) -> tuple[Array, Array, int, float, float]:
-        """Coefficients (k,), (X'X)^-1, the rank, and the squares of the target before and after."""
-        size = np.sqrt((columns**2).sum(axis=0))
-        size = np.where(size > np.finfo(float).tiny, size, 1.0)
-        gram = self._removed(columns / size)
-        product = gram.T @ gram
-        values, vectors = np.linalg.eigh(product)
-        kept = values > 1e-7
-        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-        coefficients = inverse @ (gram.T @ self._target)
-        before = float(self._target @ self._target)
-        after = before - float(coefficients @ product @ coefficients)
-        return coefficients / size, inverse / np.outer(size, size), int(kept.sum()), before, after
+def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Array],
+         ) -> tuple[Array, Array, int, int, float, float]:
+    """Columns (n, k) per run fitted to a target (n,), both without what others (n, m) explain: coefficients (k,),
+    (X'X)^-1, the rank, the degrees of freedom, and the squares of the target before and after."""
+    left, right, wanted = (np.concatenate(one) for one in (others, columns, target))
+    vectors, sizes, _ = np.linalg.svd(left / np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300), full_matrices=False)
+    basis = vectors[:, sizes > 1e-9 * sizes[0]]
+    size = np.sqrt((right**2).sum(axis=0))
+    size = np.where(size > np.finfo(float).tiny, size, 1.0)
+    wanted, gram = (one - basis @ (basis.T @ one) for one in (wanted, right / size))
+    product = gram.T @ gram
+    values, vectors = np.linalg.eigh(product)
+    kept = values > 1e-7
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    coefficients = inverse @ (gram.T @ wanted)
+    before, rank = float(wanted @ wanted), int(kept.sum())
+    after = before - float(coefficients @ product @ coefficients)
+    return (coefficients / size, inverse / np.outer(size, size), rank, len(wanted) - basis.shape[1] - rank, before,
+            after)
 
 
 def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) -> Curve:

@@ -66,7 +66,7 @@ class ResidualTest:
 
     @property
     def found(self) -> bool:
-        """Whether it is there, and matters."""
+        """Whether the test finds something: it is hardly chance, and it matters."""
         return bool(self.p_value < DOUBT and self.large)
 
 
@@ -81,14 +81,14 @@ class ResidualTests:
 
     @property
     def found(self) -> tuple[ResidualTest, ...]:
-        """Those that are there."""
+        """The tests that find something."""
         return tuple(one for one in self.tests if one.found)
 
 
 def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: ModelResiduals) -> ResidualTests:
     """Test the residuals of a model.
 
-    where      where it sits
+    where      where their power sits
     unmoved    the same car on the distances as they were recorded, which alignment is asked of
     """
     coherence, forces, alignment = with_road(residuals), force_map(residuals), lags(unmoved.runs, unmoved.predictions)

@@ -39,7 +39,7 @@ class SpatialLine:
 
     @property
     def found(self) -> bool:
-        """Whether it is no chance."""
+        """Whether the line is hardly chance."""
         return self.p_value < DOUBT
 
 

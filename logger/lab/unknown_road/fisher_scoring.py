@@ -57,16 +57,17 @@ def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.
         gains, slopes = sloped(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
             problem = problem.prepared(State(effects, logs, roads, gains))
-        scored = problem.scored(problem.table(gains, slopes), roads, information=True)
+        score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
         off, precision = problem.prior_terms(logs, q, roads)
-        score = scored.slopes - precision * off
-        step = _step(score, scored.information + np.diag(precision), here, low, high)
+        score -= precision * off
+        information = data + np.diag(precision)
+        step = _step(score, information, here, low, high)
         if count and float(score @ step) < settled:
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
     found = State(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), scored.information, scored.information + np.diag(precision), problem)
+    return Fitted(found, tuple(moves), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:

@@ -72,15 +72,6 @@ class State:
         return float(np.exp(self.roads[-1]))
 
 
-@dataclass(frozen=True, eq=False)
-class ScoreAndInformation:
-    """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
-    the information (m, m) or zeros; nothing of the priors is in them."""
-
-    slopes: Array
-    information: Array
-
-
 class SameRoad:
     """Drives over one road, a nominal vehicle, and what may be a little off.
 
@@ -122,11 +113,12 @@ class SameRoad:
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
-        """Its response (x, f). ValueError if it does not answer in proportion to the road."""
+        """The response (x, f) of the car with these numbers and effects. ValueError if it does not answer in proportion
+        to the road."""
         return response_of(self.car(effects, logs), self.rate_hz)
 
     def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
-        """A response with slopes (p, x, f), as roads are asked with."""
+        """A response (x, f) with slopes (p, x, f), as roads are asked with."""
         found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
         return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
 
@@ -134,8 +126,9 @@ class SameRoad:
         """The car as it stands on roads of a likely level."""
         return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
 
-    def scored(self, table: Tabulated, roads: Array, information: bool) -> ScoreAndInformation:
-        """The slopes, by the table's and by the roads' numbers, and the information."""
+    def scored(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
+        """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
+        the information (m, m) or zeros; nothing of the priors is in them."""
         p, self.rounds = len(table.slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
         for road, part in zip(self._roads, self._parts, strict=True):
@@ -145,10 +138,10 @@ class SameRoad:
             self.rounds = max(self.rounds, asked.rounds)
             slopes[whole] += own
             matrix[np.ix_(whole, whole)] += known
-        return ScoreAndInformation(slopes, matrix)
+        return slopes, matrix
 
     def prepared(self, state: State) -> SameRoad:
-        """The same, quick for models that are like this one."""
+        """The same drives, quick for models that are like this one."""
         table, other = self.table(state.gains), copy(self)
         other._roads = [road.with_car(table) for road in self._roads]
         for road, part in zip(other._roads, self._parts, strict=True):
@@ -187,8 +180,8 @@ class SameRoad:
         nodes, weights = np.polynomial.legendre.leggauss(3)
         for node, weight in zip(0.5 * (nodes + 1), 0.5 * weights, strict=True):
             table = self.table(before.gains + node * change, change[None])
-            scored = self.scored(table, before.roads + node * road_change, information=False)
-            total += weight * float(scored.slopes[0] + scored.slopes[1:] @ road_change)
+            slopes, _ = self.scored(table, before.roads + node * road_change, information=False)
+            total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
     def predicted_by_others(self, state: State) -> Iterator[tuple[int, Array, Array]]:
@@ -218,7 +211,7 @@ class SameRoad:
         return [_error([own for run, own in squares if run == number]) for number in range(len(self.runs))]
 
     def error(self, state: State) -> float:
-        """The same of all of them together."""
+        """That error of all runs together."""
         return _error([own for _, own in self._squares(state)])
 
     def _squares(self, state: State) -> list[tuple[int, tuple[float, float]]]:
@@ -228,18 +221,18 @@ class SameRoad:
 
     @property
     def size_mps2(self) -> float:
-        """R.m.s. of what was read, by which errors are divided."""
+        """R.m.s. of what was read, by which errors are divided [m/s2]."""
         squares = sum(float((one**2).sum()) for road in self._roads for one in road.measured)
         return float(np.sqrt(squares / self.samples))
 
     @property
     def least_mps2(self) -> float:
-        """What is left is no less than two right simulations differ by."""
+        """The least that a model leaves: what two right simulations of a car differ by [m/s2]."""
         return DISCREPANCY * self.size_mps2
 
     @property
     def samples(self) -> int:
-        """How many there are, of all drives."""
+        """How many samples there are, of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
     def noise(self, state: State) -> Noise:

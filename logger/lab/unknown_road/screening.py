@@ -40,20 +40,21 @@ def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Tria
     gains, own = sloped(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
-    scored = problem.scored(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
+    table = problem.table(gains, np.array([*own, *changes]))
+    slopes, information = problem.scored(table, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
     off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)
-    known = inverse(scored.information[np.ix_(rest, rest)] + np.diag(precision))
-    by_road = inverse(scored.information[np.ix_(road, road)] + np.diag(precision[p:]))
-    score = scored.slopes[rest] - precision * off
+    known = inverse(information[np.ix_(rest, rest)] + np.diag(precision))
+    by_road = inverse(information[np.ix_(road, road)] + np.diag(precision[p:]))
+    score = slopes[rest] - precision * off
     found = []
     for index, one in enumerate(ones, p):
-        alone, mixed = scored.information[index, index], scored.information[index, rest]
+        alone, mixed = information[index, index], information[index, rest]
         left = max(float(alone - mixed @ known @ mixed), 0.0)
-        taken = scored.information[index, road]
+        taken = information[index, road]
         share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
-        slope = float(scored.slopes[index] - mixed @ known @ score)
+        slope = float(slopes[index] - mixed @ known @ score)
         found.append(_trial(one, slope, left, alone, max(share, 0.0)))
     return found
 
