@@ -12,14 +12,15 @@ import numpy.typing as npt
 
 from logger.chart_data import Curves, Line
 from logger.lab.compare import Comparison, Standing
-from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, paired, segments, short_names
+from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.residuals.residual_tests import worst_places
 from logger.report.charts import chart
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
-from logger.report.residual_text import error_text
+from logger.report.residual_text import error_text, paired
+from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
 

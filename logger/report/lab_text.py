@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from logger.lab.compare import Comparison
 from logger.lab.diagnosis import Diagnosis
-from logger.lab.residuals.breakdown import Part, paired, short_names
+from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.diagnosis_text import looks_like, summary, table, untested
-from logger.report.residual_text import error_text
+from logger.report.residual_text import error_text, paired
 from logger.report.text_layout import columns, paragraphs
+from logger.runs import short_names
 
 _PLACES = 5
 

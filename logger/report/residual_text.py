@@ -53,6 +53,13 @@ def error_text(part: Part, digits: int) -> str:
     return f"{part.error:.{digits}f}" if np.isfinite(part.error) else "-"
 
 
+def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
+    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
+    numbers; others by their ends. None where there is no such part."""
+    known = {one.name or (one.low, one.high): one for one in before}
+    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
+
+
 # --- the residual by itself ---
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments, short_names
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.session import Round, Story
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
@@ -16,6 +16,7 @@ from logger.report.diagnosis_text import summary, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
 from logger.report.session_text import ending, steps
+from logger.runs import short_names
 
 STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")

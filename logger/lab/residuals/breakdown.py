@@ -97,7 +97,7 @@ class ModelResiduals:
     @cached_property
     def measured(self) -> list[Array]:
         """What was measured, the samples that count, per run [m/s2]."""
-        return [run.measured_mps2[run.first:] for run in self.runs]
+        return [run.kept_mps2 for run in self.runs]
 
     @cached_property
     def model(self) -> list[Array]:
@@ -132,13 +132,6 @@ def breakdown(residuals: ModelResiduals) -> Breakdown:
     return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
 
 
-def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
-    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
-    numbers; others by their ends. None where there is no such part."""
-    known = {one.name or (one.low, one.high): one for one in before}
-    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
-
-
 # --- tools that the residual tests share ---
 
 
@@ -167,12 +160,6 @@ def _segment_size(residuals: ModelResiduals) -> int:
 def frequencies(residuals: ModelResiduals) -> Array:
     """Frequencies (f,) of the spectra of ``segments`` [Hz]."""
     return np.asarray(np.fft.rfftfreq(_segment_size(residuals), 1 / residuals.rate_hz))
-
-
-def short_names(runs: Sequence[Run]) -> dict[str, str]:
-    """What to call runs in a sentence, by name: the last folder of each, or all of the name where those are alike."""
-    last = {run.name: run.name.rstrip("/").rpartition("/")[2] for run in runs}
-    return last if len(set(last.values())) == len(runs) else {run.name: run.name for run in runs}
 
 
 # --- the four lists ---

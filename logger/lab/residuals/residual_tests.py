@@ -26,10 +26,11 @@ from logger.lab.residuals.block_statistics import (
     rank_correlation,
     rms,
 )
-from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part, short_names
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part
 from logger.lab.residuals.force_state_map import Curve, ForceMap, force_map
 from logger.lab.residuals.road_coherence import Coherence, with_road
 from logger.lab.residuals.spectral_lines import loudest, periodogram
+from logger.runs import short_names
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown, short_names
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
 from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
+from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
 

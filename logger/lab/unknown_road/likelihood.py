@@ -32,13 +32,14 @@ from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.roads.iso8608 import STANDARD_WAVINESS
-from logger.runs import Run
+from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+Ints = npt.NDArray[np.intp]
 
 _LEAST_S = 3.0
 """What a drive has to share of a stretch to tell of it: some periods of a body's bounce."""
@@ -131,22 +132,31 @@ class SameRoad:
         the information (m, m) or zeros; nothing of the priors is in them."""
         p, self.rounds = len(table.slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
-        for road, part in zip(self._roads, self._parts, strict=True):
+        for road, at, part, _ in self._at(table, roads):
             whole = np.append(np.arange(p), p + part)
-            asked = road.with_car(table)
-            own, known, _ = asked.score(self._at(roads[part], p), information)
-            self.rounds = max(self.rounds, asked.rounds)
+            own, known, _ = road.score(at, information)
+            self.rounds = max(self.rounds, road.rounds)
             slopes[whole] += own
             matrix[np.ix_(whole, whole)] += known
         return slopes, matrix
 
     def prepared(self, state: State) -> SameRoad:
         """The same drives, quick for models that are like this one."""
-        table, other = self.table(state.gains), copy(self)
-        other._roads = [road.with_car(table) for road in self._roads]
-        for road, part in zip(other._roads, self._parts, strict=True):
-            road.prepare(self._at(state.roads[part], 0))
+        other = copy(self)
+        other._roads = []
+        for road, at, *_ in self._at(self.table(state.gains), state.roads):
+            road.prepare(at)
+            other._roads.append(road)
         return other
+
+    def _at(self, table: Tabulated, roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
+        """Every stretch under a car of this response: its road, its numbers, where these stand among those of all
+        roads, and the runs that its drives are of."""
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            own = roads[part]
+            at = RoadState(np.zeros(len(table.slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
+                           float(np.exp(own[-1])))
+            yield road.with_car(table), at, part, [run for run, _ in parts]
 
     def prior_terms(self, logs: Array, moves: int, roads: Array, waviness_off: float = 0.3,
                     place_off_m: float = 0.05) -> tuple[Array, Array]:
@@ -187,37 +197,26 @@ class SameRoad:
     def predicted_by_others(self, state: State) -> Iterator[tuple[int, Array, Array]]:
         """Of every drive over every stretch: its run, what was read (n,), and what the other drives make one expect
         (n,)."""
-        for road, at, runs in self._roads_at(state):
+        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, run in enumerate(runs):
                 yield run, road.measured[number], road.predicted(at, number)
 
     def predicted_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
         """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
         the latter alone makes one expect (n,)."""
-        for road, at, runs in self._roads_at(state):
+        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
             for number, by in permutations(range(len(runs)), 2):
                 yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
-
-    def _roads_at(self, state: State) -> Iterator[tuple[UnknownRoad, RoadState, list[int]]]:
-        """Every stretch with the car of a state, its numbers, and the runs that its drives are of."""
-        table = self.table(state.gains)
-        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
-            yield road.with_car(table), self._at(state.roads[part], 0), [run for run, _ in parts]
 
     def errors(self, state: State) -> list[float]:
         """Of every run, rms(read - expected) / rms(read), the road being known from the other drives alone; nan for one
         that no other shares a stretch with."""
-        squares = self._squares(state)
-        return [_error([own for run, own in squares if run == number]) for number in range(len(self.runs))]
+        drives = list(self.predicted_by_others(state))
+        return [_error([one for one in drives if one[0] == run]) for run in range(len(self.runs))]
 
     def error(self, state: State) -> float:
         """That error of all runs together."""
-        return _error([own for _, own in self._squares(state)])
-
-    def _squares(self, state: State) -> list[tuple[int, tuple[float, float]]]:
-        """Of every drive over every stretch: its run, and the squares of read - expected and of read."""
-        return [(run, (float(((read - expected) ** 2).sum()), float((read**2).sum())))
-                for run, read, expected in self.predicted_by_others(state)]
+        return _error(list(self.predicted_by_others(state)))
 
     @property
     def size_mps2(self) -> float:
@@ -245,10 +244,6 @@ class SameRoad:
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
-    def _at(self, own: Array, count: int) -> RoadState:
-        places = np.append(0.0, own[2:-1])
-        return RoadState(np.zeros(count), float(own[0]), float(own[1]), places, float(np.exp(own[-1])))
-
     def _start(self, nominal: Tabulated) -> Array:
         """Levels and noise from the spectra; places by trying them on the longest stretch."""
         first = np.zeros(int(self._parts[-1][-1]) + 1)
@@ -258,22 +253,21 @@ class SameRoad:
             first[part[1]] = STANDARD_WAVINESS
             noises.append(noise)
         first[-1] = np.log(max(np.median(noises), self.least_mps2))
-        offsets = self._offsets(first)
+        offsets = self._offsets(nominal, first)
         for part, parts in zip(self._parts, self.stretches, strict=True):
             own = [offsets[run] for run, _ in parts]
             first[part[2:-1]] = np.array(own[1:]) - own[0]
         return first
 
-    def _offsets(self, first: Array) -> Array:
+    def _offsets(self, nominal: Tabulated, first: Array) -> Array:
         """By how much each run's places are off [m] against those of the first run of the stretch that most runs share;
         where some are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}
-        while left := [one for one, parts in enumerate(self.stretches) if any(run not in offsets for run, _ in parts)]:
-            tied = [one for one in left if any(run in offsets for run, _ in self.stretches[one])]
-            index = max(tied or left, key=lambda one: len(self.stretches[one]))
-            runs = [run for run, _ in self.stretches[index]]
-            at = self._at(first[self._parts[index]], 0)
-            offset = partial(self._roads[index].offset, at)  # against the first run of the stretch
+        left = list(self._at(nominal, first))
+        while left := [one for one in left if any(run not in offsets for run in one[-1])]:
+            tied = [one for one in left if any(run in offsets for run in one[-1])]
+            road, at, _, runs = max(tied or left, key=lambda one: len(one[-1]))
+            offset = partial(road.offset, at)  # against the first run of the stretch
             if runs[0] not in offsets:
                 known = next((number for number, run in enumerate(runs) if run in offsets), None)
                 offsets[runs[0]] = 0.0 if known is None else offsets[runs[known]] - offset(known)
@@ -283,9 +277,8 @@ class SameRoad:
         return np.array([offsets[run] for run in range(len(self.runs))])
 
 
-def _error(squares: Sequence[tuple[float, float]]) -> float:
-    left, whole = (sum(one) for one in zip(*squares, strict=True)) if squares else (0.0, 0.0)
-    return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
+    return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
 def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
