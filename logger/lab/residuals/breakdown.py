@@ -24,7 +24,6 @@ from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 BLOCK_S = 1.0
 """Blocks so long count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps an

@@ -139,22 +139,22 @@ class _Regression:
 
 def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Array],
          ) -> tuple[Array, Array, int, int, float, float]:
-    """Columns (n, k) per run fitted to a target (n,), both without what others (n, m) explain: coefficients (k,),
-    (X'X)^-1, the rank, the degrees of freedom, and the squares of the target before and after."""
-    left, right, wanted = (np.concatenate(one) for one in (others, columns, target))
-    vectors, sizes, _ = np.linalg.svd(left / np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300), full_matrices=False)
+    """Least squares of a target y (n,) by columns X (n, k), both without what others Z (n, m) explain, given per run:
+    coefficients (k,), inv(X'X), the rank, the degrees of freedom, and the squares of y before and after."""
+    y, z, x = (np.concatenate(one) for one in (target, others, columns))
+    vectors, sizes, _ = np.linalg.svd(z / np.maximum(np.sqrt((z**2).sum(axis=0)), 1e-300), full_matrices=False)
     basis = vectors[:, sizes > 1e-9 * sizes[0]]
-    size = np.sqrt((right**2).sum(axis=0))
-    size = np.where(size > np.finfo(float).tiny, size, 1.0)
-    wanted, gram = (one - basis @ (basis.T @ one) for one in (wanted, right / size))
-    product = gram.T @ gram
-    values, vectors = np.linalg.eigh(product)
+    scale = np.sqrt((x**2).sum(axis=0))
+    scale = np.where(scale > np.finfo(float).tiny, scale, 1.0)
+    y, x = (one - basis @ (basis.T @ one) for one in (y, x / scale))
+    product = x.T @ x
+    values, directions = np.linalg.eigh(product)
     kept = values > 1e-7
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    coefficients = inverse @ (gram.T @ wanted)
-    before, rank = float(wanted @ wanted), int(kept.sum())
+    inverse = (directions[:, kept] / values[kept]) @ directions[:, kept].T
+    coefficients = inverse @ (x.T @ y)
+    rank, before = int(kept.sum()), float(y @ y)
     after = before - float(coefficients @ product @ coefficients)
-    return (coefficients / size, inverse / np.outer(size, size), rank, len(wanted) - basis.shape[1] - rank, before,
+    return (coefficients / scale, inverse / np.outer(scale, scale), rank, len(y) - basis.shape[1] - rank, before,
             after)
 
 

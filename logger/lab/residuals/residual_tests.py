@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
@@ -28,12 +27,10 @@ from logger.lab.residuals.block_statistics import (
 )
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part
 from logger.lab.residuals.force_state_map import Curve, ForceMap, force_map
-from logger.lab.residuals.road_coherence import Coherence, with_road
+from logger.lab.residuals.road_coherence import with_road
 from logger.lab.residuals.spectral_lines import loudest, periodogram
 from logger.runs import short_names
 from logger.vehicle.simulate import PASS_OF_RATE
-
-Array = npt.NDArray[np.float64]
 
 DOUBT = 0.002
 """A test whose result is less probable than this finds something: of some fifteen tests, one is false in thirty
@@ -76,7 +73,6 @@ class ResidualTests:
     """All tests of a residual, and what they were read from, for pictures."""
 
     tests: tuple[ResidualTest, ...]
-    coherence: Coherence
     forces: ForceMap
     alignment: Lags
 
@@ -92,16 +88,16 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
     where      where their power sits
     unmoved    the same car on the distances as they were recorded, which alignment is asked of
     """
-    coherence, forces, alignment = with_road(residuals), force_map(residuals), lags(unmoved.runs, unmoved.predictions)
+    forces, alignment = force_map(residuals), lags(unmoved.runs, unmoved.predictions)
     drifting = _drift(alignment)
     tests = (
         drifting, _shift(alignment, drifting), _whiteness(residuals), _frequency(residuals, where),
-        _follows_road(residuals, coherence), _gain(residuals), _proportion(residuals),
+        _follows_road(residuals), _gain(residuals), _proportion(residuals),
         _by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
         _by("travel", forces.by_travel, forces.hardening.value), _lean(residuals),
         _excitation(residuals, where), _speed(residuals), _place(residuals, where), _tone(residuals),
     )
-    return ResidualTests(tests, coherence, forces, alignment)
+    return ResidualTests(tests, forces, alignment)
 
 
 # --- the residual by itself ---
@@ -147,7 +143,8 @@ def _lean(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
-    """The frequency that stands out most, of all runs, from those within a width on either side."""
+    """The frequency that stands out most, of all runs, from those within a width on either side, about what a spectrum
+    of segments resolves."""
     names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
@@ -163,8 +160,9 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
 # --- the residual and the road ---
 
 
-def _follows_road(residuals: ModelResiduals, coherence: Coherence) -> ResidualTest:
-    top = PASS_OF_RATE * residuals.rate_hz
+def _follows_road(residuals: ModelResiduals) -> ResidualTest:
+    """Coherence with the road, at the frequencies that the recorder passes."""
+    coherence, top = with_road(residuals), PASS_OF_RATE * residuals.rate_hz
     share, p_value = coherence.explained(0.0, top)
     bands = [band for band in residuals.bands if band.from_hz < top]
     most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
@@ -184,7 +182,8 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
 
 
 def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
-    """The same shift all the way; none where it grows on the way."""
+    """The same shift all the way; none where it grows on the way. ``least_s`` is a third of a sample at 100 samples a
+    second, which no clock is asked to be better than."""
     time, length, is_time = constant(alignment)
     trend, unit = (length, "m") if is_time is False else (time, "s")
     return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
@@ -193,6 +192,8 @@ def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> R
 
 
 def _drift(alignment: Lags, least_m: float = 0.05) -> ResidualTest:
+    """A shift that grows on the way, to so much at least in the longest run (a judgement: about a
+    twentieth of the wave that makes wheels hop at 10 m/s)."""
     trend = drift(alignment)
     in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
     return ResidualTest("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > least_m, True,

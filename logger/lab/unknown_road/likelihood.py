@@ -164,7 +164,7 @@ class SameRoad:
         of so many moves of effects, which are free, and of the roads'.
 
         waviness_off, place_off_m    how far stretches of a road usually are off in their waviness, and their places
-                                     from those of the whole way
+                                     from those of the whole way (judgements)
         """
         off, precision = np.zeros(self.count), np.zeros(self.count)
         for part in self._parts:

@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.selection.screening import scaled_by
 from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, sloped
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
