@@ -174,7 +174,7 @@ class SameRoad:
             off[places] = roads[places] - self._first[places]
             precision[places] = place_off_m**-2
         free = np.zeros(moves)
-        return (np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision]))
+        return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
 
     def cost(self, state: State) -> float:
         """What the state's numbers cost: squares of their deviations."""
