@@ -82,3 +82,9 @@ def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> flo
     """rms(residuals) / rms(measured) over all samples of arrays (n,); NaN where nothing but zeros was measured."""
     left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))
     return float(np.sqrt(left / whole)) if whole > 0 else float("nan")
+
+
+def short_names(runs: Sequence[Run]) -> dict[str, str]:
+    """What to call runs in a sentence, by name: the last folder of each, or all of the name where those are alike."""
+    last = {run.name: run.name.rstrip("/").rpartition("/")[2] for run in runs}
+    return last if len(set(last.values())) == len(runs) else {run.name: run.name for run in runs}

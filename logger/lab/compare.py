@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.map_fit import aligned, fit
@@ -27,10 +26,9 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
-Array = npt.NDArray[np.float64]
-
 FAR_SIGMA = 3.0
-"""So many standard deviations of what a number is usually off are far."""
+"""So many standard deviations of what a number is usually off are far: of a dozen numbers that are right, one goes as
+far in thirty comparisons."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +38,11 @@ class Standing:
     residuals: ModelResiduals
     error: float
     where: Breakdown
+
+    @staticmethod
+    def of(residuals: ModelResiduals) -> Standing:
+        """Of a model, by its residuals."""
+        return Standing(residuals, normalised_rms_error(residuals.runs, residuals.predictions), breakdown(residuals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,8 @@ class Comparison:
 
 def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (), given: Vehicle | None = None,
             tolerance: Tolerance | None = None) -> Comparison:
-    """Compare a vehicle and its effects, with the values they have, with runs of one sample rate.
+    """Compare a vehicle and its effects, with the values they have, with runs of one sample rate. Where the refitted
+    model is no better than the plain one, that is the refitted one as well.
 
     given        the vehicle before any fit, if it has been refitted: what its numbers are usually off from
     tolerance    what is usually off, and by how much; None: the usual
@@ -90,34 +94,23 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
-    plain = _standing(ModelResiduals(runs.runs, car, runs.predict(car), runs.respond(car)))
+    plain = Standing.of(ModelResiduals(runs.runs, car, runs.predict(car), runs.respond(car)))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_wall()
-    refitted, moves, far, off_m = _refitted(posterior, effects, plain)
-    return Comparison(vehicle.name, tuple(effects), plain, refitted, moves, far, off_m,
-                      run_residual_tests(refitted.residuals, refitted.where, plain.residuals))
-
-
-def _refitted(
-    posterior: Posterior, effects: Sequence[Chosen], plain: Standing,
-) -> tuple[Standing, dict[str, float], tuple[str, ...], float]:
-    """The model refitted, how its numbers moved, which of them far, and by how much the distances are off. One that is
-    no better than the plain model is the plain one: the fit weighs every frequency by its noise, and may buy a better
-    top with a worse body bounce."""
     names, deviations = posterior.prior.names, posterior.prior.deviations
     state = fit(aligned(posterior, posterior.start(effects))).state
     if posterior.error(state) > plain.error:
-        return plain, dict.fromkeys(names, 0.0), (), 0.0
+        # The fit weighs every frequency by its noise, and may buy a better top with a worse body bounce.
+        return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), 0.0,
+                          run_residual_tests(plain.residuals, plain.where, plain.residuals))
     car = posterior.car(state.effects, state.logs)
-    responses = posterior.runs.respond(car, posterior.moved_m(state.record))
+    refitted = Standing.of(ModelResiduals(runs.runs, car, state.predictions,
+                                          runs.respond(car, posterior.moved_m(state.record))))
     away = np.abs(state.logs / deviations)
-    far = tuple(names[index] for index in np.argsort(-away) if away[index] > FAR_SIGMA)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):
         moves |= {f"{before.effect.name}.{name}": after.values[name] / value - 1
                   for name, value in before.values.items() if value}
-    refitted = _standing(ModelResiduals(posterior.runs.runs, car, state.predictions, responses))
-    return refitted, moves, far, unusual_m(posterior.record_errors, state.record)
-
-
-def _standing(residuals: ModelResiduals) -> Standing:
-    return Standing(residuals, normalised_rms_error(residuals.runs, residuals.predictions), breakdown(residuals))
+    return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
+                      tuple(names[index] for index in np.argsort(-away) if away[index] > FAR_SIGMA),
+                      unusual_m(posterior.record_errors, state.record),
+                      run_residual_tests(refitted.residuals, refitted.where, plain.residuals))

@@ -54,15 +54,6 @@ class Story:
         return (self.rounds[-1].addition if self.rounds else self.diagnoses[-1]).noise_floor_error
 
     @property
-    def steps(self) -> list[tuple[str, float]]:
-        """Models on the way, each with its error on all samples."""
-        if not self.rounds:
-            return [("as its file says", self.first.plain.error), ("numbers refitted", self.first.refitted.error)]
-        start = self.rounds[0].addition
-        return [("as its file says", start.error_before), ("numbers refitted", start.error_refitted),
-                *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in self.rounds)]
-
-    @property
     def moved(self) -> list[Number]:
         """The car's numbers without and with the effects; none where nothing was added."""
         return moved_between(self.rounds[0].addition, self.rounds[-1].addition) if self.rounds else []

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.compare import FAR_SIGMA, Comparison, Standing
+from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
 from logger.report.quantities import distance_error
+from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error
-
-Array = npt.NDArray[np.float64]
 
 _HELPS = 0.97
 _MOST_MOVES = 3
@@ -23,7 +21,7 @@ _MOST_MOVES = 3
 def headline(found: Comparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
-    residual, measured = (_rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
+    residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
     lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
              f"{plain.error:.3f}."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
@@ -50,7 +48,7 @@ def evidence(found: Comparison) -> list[str]:
                 "evidence."]
     if not found.tests_found:
         return ["No test finds more than noise in the residual."]
-    return [test.sentence for test in found.tests_found]
+    return [sentence(test) for test in found.tests_found]
 
 
 def conclusion(found: Comparison) -> str:
@@ -111,7 +109,3 @@ def _test_json(test: ResidualTest, found: bool) -> dict[str, Any]:
 
 def _finite(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else value
-
-
-def _rms(signals: Sequence[Array]) -> float:
-    return float(np.sqrt(sum(float(one @ one) for one in signals) / sum(map(len, signals))))

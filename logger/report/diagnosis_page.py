@@ -12,6 +12,7 @@ from logger.report.diagnosis_text import JUDGED_ON, looks_like, summary, table, 
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html
 from logger.report.lab_page import forces_section, spectra_section
+from logger.report.residual_text import error_text
 
 _LEAST_SHARE = 0.01
 
@@ -84,7 +85,7 @@ def _candidates(found: Diagnosis) -> Html:
 
 def _where(shape: Shape) -> Html:
     """By frequency, and along the way."""
-    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", part.error_text(2))
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", error_text(part, 2))
             for part in shape.where.frequency]
     drawn = grid(("Band", "Hz", "Share of the residual", "Error"), rows)
     if shape.line is not None and shape.line.found:

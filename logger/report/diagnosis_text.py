@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from logger.lab.diagnosis import Diagnosis
-from logger.lab.residuals.unexplained import Shape, sentences
+from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
+from logger.report import residual_text
 from logger.report.quantities import chance, distance_error, finite, numbers_of
 from logger.vehicle.effect import Chosen
 
@@ -44,7 +45,7 @@ def summary(found: Diagnosis) -> list[str]:
 
 def looks_like(found: Diagnosis) -> list[str]:
     """What no candidate explains, described; nothing where no more than noise is left."""
-    return [] if found.shape is None else sentences(found.shape)
+    return [] if found.shape is None else residual_text.looks_like(found.shape)
 
 
 def untested(found: Diagnosis) -> list[str]:
@@ -129,7 +130,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
 def _shape_json(shape: Shape) -> dict[str, Any]:
     forces, line = shape.tests.forces, shape.line
     return {
-        "sentences": sentences(shape),
+        "sentences": residual_text.looks_like(shape),
         "force_by_rate": {"rate_mps": forces.by_rate.at.tolist(), "force_n": forces.by_rate.force_n.tolist(),
                           "standard_error_n": forces.by_rate.error_n.tolist(), "share": forces.by_rate.share},
         "force_by_travel": {"travel_m": forces.by_travel.at.tolist(), "force_n": forces.by_travel.force_n.tolist(),

@@ -12,13 +12,15 @@ import numpy.typing as npt
 
 from logger.chart_data import Curves, Line
 from logger.lab.compare import Comparison, Standing
-from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, paired, segments, short_names
+from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.residuals.residual_tests import worst_places
 from logger.report.charts import chart
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.residual_text import error_text, paired
+from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
 
@@ -97,7 +99,7 @@ def _places(standing: Standing) -> Html:
                               np.array([part.residual_mps2 for part in parts])))
     along = Curves("What is left along the road", "distance [m]", "r.m.s. [m/s2]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
-             part.error_text(2)) for part in worst_places(standing.where, _WORST)]
+             error_text(part, 2)) for part in worst_places(standing.where, _WORST)]
     return section("By place", (chart(along) if lines else EMPTY) + grid(
         ("Run", "From, to [m]", "Share of what is left", "Left [m/s2]", "Error"), rows))
 
@@ -147,10 +149,10 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
 
     def cells(one: Part | None, part: Part) -> Html:
         bar = html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
-        before = html("<td class=n>{}</td>", one.error_text(3) if one else "") if stands else EMPTY
+        before = html("<td class=n>{}</td>", error_text(one, 3) if one else "") if stands else EMPTY
         return ((html("<td>{}</td>", part.name) if named else EMPTY)
                 + html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
-                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, part.error_text(3)) + before)
+                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
 
     heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
              + Html("<th>Share of what is left</th><th></th><th class=n>Error</th>")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from logger.lab.compare import Comparison
 from logger.lab.diagnosis import Diagnosis
-from logger.lab.residuals.breakdown import Part, paired, short_names
+from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, bias, errors, judgement, moved_rows
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.diagnosis_text import looks_like, summary, table, untested
+from logger.report.residual_text import error_text, paired
 from logger.report.text_layout import columns, paragraphs
+from logger.runs import short_names
 
 _PLACES = 5
 
@@ -44,13 +46,13 @@ def _tables(found: Comparison) -> list[str]:
 
 def _row(plain: Part | None, refitted: Part, unit: str) -> str:
     name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", plain.error_text(3)) if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{refitted.error_text(3):>8}"
+    share, error = (f"{plain.share:.1%}", error_text(plain, 3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{error_text(refitted, 3):>8}"
 
 
 def _place(part: Part, run: str) -> str:
     name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{part.error_text(3):>8}"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{error_text(part, 3):>8}"
 
 
 def diagnosis_lines(found: Diagnosis, most: int | None) -> list[str]:

@@ -14,7 +14,7 @@ def summary(found: Found) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = []
     for one in found.missing:
-        candidate = next(other for other in found.candidates if other.one.effect.name == one.effect.name)
+        candidate = next(other for other in found.candidates if other.name == one.effect.name)
         numbers = f": {numbers_of(one)}" if one.values else ""
         lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
                      f"looks like this, all candidates together: {chance(candidate.p_value)}.")
@@ -23,13 +23,20 @@ def summary(found: Found) -> list[str]:
     if not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
-               for index, (words, error) in enumerate(found.steps)]
+               for index, (words, error) in enumerate(_steps(found))]
     lines.append(f"Error of each drive over the road as estimated from the others: {', '.join(by_step)}. The sensor's "
                  f"noise alone makes {found.floor_error:.3f}.")
     if found.unexplained:
         lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise: something else is "
                      "missing, maybe one of the effects that only a measured road can show.")
     return lines
+
+
+def _steps(found: Found) -> list[tuple[str, float]]:
+    """Models on the way, each with its error."""
+    words = ["the vehicle as its file says", "its numbers refitted within what is granted",
+             *(f"with {one.effect.name}" for one in found.missing)]
+    return list(zip(words, found.errors, strict=True))
 
 
 def cannot_tell(found: Found) -> list[str]:
@@ -44,13 +51,13 @@ def cannot_tell(found: Found) -> list[str]:
     lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "
               "deviations."
               for name, deviations in found.hidden.items()]
-    return [*lines, *(f"The car's numbers: {words}" for words in found.together)]
+    return [*lines, *(f"The car's numbers: {one.words}" for one in found.together)]
 
 
 def same_road_lines(found: Found, runs: Sequence[str], most: int | None) -> list[str]:
     """What a person reads; ``most`` so many candidates, None: all."""
     rows = [("Effect", "Error", "Chance", "Numbers")]
-    rows += [(one.one.effect.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
+    rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
               numbers_of(one.one)) for one in found.candidates[:most]]
     by_run = [("Run", "Error before", "after"),
               *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
@@ -64,16 +71,16 @@ def as_json(found: Found) -> dict[str, Any]:
     errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     values = {one.effect.name: dict(one.values) for one in found.missing}
     return {
-        "baseline_error": found.steps[0][1], "noise_floor_error": found.floor_error,
+        "baseline_error": found.errors[0], "noise_floor_error": found.floor_error,
         "candidates": [
-            {"effect": one.one.effect.name, "parameters": values.get(one.one.effect.name, dict(one.one.values)),
+            {"effect": one.name, "parameters": values.get(one.name, dict(one.one.values)),
              "error": one.error, "p_value": one.p_value,
              "confused_with": list(one.confused_with), "fitted": one.fitted,
-             "standard_errors": errors.get(one.one.effect.name, {}), "log_likelihood_gain": one.gain / 2}
+             "standard_errors": errors.get(one.name, {}), "log_likelihood_gain": one.gain / 2}
             for one in found.candidates],
         "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
         "left_over_noise": 1 + found.excess,
-        "steps": [{"step": words, "error": error} for words, error in found.steps],
+        "steps": [{"step": words, "error": error} for words, error in _steps(found)],
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
         "not_tried": dict(found.untried), "taken_by_road": dict(found.taken_by_road), "hidden": dict(found.hidden),

@@ -8,13 +8,21 @@ from logger.lab.session import Story
 from logger.report.add_effect_text import bias
 
 
+def steps(story: Story) -> list[tuple[str, float]]:
+    """Models on the way, each with its error on all samples."""
+    start = story.rounds[0].addition if story.rounds else None
+    return [("as its file says", start.error_before if start else story.first.plain.error),
+            ("numbers refitted", start.error_refitted if start else story.first.refitted.error),
+            *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
+
+
 def ending(story: Story) -> list[str]:
     """What it came to."""
-    diagnosis, steps = story.diagnoses[-1], story.steps
+    diagnosis, models = story.diagnoses[-1], steps(story)
     with_what = [bias(story.added, story.moved)] if story.added else []
     lines = []
     if story.added:
-        lines.append(f"{' and '.join(story.added)} took the error from {steps[1][1]:.3f} to {steps[-1][1]:.3f}, "
+        lines.append(f"{' and '.join(story.added)} took the error from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
                      "before and after with the car's numbers and the distances refitted within their tolerance. "
                      f"As the last file says, on the distances as recorded, it is {story.last.plain.error:.3f}.")
     lines.append(f"The sensor's noise alone makes about {story.floor:.3f}.")
@@ -35,11 +43,12 @@ def ending(story: Story) -> list[str]:
 
 def as_json(story: Story) -> dict[str, Any]:
     """The story as one JSON object."""
+    models = steps(story)
     return {
-        "error_before": story.steps[0][1], "error_after": story.steps[-1][1], "noise_floor_error": story.floor,
+        "error_before": models[0][1], "error_after": models[-1][1], "noise_floor_error": story.floor,
         "added": story.added, "refused": list(story.refused), "left": story.not_added,
         "unexplained": story.diagnoses[-1].unexplained,
-        "steps": [{"step": words, "error": error} for words, error in story.steps],
+        "steps": [{"step": words, "error": error} for words, error in models],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],
         "vehicles": [one.file for one in story.rounds], "sentences": ending(story),

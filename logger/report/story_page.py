@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments, short_names
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.session import Round, Story
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
@@ -15,7 +15,8 @@ from logger.report.diagnosis_page import falling, shape_sections
 from logger.report.diagnosis_text import summary, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
-from logger.report.session_text import ending
+from logger.report.session_text import ending, steps
+from logger.runs import short_names
 
 STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")
@@ -47,16 +48,16 @@ def page(story: Story) -> Html:
 
 def _tiles(story: Story) -> Html:
     return tiles([
-        ("Error as the file says", f"{story.steps[0][1]:.3f}", "as recorded"),
-        ("Error at last", f"{story.steps[-1][1]:.3f}", "refitted"),
+        ("Error as the file says", f"{steps(story)[0][1]:.3f}", "as recorded"),
+        ("Error at last", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ("The sensor's noise alone", f"{story.floor:.3f}", ""),
         ("Effects added", f"{len(story.added)}", ""),
     ])
 
 
 def _steps(story: Story) -> Html:
-    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(story.steps)]
-    return (falling("Error of each model, on all samples", story.steps, story.floor)
+    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
+    return (falling("Error of each model, on all samples", steps(story), story.floor)
             + grid(("Step", "Model", "Error"), rows, words=(0, 1)) + hint(STEPS_HINT))
 
 

@@ -7,38 +7,43 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.residuals.breakdown import ModelResiduals, block_means
+from logger.lab.residuals.breakdown import BLOCK_S, ModelResiduals
 
 Array = npt.NDArray[np.float64]
 
-_UNKNOWN = float("nan")
-_LEAST_BLOCKS, _LEAST_FREEDOM = 4, 6
+
+def block_means(residuals: ModelResiduals, signals: Sequence[Array], blocks: int = 1) -> Array:
+    """Means of signals [(n,), ...] over so many blocks at a time, all runs one after the other (b,); what is over at an
+    end is left out."""
+    size = max(2, round(blocks * BLOCK_S * residuals.rate_hz))
+    return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
 
 
-def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals, seconds: float) -> tuple[float, float, float]:
-    """Mean, its standard error from the spread of blocks, and Student's p-value against 0; NaN where nothing is known.
-    """
+def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals) -> tuple[float, float, float]:
+    """Mean of signals [(n,), ...], its standard error from the spread of pairs of blocks, and Student's p-value against
+    0; NaN where nothing is known."""
     from scipy.stats import ttest_1samp
 
-    means = block_means(residuals, signals, seconds)
-    if len(means) < _LEAST_BLOCKS:
-        return float(means.mean()), _UNKNOWN, _UNKNOWN
+    means = block_means(residuals, signals, 2)
+    if len(means) < 4:
+        return float(means.mean()), np.nan, np.nan
     error = float(means.std(ddof=1) / np.sqrt(len(means)))
-    return float(means.mean()), error, float(ttest_1samp(means, 0.0).pvalue) if error > 0 else _UNKNOWN
+    return float(means.mean()), error, float(ttest_1samp(means, 0.0).pvalue) if error > 0 else np.nan
 
 
 def rank_correlation(one: Array, other: Array) -> tuple[float, float]:
-    """Spearman's rank correlation and its p-value; NaN where nothing is known."""
+    """Spearman's rank correlation of (n,) with (n,) and its p-value; NaN for fewer than eight or where nothing varies.
+    """
     from scipy.stats import spearmanr
 
-    if len(one) - 2 < _LEAST_FREEDOM or not (np.ptp(one) > 0 and np.ptp(other) > 0):
-        return _UNKNOWN, _UNKNOWN
+    if len(one) < 8 or not (np.ptp(one) > 0 and np.ptp(other) > 0):
+        return np.nan, np.nan
     found = spearmanr(one, other)
     return float(found.statistic), float(found.pvalue)
 
 
 def autocorrelations(signals: Sequence[Array], lags: int) -> Array:
-    """At 1 ... lags samples (lags,)."""
+    """Correlations of the samples of signals [(n,), ...] that lie 1 ... lags apart (lags,)."""
     power = sum(float(one @ one) for one in signals) or 1.0
     return np.array([sum(float(one[lag:] @ one[:-lag]) for one in signals) for lag in range(1, lags + 1)]) / power
 
@@ -50,5 +55,5 @@ def band_pass(signal: Array, low_hz: float, high_hz: float, rate_hz: float) -> A
 
 
 def rms(signals: Sequence[Array]) -> float:
-    """Over all samples of some signals."""
+    """Root-mean-square of all samples of signals [(n,), ...]."""
     return float(np.sqrt(sum(float(one @ one) for one in signals) / sum(map(len, signals))))

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.lag import WINDOW_S
 from logger.runs import Run
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
@@ -23,19 +24,10 @@ from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
-SEGMENT_S = 2.56
-"""Spectra are means over segments so long, of which each overlaps half of the next."""
 BLOCK_S = 1.0
-"""Blocks so long count as independent, and are what speed and excitation are asked of."""
-BAND_NAMES = ("below body bounce", "body bounce", "between", "wheel hop", "above wheel hop", "far above wheel hop",
-              "beyond the recorder's filter")
-_BODY_SPREAD, _HOP_SPREAD = 1.35, 1.3
-_LEVELS = 4
-_SPEED_BINS = 6
-_PLACE_S = 0.6
-_STEPS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Blocks so long count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps an
+eighth of its motion after that time."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +58,6 @@ class Part:
     samples: int
     name: str = ""
 
-    def error_text(self, digits: int) -> str:
-        """The error with so many digits behind the point; a dash where there is none."""
-        return f"{self.error:.{digits}f}" if np.isfinite(self.error) else "-"
-
 
 @dataclass(frozen=True)
 class Breakdown:
@@ -97,7 +85,7 @@ class ModelResiduals:
 
     @property
     def rate_hz(self) -> float:
-        """The same in all runs."""
+        """Samples a second, the same in all runs."""
         return self.runs[0].rate_hz
 
     @cached_property
@@ -107,12 +95,12 @@ class ModelResiduals:
 
     @cached_property
     def measured(self) -> list[Array]:
-        """The samples that count, per run [m/s2]."""
-        return [run.measured_mps2[run.first:] for run in self.runs]
+        """What was measured, the samples that count, per run [m/s2]."""
+        return [run.kept_mps2 for run in self.runs]
 
     @cached_property
     def model(self) -> list[Array]:
-        """The samples that count, per run [m/s2]."""
+        """What the model predicts, the samples that count, per run [m/s2]."""
         return [one[run.first:] for run, one in zip(self.runs, self.predictions, strict=True)]
 
     def kept(self, of: Callable[[Run], Array]) -> list[Array]:
@@ -121,17 +109,20 @@ class ModelResiduals:
 
     @cached_property
     def bands(self) -> tuple[Band, ...]:
-        """Body and wheels of this car, and what lies below, between and above, up to half the sample rate."""
+        """Body and wheels of this car, about as wide as their damping makes them, and what lies below, between and
+        above, up to half the sample rate."""
         structure = structure_of(self.car.vehicle)
         own_hz = undamped_frequencies_hz(structure)
         body_hz, wheels_hz = own_hz[: -len(structure.wheels)], own_hz[-len(structure.wheels):]
         between = np.sqrt(body_hz[-1] * wheels_hz[0])
-        top, above = self.rate_hz / 2, wheels_hz[-1] * _HOP_SPREAD
+        top, above = self.rate_hz / 2, wheels_hz[-1] * 1.3
         kept = max(PASS_OF_RATE * self.rate_hz, above)
-        ends = [0.0, body_hz[0] / _BODY_SPREAD, min(body_hz[-1] * _BODY_SPREAD, between),
-                max(wheels_hz[0] / _HOP_SPREAD, between), above, np.sqrt(above * kept), kept, top]
-        rounded = [round(float(min(end, top)), 2) for end in ends]
-        return tuple(Band(name, low, high) for name, (low, high) in zip(BAND_NAMES, pairwise(rounded), strict=True)
+        bands = (("below body bounce", body_hz[0] / 1.35), ("body bounce", min(body_hz[-1] * 1.35, between)),
+                 ("between", max(wheels_hz[0] / 1.3, between)), ("wheel hop", above),
+                 ("above wheel hop", np.sqrt(above * kept)), ("far above wheel hop", kept),
+                 ("beyond the recorder's filter", top))
+        ends = [0.0, *(round(float(min(end, top)), 2) for _, end in bands)]
+        return tuple(Band(name, low, high) for (name, _), (low, high) in zip(bands, pairwise(ends), strict=True)
                      if high > low)
 
 
@@ -140,22 +131,16 @@ def breakdown(residuals: ModelResiduals) -> Breakdown:
     return Breakdown(_by_frequency(residuals), _by_speed(residuals), _by_amplitude(residuals), _by_place(residuals))
 
 
-def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
-    """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
-    numbers; others by their ends. None where there is no such part."""
-    known = {one.name or (one.low, one.high): one for one in before}
-    return [(known.get(one.name or (one.low, one.high)), one) for one in after]
-
-
 # --- tools that the residual tests share ---
 
 
 def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray[np.complex128]:
     """Spectra of all segments of some signals [(n,), ...]: (segments, frequencies), scaled to mean powers.
 
-    Segments are tapered (Hann). They are as long as the longest run at most; a run shorter than one gives none.
+    Segments overlap by half and are tapered (Hann). They are as long as the longest run at most; a run shorter than one
+    gives none.
     """
-    size = segment_size(residuals)
+    size = _segment_size(residuals)
     taper = np.hanning(size + 1)[:-1]
     taper = taper / np.sqrt((taper**2).sum() * size)
     blocks = [np.lib.stride_tricks.sliding_window_view(one, size)[:: max(1, size // 2)]
@@ -165,40 +150,15 @@ def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray
     return np.asarray(spectra)
 
 
-def segment_size(residuals: ModelResiduals) -> int:
+def _segment_size(residuals: ModelResiduals) -> int:
     """Samples in a segment, an even number."""
     longest = max(map(len, residuals.residual))
-    return min(round(SEGMENT_S * residuals.rate_hz), longest) // 2 * 2
+    return min(round(WINDOW_S * residuals.rate_hz), longest) // 2 * 2
 
 
 def frequencies(residuals: ModelResiduals) -> Array:
-    """Of the spectra of ``segments`` [Hz]."""
-    return np.asarray(np.fft.rfftfreq(segment_size(residuals), 1 / residuals.rate_hz))
-
-
-def block_means(residuals: ModelResiduals, signals: Sequence[Array], seconds: float = BLOCK_S) -> Array:
-    """Means over blocks of so many seconds, all runs one after the other (b,); what is over at an end is left out."""
-    size = max(2, round(seconds * residuals.rate_hz))
-    return np.concatenate([one[: len(one) // size * size].reshape(-1, size).mean(axis=1) for one in signals])
-
-
-def running_rms(signal: Array, samples: int) -> Array:
-    """Root-mean-square around each sample (n,)."""
-    width = min(samples, len(signal))
-    mean: Array = np.convolve(signal**2, np.full(width, 1 / width), mode="same").astype(np.float64)
-    return np.asarray(np.sqrt(np.maximum(mean, 0.0)))
-
-
-def short_names(runs: Sequence[Run]) -> dict[str, str]:
-    """What to call runs in a sentence, by name: the last folder of each, or all of the name where those are alike."""
-    last = {run.name: run.name.rstrip("/").rpartition("/")[2] for run in runs}
-    return last if len(set(last.values())) == len(runs) else {run.name: run.name for run in runs}
-
-
-def place_length_m(runs: Sequence[Run]) -> float:
-    """How long the places are, into which the roads are cut: about what a car drives in half a second."""
-    usual = float(np.median(np.concatenate([run.speed_mps[run.first:] for run in runs])))
-    return next((step for step in _STEPS_M if step >= _PLACE_S * usual), _STEPS_M[-1])
+    """Frequencies (f,) of the spectra of ``segments`` [Hz]."""
+    return np.asarray(np.fft.rfftfreq(_segment_size(residuals), 1 / residuals.rate_hz))
 
 
 # --- the four lists ---
@@ -211,32 +171,41 @@ def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
     found = []
     for band in residuals.bands:
         inside = (f_hz >= band.from_hz) & ((f_hz < band.to_hz) | (band is residuals.bands[-1]))
-        part, of = float(residual[inside].sum()), float(measured[inside].sum())
-        found.append(Part(band.from_hz, band.to_hz, _ratio(part, of), part / whole if whole > 0 else 0.0,
-                          float(np.sqrt(part)), sum(map(len, residuals.residual)), band.name))
+        power = float(residual[inside].sum())
+        found.append(_part(band.from_hz, band.to_hz, power, float(measured[inside].sum()), whole, power,
+                           sum(map(len, residuals.residual)), band.name))
     return tuple(found)
 
 
-def _by_speed(residuals: ModelResiduals) -> tuple[Part, ...]:
+def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
+    """In so many steps of a round speed at most, or one more."""
     speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
     low, high = float(speed.min()), float(speed.max())
-    step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= _SPEED_BINS), 50.0)
-    edges = np.arange(np.floor(low / step), np.floor(high / step) + 2) * step
-    return _binned(residuals, speed, edges)
+    step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= most), 50.0)
+    return _binned(residuals, speed, np.arange(np.floor(low / step), np.floor(high / step) + 2) * step)
 
 
 def _by_amplitude(residuals: ModelResiduals) -> tuple[Part, ...]:
+    """In quarters, by the r.m.s. of the model in a block around each sample."""
     size = round(BLOCK_S * residuals.rate_hz)
-    level = np.concatenate([running_rms(one, size) for one in residuals.model])
-    edges = np.unique(np.quantile(level, np.linspace(0, 1, _LEVELS + 1)))
+    level = np.concatenate([_running_rms(one, size) for one in residuals.model])
+    edges = np.unique(np.quantile(level, np.linspace(0, 1, 5)))
     if len(edges) == 1:  # a model that does not move
         edges = np.array([edges[0], edges[0] + 1e-9])
     edges[-1] = np.nextafter(edges[-1], np.inf)
     return _binned(residuals, level, edges)
 
 
-def _by_place(residuals: ModelResiduals) -> tuple[Part, ...]:
-    length = place_length_m(residuals.runs)
+def _running_rms(signal: Array, samples: int) -> Array:
+    width = min(samples, len(signal))
+    mean: Array = np.convolve(signal**2, np.full(width, 1 / width), mode="same").astype(np.float64)
+    return np.asarray(np.sqrt(np.maximum(mean, 0.0)))
+
+
+def _by_place(residuals: ModelResiduals, place_s: float = 0.6) -> tuple[Part, ...]:
+    """In stretches of a round length, about what a car drives in so long or somewhat more."""
+    usual_mps = float(np.median(np.concatenate(residuals.kept(lambda run: run.speed_mps))))
+    length = next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step >= place_s * usual_mps), 50.0)
     whole = sum(float(one @ one) for one in residuals.residual)
     found: list[Part] = []
     for run, residual, measured in zip(residuals.runs, residuals.residual, residuals.measured, strict=True):
@@ -253,15 +222,15 @@ def _binned(residuals: ModelResiduals, values: Array, edges: Array) -> tuple[Par
 
 def _parts(values: Array, edges: Array, residual: Array, measured: Array, whole: float, name: str = "") -> list[Part]:
     """Bins [edge, next edge) that hold samples."""
-    index = np.searchsorted(edges, values, side="right") - 1
-    bins = len(edges) - 1
+    index, bins = np.searchsorted(edges, values, side="right") - 1, len(edges) - 1
     count = np.bincount(index, minlength=bins)
     power, of = (np.bincount(index, one**2, minlength=bins) for one in (residual, measured))
-    return [Part(float(edges[i]), float(edges[i + 1]), _ratio(power[i], of[i]),
-                 float(power[i] / whole) if whole > 0 else 0.0, float(np.sqrt(power[i] / count[i])), int(count[i]),
-                 name)
-            for i in np.flatnonzero(count)]
+    return [_part(float(edges[i]), float(edges[i + 1]), power[i], of[i], whole, power[i] / count[i], int(count[i]),
+                  name) for i in np.flatnonzero(count)]
 
 
-def _ratio(power: float, of: float) -> float:
-    return float(np.sqrt(power / of)) if of > 0 else float("nan")
+def _part(low: float, high: float, power: float, of: float, whole: float, mean: float, samples: int,
+          name: str) -> Part:
+    """By its powers: of the residual in it, of the measurement in it, of all residuals, and the mean of the first."""
+    return Part(low, high, float(np.sqrt(power / of)) if of > 0 else float("nan"),
+                float(power / whole) if whole > 0 else 0.0, float(np.sqrt(mean)), samples, name)

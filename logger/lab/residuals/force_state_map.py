@@ -25,13 +25,9 @@ from logger.vehicle.stepping import force_input
 Array = npt.NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
 
-# Knots, in units of the r.m.s. of what they are of.
 _KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])
-_USED = tuple(int(index) for index in np.flatnonzero(_KNOTS))
-_ORDER = 12
-_HIGHEST_OF_RATE = 0.4
-_RANK = 1e-9
-_NOTHING = 1e-100
+"""Of a curve, in units of the r.m.s. of its coordinate: nearer to each other where more samples are, the last ones
+where half of a per cent of a normal distribution are beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,100 +73,98 @@ class ForceMap:
 
 
 def force_map(residuals: ModelResiduals) -> ForceMap:
-    """The force that is missing in the suspensions, the same law in each."""
-    rate_rms, travel_rms = (float(np.sqrt(np.mean(np.concatenate([getattr(one, name).ravel() for one in
-                            residuals.responses]) ** 2))) or 1.0 for name in ("rate_mps", "travel_m"))
-    rate_knots, travel_knots = _KNOTS * rate_rms, _KNOTS * travel_rms
-    regression = _Regression(residuals)
-    return ForceMap(
-        _curve(regression, residuals, rate_knots, [_hat(rate_knots, index, of_rate=True) for index in _USED]),
-        _curve(regression, residuals, travel_knots, [_hat(travel_knots, index, of_rate=False) for index in _USED]),
-        regression.term(_through(residuals, [lambda _, rate: np.abs(rate)])),
-        regression.term(_through(residuals, [lambda _, rate: rate * np.abs(rate)])),
-        regression.term(_through(residuals, [lambda travel, _: travel**3])))
+    """The force that is missing in the suspensions of a model, by its residuals; the same law in each suspension."""
+    regression = _Regression.of(residuals)
+
+    def term(shape: Shape) -> Term:
+        coefficients, covariance, p_value, share = regression.fitted(_through(residuals, [shape]))
+        return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
+
+    return ForceMap(_curve(regression, residuals, of_rate=True), _curve(regression, residuals, of_rate=False),
+                    term(lambda _, rate: np.abs(rate)), term(lambda _, rate: rate * np.abs(rate)),
+                    term(lambda travel, _: travel**3))
 
 
-def whitening(residual: Sequence[Array]) -> Array:
-    """Filter (p + 1,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white."""
+def _whitening(residual: Sequence[Array], order: int = 12) -> Array:
+    """Filter (order + 1,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white.
+    """
     if autocorrelation(residual, 0).passed:
         return np.ones(1)
     count = sum(map(len, residual))
     lags = np.array([sum(float(one[: len(one) - lag] @ one[lag:]) for one in residual) / count
-                     for lag in range(_ORDER + 1)])
+                     for lag in range(order + 1)])
     lags[0] *= 1 + 1e-6
-    table = lags[np.abs(np.arange(_ORDER)[:, None] - np.arange(_ORDER))]
+    table = lags[np.abs(np.arange(order)[:, None] - np.arange(order))]
     return np.concatenate([[1.0], -np.linalg.solve(table, lags[1:])])
 
 
+@dataclass(frozen=True, eq=False)
 class _Regression:
-    """The residual, and what is never physics, whitened."""
+    """Residuals (n,) and what is never physics (n, m), per run, and the filter that whitens them."""
 
-    def __init__(self, residuals: ModelResiduals) -> None:
-        self._filter = whitening(residuals.residual)
+    residual: Sequence[Array]
+    nuisance: Sequence[Array]
+    whitening: Array
+
+    @staticmethod
+    def of(residuals: ModelResiduals) -> _Regression:
+        """With each linear damper and spring, the gain and a small shift in time as what is never physics."""
         wheels = range(residuals.responses[0].rate_mps.shape[1])
-        linear = [_through(residuals, [_straight(wheel, of_rate) for wheel in wheels]) for of_rate in (True, False)]
+        dampers, springs = (_through(residuals, [_straight(wheel, of_rate) for wheel in wheels])
+                            for of_rate in (True, False))
         rates = [np.gradient(one, 1 / residuals.rate_hz) for one in residuals.model]
-        nuisance = [np.column_stack([*(one[index] for one in linear), model, rate])
-                    for index, (model, rate) in enumerate(zip(residuals.model, rates, strict=True))]
-        pairs = ((residuals.residual, nuisance), (self._whitened(residuals.residual), self._whitened(nuisance)))
-        self._plain, self._white = (_Without(np.concatenate(one), np.concatenate(columns)) for one, columns in pairs)
+        nuisance = [np.column_stack(one) for one in zip(dampers, springs, residuals.model, rates, strict=True)]
+        return _Regression(residuals.residual, nuisance, _whitening(residuals.residual))
 
     def fitted(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
-        """Coefficients (k,), their covariance (k, k), the p-value of all together, and the share that they explain."""
+        """Of columns (n, k) per run: their coefficients (k,), the covariance (k, k) of these, the p-value of all
+        together, by what is whitened, and the share of the residual that they explain, as it is."""
         from scipy.stats import f
 
-        coefficients, covariance, rank, power, residual = self._white.fit(np.concatenate(self._whitened(columns)))
-        freedom = self._white.freedom - rank
-        if rank == 0 or not residual > 0:
+        coefficients, covariance, rank, freedom, power, rest = _fit(
+            *(self._whitened(one) for one in (self.residual, self.nuisance, columns)))
+        if rank == 0 or not rest > 0:
             return coefficients, covariance, float("nan"), 0.0
-        variance = residual / freedom
-        p_value = float(f.sf((power - residual) / rank / variance, rank, freedom))
-        _, _, rank, power, residual = self._plain.fit(np.concatenate(columns))
-        share = 1 - residual / power * self._plain.freedom / (self._plain.freedom - rank) if power > 0 else 0.0
+        variance = rest / freedom
+        p_value = float(f.sf((power - rest) / rank / variance, rank, freedom))
+        _, _, rank, freedom, power, rest = _fit(self.residual, self.nuisance, columns)
+        share = 1 - rest / power * (freedom + rank) / freedom if power > 0 else 0.0
         return coefficients, covariance * variance, p_value, max(share, 0.0)
 
-    def term(self, columns: Sequence[Array]) -> Term:
-        """Of one column."""
-        coefficients, covariance, p_value, share = self.fitted(columns)
-        return Term(float(coefficients[0]), float(np.sqrt(covariance[0, 0])), p_value, share)
-
     def _whitened(self, signals: Sequence[Array]) -> list[Array]:
-        order = len(self._filter) - 1
-        return [sum((weight * one[order - lag : len(one) - lag] for lag, weight in enumerate(self._filter)),
+        order = len(self.whitening) - 1
+        return [sum((weight * one[order - lag : len(one) - lag] for lag, weight in enumerate(self.whitening)),
                     np.zeros_like(one[order:])) for one in signals]
 
 
-class _Without:
-    """A target (n,) and columns without what other columns (n, m) explain."""
-
-    def __init__(self, target: Array, others: Array) -> None:
-        scaled = others / np.maximum(np.sqrt((others**2).sum(axis=0)), 1e-300)
-        residual, values, _ = np.linalg.svd(scaled, full_matrices=False)
-        self._basis = residual[:, values > _RANK * values[0]]
-        self._target = self._removed(target)
-        self.freedom = len(target) - self._basis.shape[1]
-
-    def _removed(self, values: Array) -> Array:
-        return np.asarray(values - self._basis @ (self._basis.T @ values))
-
-    def fit(self, columns: Array) -> tuple[Array, Array, int, float, float]:
-        """Coefficients (k,), (X'X)^-1, the rank, and the squares of the target before and after."""
-        size = np.sqrt((columns**2).sum(axis=0))
-        size = np.where(size > _NOTHING, size, 1.0)
-        gram = self._removed(columns / size)
-        product = gram.T @ gram
-        values, vectors = np.linalg.eigh(product)
-        kept = values > 1e-7
-        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-        coefficients = inverse @ (gram.T @ self._target)
-        before = float(self._target @ self._target)
-        after = before - float(coefficients @ product @ coefficients)
-        return coefficients / size, inverse / np.outer(size, size), int(kept.sum()), before, after
+def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Array],
+         ) -> tuple[Array, Array, int, int, float, float]:
+    """Least squares of a target y (n,) by columns X (n, k), both without what others Z (n, m) explain, given per run:
+    coefficients (k,), inv(X'X), the rank, the degrees of freedom, and the squares of y before and after."""
+    y, z, x = (np.concatenate(one) for one in (target, others, columns))
+    vectors, sizes, _ = np.linalg.svd(z / np.maximum(np.sqrt((z**2).sum(axis=0)), 1e-300), full_matrices=False)
+    basis = vectors[:, sizes > 1e-9 * sizes[0]]
+    scale = np.sqrt((x**2).sum(axis=0))
+    scale = np.where(scale > np.finfo(float).tiny, scale, 1.0)
+    y, x = (one - basis @ (basis.T @ one) for one in (y, x / scale))
+    product = x.T @ x
+    values, directions = np.linalg.eigh(product)
+    kept = values > 1e-7
+    inverse = (directions[:, kept] / values[kept]) @ directions[:, kept].T
+    coefficients = inverse @ (x.T @ y)
+    rank, before = int(kept.sum()), float(y @ y)
+    after = before - float(coefficients @ product @ coefficients)
+    return (coefficients / scale, inverse / np.outer(scale, scale), rank, len(y) - basis.shape[1] - rank, before,
+            after)
 
 
-def _curve(regression: _Regression, residuals: ModelResiduals, knots: Array, shapes: Sequence[Shape]) -> Curve:
-    used = list(_USED)
-    coefficients, covariance, p_value, share = regression.fitted(_through(residuals, shapes))
+def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) -> Curve:
+    """Of rate or of travel."""
+    driven = np.concatenate([(one.rate_mps if of_rate else one.travel_m).ravel() for one in residuals.responses])
+    knots = _KNOTS * (float(np.sqrt(np.mean(driven**2))) or 1.0)
+    used = np.flatnonzero(_KNOTS)
+    coefficients, covariance, p_value, share = regression.fitted(
+        _through(residuals, [_hat(knots, int(index), of_rate) for index in used]))
     # What a straight line through 0 would do is not told apart from a spring or damper a little off: it is taken out,
     # the middle counting as it is driven.
     weight = np.exp(-0.5 * (knots[used] / knots[-1] * _KNOTS[-1]) ** 2)
@@ -182,8 +176,9 @@ def _curve(regression: _Regression, residuals: ModelResiduals, knots: Array, sha
     return Curve(knots, force, errors, p_value, share)
 
 
-def _through(residuals: ModelResiduals, shapes: Sequence[Shape]) -> list[Array]:
-    """What forces of these shapes in the suspensions leave at the sensor: (n, k) per run, the samples that count."""
+def _through(residuals: ModelResiduals, shapes: Sequence[Shape], highest_of_rate: float = 0.4) -> list[Array]:
+    """What forces of these shapes in the suspensions leave at the sensor, where the recorder's filter hardly begins:
+    (n, k) per run, the samples that count."""
     structure = residuals.car.structure
     n, w = len(structure.mass), len(structure.wheels)
     a, _ = structure.state_space()
@@ -192,7 +187,7 @@ def _through(residuals: ModelResiduals, shapes: Sequence[Shape]) -> list[Array]:
     for run, response in zip(residuals.runs, residuals.responses, strict=True):
         length = smooth_length(run.count + round(4 * run.rate_hz))
         f_hz = np.fft.rfftfreq(length, 1 / run.rate_hz)
-        kept = np.flatnonzero(f_hz < _HIGHEST_OF_RATE * run.rate_hz)
+        kept = np.flatnonzero(f_hz < highest_of_rate * run.rate_hz)
         s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
         states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
         transfer = (np.einsum("n,fnw->fw", residuals.car.row @ a[n:], states) + residuals.car.row @ push[n:])

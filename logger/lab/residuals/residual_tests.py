@@ -2,70 +2,69 @@
 
 Problem: a residual has to be read by people who want to know whether physics is missing, and of which kind. Solution:
 each test asks one question (does it follow the road, is the car's answer proportional, does it owe to the direction of
-motion ...), and comes with a value, its standard error where it has one, how probable such a value would be in a
-residual that is noise, and a sentence that says it plainly. A test finds something when it is improbable by chance and
-large enough to matter.
+motion ...), and comes with a value, its standard error where it has one, and how probable such a value would be in a
+residual that is noise. A test finds something when it is improbable by chance and large enough to matter. What each
+says in words stands in ``report.residual_text``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
-from logger.lab.residuals.block_statistics import autocorrelations, band_pass, mean_of_blocks, rank_correlation, rms
-from logger.lab.residuals.breakdown import BAND_NAMES, Breakdown, ModelResiduals, Part, block_means, short_names
-from logger.lab.residuals.force_state_map import Curve, ForceMap, Term, force_map
-from logger.lab.residuals.road_coherence import Coherence, with_road
-from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
-
-Array = npt.NDArray[np.float64]
+from logger.lab.residuals.block_statistics import (
+    autocorrelations,
+    band_pass,
+    block_means,
+    mean_of_blocks,
+    rank_correlation,
+    rms,
+)
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, Part
+from logger.lab.residuals.force_state_map import Curve, ForceMap, force_map
+from logger.lab.residuals.road_coherence import with_road
+from logger.lab.residuals.spectral_lines import loudest, periodogram
+from logger.runs import short_names
+from logger.vehicle.simulate import PASS_OF_RATE
 
 DOUBT = 0.002
 """A test whose result is less probable than this finds something: of some fifteen tests, one is false in thirty
 comparisons."""
-_LEAST_SHARE = 0.02
-_LEAST_CHANGE = 0.02
-_LEAST_LEAN = 0.3
-_ALIKE = 0.5
-_HIGHEST_OF_RATE = 0.38
-_LONG_BLOCK_S = 2.0
-_TONE_WIDTH_HZ = 0.4
-_SPEED_SPREAD = 1.15
-_LEAST_LOG_FACTOR = 0.25
-_GROWN = 1.3
-_MEMORY = 50
-_LEAST_SHIFT_S = 0.003
-_LEAST_DRIFT_M, _MUCH_DRIFT_M = 0.05, 0.3
-_UNKNOWN = float("nan")
+LEAST_SHARE = 0.02
+"""A smaller share of the residual's power, or of a gain, does not matter. A judgement: an error of 0.1 would fall by
+0.001."""
+GROWN = 1.3
+"""A residual that changes by a smaller factor is as large everywhere. A judgement."""
 
 
 @dataclass(frozen=True)
 class ResidualTest:
     """What one test found.
 
-    value, unit        what it is, and its standard error where there is one; NaN where the runs cannot tell
-    p_value            how probable it would be in noise; NaN where the runs cannot tell
-    large              whether it is large enough to matter
-    road               whether it ties the residual to the road or to the car's motion
-    sentence           what it says when it is found
+    value, unit, standard_error    what it is, and its error where there is one; NaN where the runs cannot tell
+    p_value                        how probable it would be in noise; NaN where the runs cannot tell
+    large                          whether it is large enough to matter
+    road                           whether it ties the residual to the road or to the car's motion
+    figures                        what else is to be said of it, by name: the arguments of its sentence
     """
 
     name: str
-    value: float
-    unit: str
-    standard_error: float | None
-    p_value: float
-    large: bool
-    road: bool
-    sentence: str
+    value: float = np.nan
+    unit: str = "1"
+    standard_error: float | None = None
+    p_value: float = np.nan
+    large: bool = False
+    road: bool = False
+    figures: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
-        """Whether it is there, and matters."""
+        """Whether the test finds something: it is hardly chance, and it matters."""
         return bool(self.p_value < DOUBT and self.large)
 
 
@@ -74,44 +73,43 @@ class ResidualTests:
     """All tests of a residual, and what they were read from, for pictures."""
 
     tests: tuple[ResidualTest, ...]
-    coherence: Coherence
     forces: ForceMap
     alignment: Lags
 
     @property
     def found(self) -> tuple[ResidualTest, ...]:
-        """Those that are there."""
+        """The tests that find something."""
         return tuple(one for one in self.tests if one.found)
 
 
 def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: ModelResiduals) -> ResidualTests:
     """Test the residuals of a model.
 
-    where      where it sits
+    where      where their power sits
     unmoved    the same car on the distances as they were recorded, which alignment is asked of
     """
-    coherence, forces, alignment = with_road(residuals), force_map(residuals), lags(unmoved.runs, unmoved.predictions)
+    forces, alignment = force_map(residuals), lags(unmoved.runs, unmoved.predictions)
     drifting = _drift(alignment)
     tests = (
         drifting, _shift(alignment, drifting), _whiteness(residuals), _frequency(residuals, where),
-        _follows_road(residuals, coherence), _gain(residuals),
-        _proportion(residuals), _by_rate(forces), _direction(forces, residuals), _by_travel(forces), _lean(residuals),
+        _follows_road(residuals), _gain(residuals), _proportion(residuals),
+        _by("rate", forces.by_rate, forces.progression.value), _direction(forces, residuals),
+        _by("travel", forces.by_travel, forces.hardening.value), _lean(residuals),
         _excitation(residuals, where), _speed(residuals), _place(residuals, where), _tone(residuals),
     )
-    return ResidualTests(tests, coherence, forces, alignment)
+    return ResidualTests(tests, forces, alignment)
 
 
 # --- the residual by itself ---
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    test = autocorrelation(residuals.residual, 0)
+    """The largest correlation of samples; one of 0.1 tells a hundredth of the power from a sample before."""
     rho = autocorrelations(residuals.residual, LAGS)
     largest = int(np.abs(rho).argmax())
-    error = sum(map(len, residuals.residual)) ** -0.5
-    return ResidualTest("whiteness", float(rho[largest]), "1", error, test.p_value, abs(rho[largest]) > 0.1, False,
-                f"The residual is not white: samples {(largest + 1) / residuals.rate_hz * 1000:.0f} ms apart have a "
-                f"correlation of {rho[largest]:.2f}.")
+    return ResidualTest("whiteness", float(rho[largest]), "1", sum(map(len, residuals.residual)) ** -0.5,
+                        autocorrelation(residuals.residual, 0).p_value, bool(abs(rho[largest]) > 0.1),
+                        figures={"lag_s": (largest + 1) / residuals.rate_hz})
 
 
 def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
@@ -120,116 +118,100 @@ def _frequency(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
 
     parts = where.frequency
     whole, span_s = parts[-1].high, sum(map(len, residuals.residual)) / residuals.rate_hz
+    freedom = 1.6 * span_s  # per hertz, of spectra of segments that overlap
     chances = []
     for part in parts:
         width = part.high - part.low
         ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
-        freedom = 1.6 * span_s
         chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
     best = max((i for i in range(len(parts)) if chances[i] < DOUBT), key=lambda i: parts[i].share,
                default=int(np.argmin(chances)))
     part = parts[best]
-    width = (part.high - part.low) / whole
-    return ResidualTest("frequency", part.share, "1", None, min(chances[best], 1.0), part.share > 2 * width, False,
-                f"{_percent(part.share)} of the residual's power lies {_band_words(part)}, where white noise would "
-                f"have {_percent(width)}; the error there is {part.error_text(2)}.")
+    white = (part.high - part.low) / whole
+    return ResidualTest("frequency", part.share, p_value=min(chances[best], 1.0), large=part.share > 2 * white,
+                        figures={"part": part, "white_share": white})
 
 
 def _lean(residuals: ModelResiduals) -> ResidualTest:
-    """Skewness, with Student's test of the cubes of blocks."""
+    """Skewness, with Student's test of the cubes of blocks; up to 1/2 either way a distribution counts as fairly
+    symmetric (M. G. Bulmer, Principles of Statistics, 1979, chapter 4)."""
     scale = rms(residuals.residual)
     if not scale > 0:
-        return _nothing("lean", "1")
-    mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in residuals.residual], residuals, _LONG_BLOCK_S)
-    return ResidualTest("lean", mean, "1", error, p_value, abs(mean) > _LEAST_LEAN, True,
-                f"The residual has its sharp peaks {'upward' if mean > 0 else 'downward'} (skewness {mean:.1f}): "
-                f"something pushes the body {'up' if mean > 0 else 'down'} in short blows.")
+        return ResidualTest("lean")
+    mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in residuals.residual], residuals)
+    return ResidualTest("lean", mean, "1", error, p_value, abs(mean) > 0.5, True)
 
 
-def _tone(residuals: ModelResiduals) -> ResidualTest:
-    """The frequency that stands out most, of all runs."""
-    tones = []
+def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
+    """The frequency that stands out most, of all runs, from those within a width on either side, about what a spectrum
+    of segments resolves."""
+    names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
-        reach = max(NEIGHBOURS, round(_TONE_WIDTH_HZ * len(residual) / residuals.rate_hz))
-        found = loudest(periodogram(residual), reach=reach)
+        found = loudest(periodogram(residual), reach=round(width_hz * len(residual) / residuals.rate_hz))
         if found is not None:
-            tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), short_names(residuals.runs)[run.name]))
+            tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), names[run.name]))
     if not tones:
-        return _nothing("tone", "Hz")
+        return ResidualTest("tone", unit="Hz")
     p_value, at_hz, name = min(tones)
-    return ResidualTest("tone", at_hz, "Hz", None, min(p_value, 1.0), True, False,
-                f"A single frequency stands out in the residual: {at_hz:.1f} Hz, in {name}. Something hums or rings "
-                "there.")
+    return ResidualTest("tone", at_hz, "Hz", None, min(p_value, 1.0), True, figures={"run": name})
 
 
 # --- the residual and the road ---
 
 
-def _follows_road(residuals: ModelResiduals, coherence: Coherence) -> ResidualTest:
-    top = _HIGHEST_OF_RATE * residuals.rate_hz
+def _follows_road(residuals: ModelResiduals) -> ResidualTest:
+    """Coherence with the road, at the frequencies that the recorder passes."""
+    coherence, top = with_road(residuals), PASS_OF_RATE * residuals.rate_hz
     share, p_value = coherence.explained(0.0, top)
-    bands = [(coherence.explained(band.from_hz, min(band.to_hz, top))[0] * _power(coherence, band.from_hz, band.to_hz),
-              band) for band in residuals.bands if band.from_hz < top]
-    band = max(bands, key=lambda one: one[0])[1]
-    return ResidualTest("coherence", share, "1", None, p_value, share > _LEAST_SHARE, True,
-                f"At least {_percent(share)} of the residual is coherent with the road, most of it "
-                f"{_AROUND[band.name]}. This part is not noise; a linear effect could cause it.")
+    bands = [band for band in residuals.bands if band.from_hz < top]
+    most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
+               * coherence.power_between(band.from_hz, band.to_hz))
+    return ResidualTest("coherence", share, "1", None, p_value, share > LEAST_SHARE, True, {"band": most.name})
 
 
 def _gain(residuals: ModelResiduals) -> ResidualTest:
+    """measured / model; one that is off by half and more is of another shape rather."""
     size = sum(float(one @ one) for one in residuals.model) / sum(map(len, residuals.model))
     if not size > 0:
-        return _nothing("gain", "1")
+        return ResidualTest("gain")
     excess, error, p_value = mean_of_blocks(
         [residual * model / size for residual, model in zip(residuals.residual, residuals.model, strict=True)],
-        residuals, _LONG_BLOCK_S)
-    return ResidualTest("gain", 1 + excess, "1", error, p_value, _LEAST_CHANGE < abs(excess) < _ALIKE, True,
-                f"Where both agree in shape, the measurement is {1 + excess:.3g} times the model "
-                f"(standard error {error:.1g}).")
+        residuals)
+    return ResidualTest("gain", 1 + excess, "1", error, p_value, LEAST_SHARE < abs(excess) < 0.5, True)
 
 
-def _shift(alignment: Lags, drifting: ResidualTest) -> ResidualTest:
-    """The same shift all the way; none where it grows on the way."""
+def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
+    """The same shift all the way; none where it grows on the way. ``least_s`` is a third of a sample at 100 samples a
+    second, which no clock is asked to be better than."""
     time, length, is_time = constant(alignment)
-    ahead = "behind" if time.value > 0 else "ahead of"
-    as_time = f"{abs(time.value) * 1000:.0f} ms"
-    as_length = f"{abs(length.value):.2f} m"
-    if is_time is None:
-        words = f"about {as_time} or {as_length}; drives at other speeds would tell which"
-    else:
-        words = f"{as_time}, whatever the speed" if is_time else f"{as_length} of road, whatever the speed"
-    trend = length if is_time is False else time
-    return ResidualTest("shift", trend.value, "m" if is_time is False else "s", trend.error, trend.p_value,
-                abs(time.value) > _LEAST_SHIFT_S and not drifting.found, True,
-                f"The measurement comes {ahead} the model by {words}.")
+    trend, unit = (length, "m") if is_time is False else (time, "s")
+    return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
+                        abs(time.value) > least_s and not drifting.found, True,
+                        {"time_s": time.value, "length_m": length.value, "is_time": is_time})
 
 
-def _drift(alignment: Lags) -> ResidualTest:
+def _drift(alignment: Lags, least_m: float = 0.05) -> ResidualTest:
+    """A shift that grows on the way, to so much at least in the longest run (a judgement: about a
+    twentieth of the wave that makes wheels hop at 10 m/s)."""
     trend = drift(alignment)
     in_all_m = abs(trend.value) * float(alignment.along_m.max(initial=0.0))
-    words = "ahead" if trend.value > 0 else "behind"
-    more = " Whatever else is found may come from that alone." if in_all_m > _MUCH_DRIFT_M else ""
-    return ResidualTest("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > _LEAST_DRIFT_M, True,
-                f"The model runs {words} by {abs(trend.value) * 100:.2g} m in each 100 m of the way, {in_all_m:.2g} m "
-                f"in the longest run: the recorded speed is off by a factor.{more}")
+    return ResidualTest("drift", trend.value, "m/m", trend.error, trend.p_value, in_all_m > least_m, True,
+                        {"in_all_m": in_all_m})
 
 
 def _proportion(residuals: ModelResiduals) -> ResidualTest:
     """measured / model where a band is weak and where it is strong, with Welch's test of the difference."""
-    best: tuple[float, float, float, float, str] | None = None
-    bands = residuals.bands[1:]
-    for band in bands:
-        found = _two_gains(residuals, band.from_hz, min(band.to_hz, _HIGHEST_OF_RATE * residuals.rate_hz))
-        if found is not None and (best is None or found[2] < best[2]):
-            best = (*found, band.name)
-    if best is None:
-        return _nothing("proportion", "1")
-    weak, strong, p_value, error, name = best
-    return ResidualTest("proportion", strong - weak, "1", error, min(1.0, p_value * len(bands)),
-                abs(strong - weak) > 2 * _LEAST_CHANGE, True,
-                f"The car does not answer in proportion to the road: {_AROUND[name]} the measurement is "
-                f"{weak:.2f} of the model where that moves little and {strong:.2f} where it moves much.")
+    found = []
+    for band in residuals.bands[1:]:
+        gains = _two_gains(residuals, band.from_hz, min(band.to_hz, PASS_OF_RATE * residuals.rate_hz))
+        if gains is not None:
+            found.append((*gains, band.name))
+    if not found:
+        return ResidualTest("proportion")
+    weak, strong, p_value, error, name = min(found, key=lambda one: one[2])
+    return ResidualTest("proportion", strong - weak, "1", error, min(1.0, p_value * (len(residuals.bands) - 1)),
+                        abs(strong - weak) > 2 * LEAST_SHARE, True, {"weak": weak, "strong": strong, "band": name})
 
 
 def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tuple[float, float, float, float] | None:
@@ -239,9 +221,9 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
     if high_hz <= low_hz:
         return None
     model, residual = ([band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
-                   for signals in (residuals.model, residuals.residual))
-    own = block_means(residuals, [one**2 for one in model], _LONG_BLOCK_S)
-    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], _LONG_BLOCK_S)
+                       for signals in (residuals.model, residuals.residual))
+    own = block_means(residuals, [one**2 for one in model], 2)
+    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], 2)
     third = len(own) // 3
     if third < 4 or not own.any():
         return None
@@ -263,93 +245,52 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 # --- the residual and the suspensions ---
 
 
-def _by_rate(forces: ForceMap) -> ResidualTest:
-    curve = forces.by_rate
-    bend = "yields at speed" if forces.progression.value < 0 else "stiffens with speed"
-    return ResidualTest("force by rate", _size(curve), "N", None, curve.p_value, curve.share > _LEAST_SHARE, True,
-                f"A force in the suspensions that depends on their velocity, "
-                f"{_side(curve, f'like a damper that {bend}')}, would explain {_percent(curve.share)} of the "
-                f"residual. In addition to linear dampers: {_ends(curve, 1, 'm/s')}.")
-
-
-def _by_travel(forces: ForceMap) -> ResidualTest:
-    curve = forces.by_travel
-    bend = "softens" if forces.hardening.value < 0 else "hardens"
-    return ResidualTest("force by travel", _size(curve), "N", None, curve.p_value, curve.share > _LEAST_SHARE, True,
-                f"A force in the suspensions that depends on their travel, "
-                f"{_side(curve, f'like a spring that {bend} far from its rest')}, would explain "
-                f"{_percent(curve.share)} of the residual. In addition to linear springs: "
-                f"{_ends(curve, 1000, 'mm')}.")
-
-
-def _side(curve: Curve, both: str) -> str:
-    """On which side a curve acts; ``both``: what to say where it acts on both in opposite directions."""
-    low, high = abs(float(curve.force_n[0])), abs(float(curve.force_n[-1]))
-    if min(low, high) < max(low, high) / 3:
-        return f"mostly in {'compression' if low > high else 'extension'}"
-    return both if curve.force_n[0] * curve.force_n[-1] < 0 else "in the same direction in compression and extension"
-
-
-def _ends(curve: Curve, factor: float, unit: str) -> str:
-    """What a curve does to body and wheel at both its ends."""
-    words = []
-    for index, way in ((0, "compression"), (-1, "extension")):
-        force, error = float(curve.force_n[index]), float(curve.error_n[index])
-        size = f"{abs(force):.0f} ± {error:.0f} N {'pulling' if force > 0 else 'pushing'} body and wheel " \
-               f"{'together' if force > 0 else 'apart'}"
-        words.append(f"{size if abs(force) > 2 * error else 'about zero'} at {abs(curve.at[index]) * factor:.2g} "
-                     f"{unit} of {way}")
-    return " and ".join(words)
+def _by(coordinate: str, curve: Curve, bend: float) -> ResidualTest:
+    """The largest force of a curve where it is known to a third of itself, else 0; ``bend``: how the law bends."""
+    known = np.abs(curve.force_n) > 3 * curve.error_n
+    return ResidualTest(f"force by {coordinate}", float(np.abs(curve.force_n[known]).max(initial=0.0)), "N", None,
+                        curve.p_value, curve.share > LEAST_SHARE, True, {"curve": curve, "bend": bend})
 
 
 def _direction(forces: ForceMap, residuals: ModelResiduals) -> ResidualTest:
-    term: Term = forces.asymmetry
-    mean = float(np.mean(residuals.car.structure.dampers))
-    more, less = ("rebound", "bump") if term.value > 0 else ("bump", "rebound")
-    ratio = f", by {_percent(2 * abs(term.value) / mean)} of the model's damping" if mean > 0 else ""
-    return ResidualTest("direction", term.value, "N s/m", term.error, term.p_value, term.share > _LEAST_SHARE, True,
-                f"The residual depends on the direction: the suspensions seem to resist {more} more than {less}{ratio} "
-                f"(this would explain {_percent(term.share)}).")
+    term = forces.asymmetry
+    return ResidualTest("direction", term.value, "N s/m", term.error, term.p_value, term.share > LEAST_SHARE, True,
+                        {"share": term.share, "damping": float(np.mean(residuals.car.structure.dampers))})
 
 
 # --- the residual and the drive ---
 
 
 def _excitation(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
-    rho, p_value = rank_correlation(block_means(residuals, [one**2 for one in residuals.residual]),
-                          block_means(residuals, [one**2 for one in residuals.model]))
+    rho, p_value = rank_correlation(*(block_means(residuals, [one**2 for one in signals])
+                                      for signals in (residuals.residual, residuals.model)))
     low, high = where.amplitude[0], where.amplitude[-1]
     grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
-    large = len(where.amplitude) > 1 and (grown > _GROWN if rho > 0 else grown < 1 / _GROWN)
-    return ResidualTest("excitation", rho, "1", None, p_value, large, True,
-                f"The residual {'grows' if rho > 0 else 'shrinks'} as the road moves the car more: "
-                f"{low.residual_mps2:.2g} m/s2 where the model has up to {low.high:.2g} m/s2, "
-                f"{high.residual_mps2:.2g} where it has {high.low:.2g} and more.")
+    large = len(where.amplitude) > 1 and (grown > GROWN if rho > 0 else grown < 1 / GROWN)
+    return ResidualTest("excitation", rho, "1", None, p_value, large, True, {"low": low, "high": high})
 
 
-def _speed(residuals: ModelResiduals) -> ResidualTest:
+def _speed(residuals: ModelResiduals, least_spread: float = 1.15) -> ResidualTest:
     """By which factor the residual changes from the slowest to the fastest driving at equal excitation: a regression of
-    the logarithms of blocks on speed and excitation, the second bent as it will."""
+    the logarithms of blocks on speed and excitation, the second bent as it will. Nothing where speeds hardly spread."""
     from scipy.stats import t
 
     speed = block_means(residuals, residuals.kept(lambda run: run.speed_mps))
     slow, fast = (float(np.quantile(speed, one)) for one in (0.05, 0.95))
     freedom = len(speed) - 5
-    if fast < _SPEED_SPREAD * max(slow, 0.1) or freedom < 6:
-        return _nothing("speed", "1")
+    if fast < least_spread * max(slow, 0.1) or freedom < 6:
+        return ResidualTest("speed")
     residual, model = (np.log(np.maximum(block_means(residuals, [one**2 for one in signals]), 1e-300))
-                   for signals in (residuals.residual, residuals.model))
+                       for signals in (residuals.residual, residuals.model))
     level = (model - model.mean()) / (float(model.std()) or 1.0)
     columns = np.column_stack([np.ones(len(level)), (speed - slow) / (fast - slow), level, level**2, level**3])
     coefficients, *_ = np.linalg.lstsq(columns, residual, rcond=None)
     rest = residual - columns @ coefficients
     error = float(np.sqrt(rest @ rest / freedom * np.linalg.pinv(columns.T @ columns)[1, 1]))
     factor = float(np.exp(coefficients[1] / 2))
-    p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else _UNKNOWN
-    return ResidualTest("speed", factor, "1", factor * error / 2, p_value,
-                abs(np.log(factor)) > _LEAST_LOG_FACTOR, False,
-                f"On stretches with the same motion of the car, the residual is {factor:.1f} times as large at "
-                f"{fast:.0f} m/s as at {slow:.0f} m/s.")
+    p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else np.nan
+    return ResidualTest("speed", factor, "1", factor * error / 2, p_value, max(factor, 1 / factor) > GROWN,
+                        figures={"slow_mps": slow, "fast_mps": fast})
 
 
 def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
@@ -358,55 +299,17 @@ def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
 
     usual = float(np.median([part.residual_mps2 for part in where.place]))
     if not usual > 0:
-        return _nothing("place", "1")
-    worth = 1 / (1 + 2 * float((autocorrelations(residuals.residual, _MEMORY) ** 2).sum()))
+        return ResidualTest("place")
+    worth = 1 / (1 + 2 * float((autocorrelations(residuals.residual, 2 * LAGS) ** 2).sum()))
     mean = sum(part.residual_mps2**2 * part.samples for part in where.place) / sum(part.samples for part in where.place)
     chances = [float(chi2.sf(worth * part.samples * part.residual_mps2**2 / mean, worth * part.samples))
                for part in where.place]
     worst = worst_places(where, 3)
-    names = short_names(residuals.runs)
-    named = "; ".join(f"{names[part.name]}, {part.low:g} to {part.high:g} m ({part.residual_mps2 / usual:.1f} times)"
-                      for part in worst)
     ratio = max(part.residual_mps2 for part in worst) / usual
-    return ResidualTest("place", ratio, "1", None, min(1.0, min(chances) * len(chances)), ratio > 2, False,
-                f"At some places the residual is much larger than usual: {named}.")
+    return ResidualTest("place", ratio, "1", None, min(1.0, min(chances) * len(chances)), ratio > 2, figures={
+        "worst": worst, "usual_mps2": usual, "names": short_names(residuals.runs)})
 
 
 def worst_places(where: Breakdown, count: int) -> list[Part]:
     """The places that hold most of the residual power."""
     return sorted(where.place, key=lambda part: -part.share)[:count]
-
-
-# --- arithmetic ---
-
-
-def _power(coherence: Coherence, low_hz: float, high_hz: float) -> float:
-    return float(coherence.power[(coherence.f_hz >= low_hz) & (coherence.f_hz < high_hz)].sum())
-
-
-def _size(curve: Curve) -> float:
-    """The largest force of a curve where it is known to a third of itself, else 0."""
-    known = np.abs(curve.force_n) > 3 * curve.error_n
-    return float(np.abs(curve.force_n[known]).max(initial=0.0))
-
-
-def _nothing(name: str, unit: str) -> ResidualTest:
-    """A test that these runs do not allow."""
-    return ResidualTest(name, _UNKNOWN, unit, None, _UNKNOWN, False, False, "")
-
-
-# --- words ---
-
-
-def _percent(share: float) -> str:
-    return f"{share:.0%}" if share >= 0.095 else f"{100 * share:.1f}%" if share >= 0.001 else "less than 0.1%"
-
-
-_AROUND = dict(zip(BAND_NAMES, (
-    "below the body's bounce", "around the body's bounce", "between body bounce and wheel hop",
-    "around the wheels' hop", "above the wheels' hop", "far above the wheels' hop", "beyond the recorder's filter"),
-    strict=True))
-
-
-def _band_words(part: Part) -> str:
-    return f"{_AROUND[part.name]} ({part.low:.2g} to {part.high:.2g} Hz)"

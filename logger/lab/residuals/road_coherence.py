@@ -10,7 +10,6 @@ variance. Neighbouring frequencies of tapered segments tell the same: every othe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +19,6 @@ from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
-
-# Segments that overlap by half, with a Hann taper, are worth so much of their number (P. D. Welch 1967).
-_WORTH = 0.947
-_EVERY = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +38,10 @@ class Coherence:
     segments: float
     power: Array
 
+    def power_between(self, low_hz: float, high_hz: float) -> float:
+        """Power of the residual between two frequencies [m2/s4]."""
+        return float(self.power[(self.f_hz >= low_hz) & (self.f_hz < high_hz)].sum())
+
     def explained(self, low_hz: float, high_hz: float) -> tuple[float, float]:
         """Between two frequencies: the share of the residual power, and how probable it would be by chance."""
         from scipy.special import digamma, polygamma
@@ -54,7 +53,7 @@ class Coherence:
         if not power > 0 or n <= q + 1:
             return 0.0, float("nan")
         share = float((self.share[inside] * self.power[inside]).sum() / power)
-        tested = self.raw[inside[::_EVERY]]
+        tested = self.raw[inside[::2]]
         statistic = -float(np.log1p(-np.minimum(tested, 1 - 1e-12)).sum())
         mean = len(tested) * float(digamma(n) - digamma(n - q))
         variance = len(tested) * float(polygamma(1, n - q) - polygamma(1, n))
@@ -62,9 +61,22 @@ class Coherence:
 
 
 def with_road(residuals: ModelResiduals) -> Coherence:
-    """Of the residual and the road under the wheels that the car has."""
-    inputs = [_slopes(residuals, behind_m) for behind_m in np.unique(residuals.car.structure.behind_m)]
-    return _coherence(residuals, inputs)
+    """The coherence of residuals with the road under the wheels that the car has."""
+    axles_m = np.unique(residuals.car.structure.behind_m)
+    residual = segments(residuals, residuals.residual)
+    roads = np.stack([segments(residuals, _slopes(residuals, one)) for one in axles_m], axis=2)
+    count = len(residual)
+    power = np.mean(np.abs(residual) ** 2, axis=0)
+    own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
+    cross = np.einsum("sfi,sf->fi", roads.conj(), residual) / count
+    gain = np.einsum("fij,fj->fi", np.linalg.pinv(own, rcond=1e-6, hermitian=True), cross)
+    found = np.einsum("fi,fi->f", cross.conj(), gain).real
+    raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)
+    # Segments that overlap by half, with a Hann taper, are worth 18 / 19 of their number (P. D. Welch 1967).
+    q, n = len(axles_m), 0.947 * count
+    chance = q / n
+    share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
+    return Coherence(frequencies(residuals), share, raw, q, n, power)
 
 
 def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
@@ -74,19 +86,3 @@ def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
         return np.gradient(height.reshape(run.count, -1).mean(axis=1), 1 / run.rate_hz)
 
     return residuals.kept(of)
-
-
-def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> Coherence:
-    residual = segments(residuals, residuals.residual)
-    roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
-    count = len(residual)
-    power = np.mean(np.abs(residual) ** 2, axis=0)
-    own = np.einsum("sfi,sfj->fij", roads.conj(), roads) / count
-    cross = np.einsum("sfi,sf->fi", roads.conj(), residual) / count
-    gain = np.einsum("fij,fj->fi", np.linalg.pinv(own, rcond=1e-6, hermitian=True), cross)
-    found = np.einsum("fi,fi->f", cross.conj(), gain).real
-    raw = np.clip(np.divide(found, power, out=np.zeros_like(found), where=power > 0), 0.0, 1.0)
-    q, n = len(inputs), _WORTH * count
-    chance = q / n
-    share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
-    return Coherence(frequencies(residuals), share, raw, q, n, power)

@@ -9,10 +9,7 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 NEIGHBOURS = 15
-"""An ordinate is held against so many on either side, or more."""
-_GAP = 3
-# A Hann taper makes neighbours alike: they count for so many fewer.
-_HANN_ALIKE = 1.94
+"""An ordinate is held against so many on either side, or more: their mean is then known to a quarter."""
 
 
 def periodogram(samples: Array) -> Array:
@@ -20,18 +17,20 @@ def periodogram(samples: Array) -> Array:
     return np.asarray(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2)
 
 
-def loudest(power: Array, among: Bools | None = None, reach: int = NEIGHBOURS) -> tuple[int, float] | None:
+def loudest(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
     """The frequency that stands out most of a periodogram, by its number in it, and how probable one so loud would be
-    by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of
-    ``reach`` neighbours on either side is F(2, 2 m) in noise, the best of so many.
+    by chance (at most; above 1 for many quiet ones): the ratio of its power to the mean of its neighbours is F(2, 2 m)
+    in noise, the best of so many.
 
-    power    (f,) of any unit
-    among    (f,) which frequencies are asked, of those with so many neighbours; None: all
+    power         (f,) of any unit
+    among         (f,) which frequencies are asked, of those with so many neighbours; None: all
+    reach, gap    neighbours are so many on either side (``NEIGHBOURS`` at least), the nearest of which are left out
 
     None where no frequency that is asked has power around it.
     """
+    reach = max(NEIGHBOURS, reach)
     around = np.ones(2 * reach + 1)
-    around[reach - _GAP : reach + _GAP + 1] = 0.0
+    around[reach - gap : reach + gap + 1] = 0.0
     level = np.convolve(power, around / around.sum(), mode="same")
     number = np.arange(len(power))
     whole = (number >= reach) & (number < len(power) - reach) & (level > 0)
@@ -39,5 +38,6 @@ def loudest(power: Array, among: Bools | None = None, reach: int = NEIGHBOURS) -
     if not len(asked):
         return None
     ratio = power[asked] / level[asked]
-    worth = around.sum() / _HANN_ALIKE
+    # A Hann taper makes neighbours alike: they count for 1 + 2 (2/3)^2 + 2 (1/6)^2 fewer.
+    worth = around.sum() / 1.94
     return int(asked[ratio.argmax()]), len(asked) * float((1 + ratio.max() / worth) ** -worth)

@@ -13,17 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown, short_names
+from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
 from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
+from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
-
-_SLOWEST_MPS = 1.0
-_FROM_PER_M, _TO_PER_M = 0.3, 2.2
-_WHEEL_M = (0.22, 0.5)
-# A tone in time that slips by a cycle along the way is no line there any more; a line is so many ordinates wide.
-_CYCLE, _LINE, _OTHER_SPEED = 1.0, 2.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -44,27 +39,9 @@ class SpatialLine:
     steady: bool
 
     @property
-    def width_per_m(self) -> float:
-        """How near two wave numbers are that are one."""
-        return _LINE * float(self.per_m[1] - self.per_m[0])
-
-    @property
     def found(self) -> bool:
-        """Whether it is no chance."""
+        """Whether the line is hardly chance."""
         return self.p_value < DOUBT
-
-    @property
-    def sentence(self) -> str:
-        """What it says when it is found."""
-        if self.steady:
-            at_hz = self.at_per_m * self.speed_mps
-            return (f"It repeats every {1 / self.at_per_m:.2f} m of the way or {at_hz:.1f} times a second: at a steady "
-                    f"speed that is the same (clearest in {self.run}). A drive at another speed would tell.")
-        radius_m = 1 / (2 * np.pi * self.at_per_m)
-        wheel = (f" A wheel of {radius_m:.2f} m radius turns so often: look at its balance and roundness."
-                 if _WHEEL_M[0] < radius_m < _WHEEL_M[1] else "")
-        return (f"It repeats every {1 / self.at_per_m:.2f} m of the way, whatever the speed (clearest in {self.run})."
-                f"{wheel}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,45 +64,44 @@ def shape_of(posterior: Posterior, state: State) -> Shape:
     return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 
 
-def sentences(shape: Shape) -> list[str]:
-    """What it looks like."""
-    turns = [shape.line.sentence] if shape.line is not None and shape.line.found else []
-    found = turns + [test.sentence for test in shape.tests.found]
-    return found or ["No test says more: it is spread over all frequencies, speeds and places."]
-
-
-def spatial_line_of(residuals: ModelResiduals) -> SpatialLine | None:
+def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
+                    per_m: tuple[float, float] = (0.3, 2.2)) -> SpatialLine | None:
     """What repeats along the way: as for a tone in time, which it is told from where the speed changes or where another
-    run, at another speed, has it too."""
-    found = []
-    names = short_names(residuals.runs)
+    run, at another speed, has it too.
+
+    slowest_mps    runs that are slower somewhere are not asked
+    per_m          asked of these wave numbers [1/m]: one to three times in a turn of a wheel of 0.22 to 0.5 m radius
+    """
+    found, names = [], short_names(residuals.runs)
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         speed = run.speed_mps[run.first:]
-        if speed.min() < _SLOWEST_MPS or run.distance_m[-1] <= run.distance_m[run.first]:
+        if speed.min() < slowest_mps or run.distance_m[-1] <= run.distance_m[run.first]:
             continue
-        way = np.maximum.accumulate(run.distance_m[run.first:])
-        step_m = float(np.median(speed)) / run.rate_hz
+        way, usual_mps = np.maximum.accumulate(run.distance_m[run.first:]), float(np.median(speed))
+        step_m = usual_mps / run.rate_hz
         along = np.interp(np.arange(way[0], way[-1], step_m), way, residual)
-        per_m = np.fft.rfftfreq(len(along), step_m)
-        asked = (per_m > _FROM_PER_M) & (per_m < _TO_PER_M)
+        waves_per_m = np.fft.rfftfreq(len(along), step_m)
+        asked = (waves_per_m > per_m[0]) & (waves_per_m < per_m[1])
         power = periodogram(along)
         stands_out = loudest(power, asked)
         if stands_out is None or asked.sum() < NEIGHBOURS:
             continue
-        at_per_m = float(per_m[stands_out[0]])
-        usual_mps = float(np.median(speed))
-        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < _CYCLE
-        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1], np.asarray(per_m[asked], float),
-                           power[asked] / float(power[asked].mean()), steady))
+        at_per_m = float(waves_per_m[stands_out[0]])
+        # A tone in time that slips by a cycle along the way is no line there any more.
+        steady = _slips(way, run.rate_hz) * at_per_m * usual_mps < 1
+        found.append(SpatialLine(names[run.name], at_per_m, usual_mps, stands_out[1],
+                                 np.asarray(waves_per_m[asked], float), power[asked] / float(power[asked].mean()),
+                                 steady))
     best = min(found, key=lambda one: one.p_value, default=None)
     if best is None:
         return None
     best = replace(best, p_value=min(1.0, best.p_value * len(found)))
-    others = [one for one in found if abs(one.speed_mps / best.speed_mps - 1) > _OTHER_SPEED]
+    others = [one for one in found if abs(one.speed_mps / best.speed_mps - 1) > 0.05]
     if not best.steady or not others:
         return best
-    again = any(abs(one.at_per_m - best.at_per_m) < max(one.width_per_m, best.width_per_m) and one.found
-                for one in others)
+    # A tapered line is two ordinates wide.
+    again = any(one.found and abs(one.at_per_m - best.at_per_m) < 2 * max(np.diff(line.per_m[:2])[0]
+                for line in (one, best)) for one in others)
     return replace(best, steady=False) if again else replace(best, p_value=1.0)
 
 

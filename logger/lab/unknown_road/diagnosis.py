@@ -13,9 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.identification.identifiability import NOT_ONE_ROAD, structural
+from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise
 from logger.lab.likelihood.standard_errors import with_errors
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
@@ -26,18 +25,13 @@ from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
 from logger.lab.unknown_road.screening import Trial, trials
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, chosen
 from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.simulate import PASS_OF_RATE
 
-Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
-MOST_EFFECTS = 3
 TAKEN_BY_ROAD = 0.02
-"""The road takes an effect of whose information it leaves no more than this share."""
-_FITTED, _STARTS, _FIRST_STEPS, _WORTH_FITTING, _LEAST_PROMISE = 3, 2, 4, 0.1, 6.0
-_NOTHING = 1e-2
-# Of a sample's freedom the recorder's filter leaves this share.
-_FREEDOM = 0.74
-_CERTAIN = 3.3  # deviations: less than one time in a thousand
+"""The road takes an effect of whose information it leaves no more than this share: over a road that was measured, the
+same drives would tell seven times as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,31 +52,41 @@ class Candidate:
     confused_with: tuple[str, ...] = ()
     fitted: bool = True
 
+    @property
+    def name(self) -> str:
+        """The effect's."""
+        return self.one.effect.name
+
+    def helps(self, error: float) -> bool:
+        """Whether it is there: not by chance, and of help in predicting each drive by the others, to which a model
+        without it makes this error."""
+        return self.fitted and self.p_value < FALSE_ALARM and self.error <= error
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What was found.
+    """What a diagnosis without a profile found.
 
     candidates    best first, those of the verdict before the others
     missing       effects that the model lacks, with standard errors, in the order they were found
-    steps         models on the way: words, and the error of all drives
+    errors        of all drives: as the vehicle's file says, with its numbers refitted, with each effect that was found
     by_run        error of each run, before and after
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
-    together      of the car's numbers: what these drives cannot tell, in words
+    together      what these drives cannot tell of the car's numbers
     noise_mps2    what no road explains; ``excess``: by what share that is more than the sensor's noise
     doubtful      pairs of runs of which these drives cannot tell whether they are over one road, by name
     """
 
     candidates: tuple[Candidate, ...]
     missing: tuple[Chosen, ...]
-    steps: tuple[tuple[str, float], ...]
+    errors: tuple[float, ...]
     by_run: tuple[tuple[float, float], ...]
     floor_error: float
     untried: Mapping[str, str]
     taken_by_road: Mapping[str, float]
     hidden: Mapping[str, float]
-    together: tuple[str, ...]
+    together: tuple[Finding, ...]
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
@@ -94,8 +98,8 @@ class Found:
 
 
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                       progress: Progress = lambda words: None) -> Found:
-    """Find the effects that the model, with those that are ``present``, lacks.
+                       progress: Progress = lambda words: None, most_effects: int = 3) -> Found:
+    """Find the effects that the model, with those that are ``present``, lacks; no more than so many.
 
     ValueError if one that is present leaves the car answering out of proportion to the road; NotOneRoad for drives that
     are plainly over two.
@@ -106,58 +110,43 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     left = {name: one for name, one in effects.items() if name not in untried}
     alike = likenesses(problem, nominal, _trials(left))
     if found := apart(alike):
-        raise NotOneRoad(_two_roads(*(problem.runs[run].name for run in found)))
+        one, other = (problem.runs[run].name for run in found)
+        raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither tells what the "
+                         f"other met. {NOT_ONE_ROAD}; name drives over one road only")
     progress("refitting the car's own numbers and the road")
-    base = fitted(problem.prepared(nominal), nominal)
-    before = base
-    first: list[Trial] = []
-    fits: list[Candidate] = []
+    before = now = fitted(problem.prepared(nominal), nominal)
+    errors = [before.problem.error(replace(nominal, roads=before.state.roads)), before.problem.error(before.state)]
+    first: list[Candidate] = []
     taken: list[Candidate] = []
-    steps = [("the vehicle as its file says", base.problem.error(replace(nominal, roads=base.state.roads))),
-             ("its numbers refitted within what is granted", base.problem.error(base.state))]
-    for number in range(1, MOST_EFFECTS + 1):
-        progress(f"round {number}: trying {len(left)} effects")
-        tried = trials(base.problem, base, _trials(left))
-        here = _Round(len(left), problem.samples, steps[-1][1])
-        models = _fits(base, tried, progress)
-        candidates = _judged(base, models, here)
-        first, fits = first or tried, fits or candidates
-        best = next((one for one in candidates if here.accepted(one)), None)
+    while len(taken) < most_effects:
+        progress(f"round {len(taken) + 1}: trying {len(left)} effects")
+        ranked = _ranked(trials(now.problem, now, _trials(left)))
+        models = _fits(now, ranked, progress)
+        candidates = _judged(now, models, len(left), errors[-1])
+        first = first or [*candidates, *(
+            _candidate(now.problem, _beside(now, ones[0].at), ones[0].gain, len(left), fitted=False)
+            for name, ones in ranked.items() if name not in models)]
+        best = next((one for one in candidates if one.helps(errors[-1])), None)
         if best is None:
             break
         taken.append(best)
-        base = models[best.one.effect.name]
-        base = replace(base, problem=base.problem.prepared(base.state))
-        steps.append((f"with {best.one.effect.name}", base.problem.error(base.state)))
-        del left[best.one.effect.name]
-    listed = [*taken, *(one for one in fits if one.one.effect.name not in [own.one.effect.name for own in taken])]
-    listed += _promises(before, first, {one.one.effect.name for one in listed},
-                        _Round(len(effects) - len(untried), problem.samples, steps[1][1]))
-    usual = trials(base.problem, base, [chosen(one, one.usual) for one in left.values()])
-    road = {one.one.effect.name: one.beside_road for one in usual if one.beside_road < TAKEN_BY_ROAD}
-    noise = base.problem.noise(base.state)
+        now = models[best.name]
+        now = replace(now, problem=now.problem.prepared(now.state))
+        errors.append(now.problem.error(now.state))
+        del left[best.name]
+    usual = {one.one.effect.name: one for one in trials(
+        now.problem, now, [chosen(one, one.usual) for one in left.values()])}
+    road = {name: one.beside_road for name, one in usual.items() if one.beside_road < TAKEN_BY_ROAD}
+    noise = now.problem.noise(now.state)
     return Found(
-        tuple(listed), _with_spread(base, len(present)), tuple(steps),
-        tuple(zip(base.problem.errors(before.state), base.problem.errors(base.state), strict=True)),
+        (*taken, *(one for one in first if one.name not in [own.name for own in taken])),
+        _with_errors(now)[len(present):], tuple(errors),
+        tuple(zip(now.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         noise.deviation_mps2 / problem.size_mps2, untried, road,
-        {one.one.effect.name: one.deviations for one in usual
-         if one.deviations < DETECTABLE_SIGMA and one.one.effect.name not in road},
-        _together(base), base.state.noise_mps2, _excess(base, noise),
+        {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
+        _together(now), now.state.noise_mps2, _excess(now, noise),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in in_doubt(alike)),
     )
-
-
-def _excess(model: Fitted, noise: Noise) -> float:
-    """By what share what no road explains is above the noise; no more than that asks for no explanation where chance
-    would make so much."""
-    above = model.state.noise_mps2 / noise.deviation_mps2 - 1
-    error = np.hypot(noise.standard_error_mps2 / noise.deviation_mps2, (2 * _FREEDOM * model.problem.samples) ** -0.5)
-    return float(above if above > _CERTAIN * error else min(above, UNEXPLAINED))
-
-
-def _two_roads(one: str, other: str) -> str:
-    return (f"{one} and {other}: expected drives over the same road, found that neither tells what the other met. "
-            f"{NOT_ONE_ROAD}; name drives over one road only")
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -181,31 +170,38 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
     return found
 
 
+# --- one round ---
+
+
 def _trials(effects: Mapping[str, Effect]) -> list[Chosen]:
     return [chosen(effect, values) for effect in effects.values() for values in effect.trials()]
 
 
-def _fits(base: Fitted, tried: Sequence[Trial], progress: Progress) -> dict[str, Fitted]:
-    """The most promising effects fitted beside the model, by name."""
-    ranked: dict[str, list[Trial]] = {}
+def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
+    """Trials by the names of their effects, the most promising first."""
+    found: dict[str, list[Trial]] = {}
     for one in sorted(tried, key=lambda one: -one.gain):
-        ranked.setdefault(one.one.effect.name, []).append(one)
-    least = max(_LEAST_PROMISE, _WORTH_FITTING * max((one.gain for one in tried), default=0.0))
-    worth = [name for name, ones in ranked.items() if ones[0].gain > least]
-    found = {}
-    for name in worth[:_FITTED]:
-        progress(f"fitting {name}")
-        tries = [fitted(base.problem, start, _FIRST_STEPS) for start in _starts(base, ranked[name])]
-        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
-        found[name] = fitted(best.problem, best.state)
+        found.setdefault(one.one.effect.name, []).append(one)
     return found
 
 
-def _starts(base: Fitted, ranked: Sequence[Trial]) -> list[State]:
-    """Where fits of an effect begin: its best trials as they are, and the best at the strength that it promises, which
-    holds for small changes only."""
-    ones = [ranked[0].at, *(trial.one for trial in ranked[:_STARTS])]
-    return [_beside(base, one) for one in ones]
+def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
+          least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, Fitted]:
+    """The most promising effects fitted beside the model, by name; the best of a few steps from each start goes on.
+
+    most, share, least    so many at most, of those that promise this share of the best one, and so much
+    starts                so many trials as they are; the best one also at the strength that it promises, which holds
+                          for small changes only
+    """
+    enough = max([least, *(share * ones[0].gain for ones in ranked.values())])
+    found = {}
+    for name in [name for name, ones in ranked.items() if ones[0].gain > enough][:most]:
+        progress(f"fitting {name}")
+        begins = [ranked[name][0].at, *(trial.one for trial in ranked[name][:starts])]
+        tries = [fitted(base.problem, _beside(base, one), first_steps) for one in begins]
+        best = max(tries, key=lambda one: one.problem.gain(base.state, one.state))
+        found[name] = fitted(best.problem, best.state)
+    return found
 
 
 def _beside(base: Fitted, one: Chosen) -> State:
@@ -214,63 +210,35 @@ def _beside(base: Fitted, one: Chosen) -> State:
     return replace(base.state, effects=effects, gains=base.problem.response(effects, base.state.logs))
 
 
-@dataclass(frozen=True)
-class _Round:
-    """A model that so many candidates are tried on, over so many samples, and its error."""
-
-    candidates: int
-    samples: int
-    error: float
-
-    def evidence_gain(self, one: Chosen, gain: float) -> float:
-        """What an effect gains in minus twice the log of the evidence, by its gain in likelihood (G. Schwarz 1978)."""
-        return gain - len(moves_of([one])) * float(np.log(self.samples))
-
-    def accepted(self, one: Candidate) -> bool:
-        """Whether an effect is there: not by chance, and of help in predicting each drive by the others."""
-        return one.fitted and one.p_value < FALSE_ALARM and one.error <= self.error
-
-
-def _judged(base: Fitted, models: Mapping[str, Fitted], here: _Round) -> list[Candidate]:
-    """Fitted effects as candidates, best first."""
-    found = []
-    for model in models.values():
-        one = model.state.effects[-1]
-        gain = here.evidence_gain(one, model.problem.gain(base.state, model.state))
-        found.append(Candidate(one, model.problem.error(model.state), probability_by_chance(gain, here.candidates),
-                               gain))
+def _judged(base: Fitted, models: Mapping[str, Fitted], count: int, error: float) -> list[Candidate]:
+    """Fitted effects as candidates of so many, best first, with those that explain about as much as each."""
+    found = [_candidate(one.problem, one.state, one.problem.gain(base.state, one.state), count)
+             for one in models.values()]
     found.sort(key=lambda one: -one.gain)
-    return [replace(one, confused_with=_rivals(one, found, here)) for one in found]
+    there = [one for one in found if one.helps(error)]
+    return [replace(one, confused_with=tuple(other.name for other in there if other is not one and one in there
+                                             and abs(other.gain - one.gain) < CONFUSED)) for one in found]
 
 
-def _rivals(one: Candidate, found: Sequence[Candidate], here: _Round) -> tuple[str, ...]:
-    return tuple(other.one.effect.name for other in found
-                 if other is not one and here.accepted(one) and here.accepted(other)
-                 and abs(other.gain - one.gain) < CONFUSED)
+def _candidate(problem: SameRoad, state: State, gain: float, count: int, fitted: bool = True) -> Candidate:
+    """The last effect of a state as one of so many candidates, by its gain in minus twice the log of the likelihood,
+    of which the evidence leaves what its numbers do not cost (G. Schwarz 1978)."""
+    one = state.effects[-1]
+    gain -= len(moves_of([one])) * float(np.log(problem.samples))
+    return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
 
 
-def _promises(base: Fitted, tried: Sequence[Trial], named: set[str], here: _Round) -> list[Candidate]:
-    """What was tried beside a model by its slopes only, best first."""
-    best: dict[str, Trial] = {}
-    for one in sorted(tried, key=lambda one: -one.gain):
-        best.setdefault(one.one.effect.name, one)
-    found = []
-    for name, one in best.items():
-        if name not in named:
-            gain = here.evidence_gain(one.at, one.gain)
-            found.append(Candidate(one.at, base.problem.error(_beside(base, one.at)),
-                                   probability_by_chance(gain, here.candidates), gain, fitted=False))
-    return found
+# --- what is left ---
 
 
-def _with_spread(model: Fitted, present: int) -> tuple[Chosen, ...]:
-    """The effects that were found, with standard errors."""
+def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
+    """The effects of a model with standard errors."""
     first = len(model.state.logs)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + len(model.moves)]
-    return with_errors(model.state.effects, model.moves, deviations)[present:]
+    return with_errors(model.state.effects, model.moves, deviations)
 
 
-def _together(model: Fitted) -> tuple[str, ...]:
+def _together(model: Fitted) -> tuple[Finding, ...]:
     """What these drives cannot tell of masses, springs and dampers beside the road, whatever is granted."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
@@ -279,4 +247,15 @@ def _together(model: Fitted) -> tuple[str, ...]:
     left = model.data[np.ix_(own, own)] - mixed @ inverse(model.data[np.ix_(road, road)]) @ mixed.T
     powers, directions = np.linalg.eigh(left)
     derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
-    return tuple(one.words for one in structural([names[index] for index in own], derivatives, 1.0, _NOTHING))
+    return tuple(structural([names[index] for index in own], derivatives, size=1.0, nothing=0.01))
+
+
+def _excess(model: Fitted, noise: Noise) -> float:
+    """By what share what no road explains is above the noise; no more than that asks for no explanation where chance
+    would make so much. Of a sample's freedom the recorder's filter leaves what it passes."""
+    from scipy.stats import norm
+
+    above = model.state.noise_mps2 / noise.deviation_mps2 - 1
+    freedom = 2 * PASS_OF_RATE * model.problem.samples
+    error = np.hypot(noise.standard_error_mps2 / noise.deviation_mps2, (2 * freedom) ** -0.5)
+    return float(above if above > norm.isf(FALSE_ALARM / 2) * error else min(above, UNEXPLAINED))

@@ -19,9 +19,6 @@ from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_LOG_STEP, _SHARE_STEP = 1e-3, 1e-3
-_MOST_STEPS, _LONGEST_LOG, _SETTLED, _MANY_ROUNDS = 10, 0.5, 0.1, 12
-
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -40,37 +37,37 @@ class Fitted:
     problem: SameRoad
 
 
-def fitted(problem: SameRoad, state: State, steps: int = _MOST_STEPS) -> Fitted:
-    """The most probable state, by Fisher's steps from this one."""
+def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.1, many_rounds: int = 12) -> Fitted:
+    """The most probable state, by so many of Fisher's steps from this one at most.
+
+    settled        a step that promises less, in the log of the probability, is the last
+    many_rounds    equations that take more rounds are prepared anew where the fit has come to
+    """
     moves = moves_of(state.effects)
     p, q = len(state.logs), len(moves)
     here = np.concatenate([state.logs, coordinates_of(state.effects, moves), state.roads])
-    low, high = _bounds(state.effects, moves, len(here), p)
+    low, high, longest = _limits(state.effects, moves, len(here), p)
     low[-1] = np.log(problem.least_mps2)
-    longest = _longest(state.effects, moves, len(here), p)
+
+    def at(here: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
+        return here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+
     for count in range(steps):
-        logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+        logs, effects, roads = at(here)
         gains, slopes = sloped(problem, effects, moves, logs)
-        if problem.rounds > _MANY_ROUNDS:
+        if problem.rounds > many_rounds:
             problem = problem.prepared(State(effects, logs, roads, gains))
-        scored = problem.scored(problem.table(gains, slopes), roads, information=True)
-        pull, prior_precision = prior_terms(problem, logs, q, roads)
-        score = scored.slopes - pull
-        step = _step(score, scored.information + np.diag(prior_precision), here, low, high)
-        if count and float(score @ step) < _SETTLED:
+        score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
+        off, precision = problem.prior_terms(logs, q, roads)
+        score -= precision * off
+        information = data + np.diag(precision)
+        step = _step(score, information, here, low, high)
+        if count and float(score @ step) < settled:
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
-    logs, effects, roads = here[:p], moved(state.effects, moves, here[p : p + q]), here[p + q :]
+    logs, effects, roads = at(here)
     found = State(effects, logs, roads, problem.response(effects, logs))
-    return Fitted(found, tuple(moves), scored.information, scored.information + np.diag(prior_precision), problem)
-
-
-def prior_terms(problem: SameRoad, logs: Array, moves: int, roads: Array) -> tuple[Array, Array]:
-    """How strongly what is granted pulls at each number (m,), and its precision (m,)."""
-    off, precision = problem.prior_terms(roads)
-    own = problem.prior.deviations**-2
-    prior_precision = np.concatenate([own, np.zeros(moves), precision])
-    return prior_precision * np.concatenate([logs, np.zeros(moves), off]), prior_precision
+    return Fitted(found, tuple(moves), data, information, problem)
 
 
 def _step(score: Array, information: Array, here: Array, low: Array, high: Array) -> Array:
@@ -82,44 +79,36 @@ def _step(score: Array, information: Array, here: Array, low: Array, high: Array
 
 
 def inverse(information: Array, ridge: float = 1e-6) -> Array:
-    """Of a matrix whose rows may differ by powers of ten, held off singularity."""
+    """Inverse of a symmetric matrix (m, m) whose rows may differ by powers of ten, held off singularity."""
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information * np.outer(scale, scale) + ridge * np.eye(len(scale))
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 
-def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move],
-            logs: Array) -> tuple[Complex, Complex]:
-    """A response and its slopes by the logs and the moves."""
+def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move], logs: Array,
+           step: float = 1e-3) -> tuple[Complex, Complex]:
+    """A response (x, f) and its slopes (p + q, x, f) by the logs and the moves, over steps of this share."""
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):
         beside = logs.copy()
-        beside[index] += _LOG_STEP
-        slopes.append((problem.response(effects, beside) - gains) / _LOG_STEP)
-    here = coordinates_of(effects, moves)
-    for index, step in enumerate(steps_of(effects, moves, _LOG_STEP, _SHARE_STEP)):
-        beside = here.copy()
         beside[index] += step
-        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / step)
+        slopes.append((problem.response(effects, beside) - gains) / step)
+    here = coordinates_of(effects, moves)
+    for index, own_step in enumerate(steps_of(effects, moves, step, step)):
+        beside = here.copy()
+        beside[index] += own_step
+        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / own_step)
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 
-def _bounds(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> tuple[Array, Array]:
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
+def _limits(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int,
+            longest_log: float = 0.5) -> tuple[Array, Array, Array]:
+    """Of each number its bounds and how far it may go in one step (count,); those of the moves begin at ``first``."""
+    low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
     for index, move in enumerate(moves, first):
         parameter = effects[move.effect].effect.parameters[move.parameter]
-        ends = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
-        low[index], high[index] = ends
-    return low, high
-
-
-def _longest(effects: Sequence[Chosen], moves: Sequence[Move], count: int, first: int) -> Array:
-    """How far each number may go in one step."""
-    longest = np.full(count, _LONGEST_LOG)
-    for index, move in enumerate(moves, first):
-        parameter = effects[move.effect].effect.parameters[move.parameter]
+        low[index], high[index] = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
         if parameter.scale is not Scale.LOG:
-            longest[index] = max(parameter.usual_way(),
-                                 0.5 * abs(coordinates_of(effects, [move])[0]))
-    return longest
+            longest[index] = max(parameter.usual_way(), 0.5 * abs(coordinates_of(effects, [move])[0]))
+    return low, high, longest

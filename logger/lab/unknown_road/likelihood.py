@@ -31,22 +31,20 @@ from logger.lab.likelihood.noise_floor import Noise, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
-from logger.runs import Run
+from logger.roads.iso8608 import STANDARD_WAVINESS
+from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+Ints = npt.NDArray[np.intp]
 
-_STRETCH_S, _LEAST_S = 10.0, 3.0
-_PLACE_OFF_M = 3.0
+_LEAST_S = 3.0
+"""What a drive has to share of a stretch to tell of it: some periods of a body's bounce."""
 PROBES = 8
-# Priors of a stretch: deviations of its waviness, and of its places from those of the whole way.
-_WAVINESS, _WAVINESS_OFF = 2.0, 0.3
-_OFFSET_OFF_M = 0.05
-_LEVEL, _TILT = 0, 1
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+"""Simulated drives that slopes are compared with: gains are taken for less than they seem by one part in so many."""
 
 
 class NotOneRoad(ValueError):
@@ -59,8 +57,8 @@ class State:
 
     effects    with their values
     logs       (p,) logarithms of the car's numbers over the nominal ones
-    roads      (r,) of every stretch its level, its waviness and the places of its drives but the first; the
-               logarithm of the noise last
+    roads      (r,) of every stretch its level, its waviness and the places of its drives but the first, in this
+               order; the logarithm of the noise last
     gains      (x, f) its response
     """
 
@@ -73,15 +71,6 @@ class State:
     def noise_mps2(self) -> float:
         """Deviation of what no road explains."""
         return float(np.exp(self.roads[-1]))
-
-
-@dataclass(frozen=True, eq=False)
-class ScoreAndInformation:
-    """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
-    the information (m, m) or zeros; nothing of the priors is in them."""
-
-    slopes: Array
-    information: Array
 
 
 class SameRoad:
@@ -110,7 +99,7 @@ class SameRoad:
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
             raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
                              "it that another drive was over too, by their distances")
-        options = Options(_WAVINESS, free_waviness=True, place_off_m=_PLACE_OFF_M, probes=PROBES)
+        options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
         self._roads = [UnknownRoad(nominal, [one for _, one in parts], options, generator) for parts in self.stretches]
@@ -125,11 +114,12 @@ class SameRoad:
         return compose(self.prior.vehicle(self.vehicle, logs), effects)
 
     def response(self, effects: Sequence[Chosen], logs: Array) -> Complex:
-        """Its response (x, f). ValueError if it does not answer in proportion to the road."""
+        """The response (x, f) of the car with these numbers and effects. ValueError if it does not answer in proportion
+        to the road."""
         return response_of(self.car(effects, logs), self.rate_hz)
 
     def table(self, gains: Complex, slopes: Complex | None = None) -> Tabulated:
-        """A response with slopes (p, x, f), as roads are asked with."""
+        """A response (x, f) with slopes (p, x, f), as roads are asked with."""
         found = np.empty((0, *gains.shape), complex) if slopes is None else slopes
         return Tabulated(self._behind_m, self._patch_m, self.rate_hz, gains, found)
 
@@ -137,101 +127,111 @@ class SameRoad:
         """The car as it stands on roads of a likely level."""
         return State(tuple(effects), self.stands, self._first, self.response(effects, self.stands))
 
-    def scored(self, table: Tabulated, roads: Array, information: bool) -> ScoreAndInformation:
-        """The slopes, by the table's and by the roads' numbers, and the information."""
+    def scored(self, table: Tabulated, roads: Array, information: bool) -> tuple[Array, Array]:
+        """Slopes of the log-likelihood (m,) by what a response was given slopes by and by the numbers of the roads, and
+        the information (m, m) or zeros; nothing of the priors is in them."""
         p, self.rounds = len(table.slopes), 0
         slopes, matrix = np.zeros(p + self.count), np.zeros((p + self.count, p + self.count))
-        for road, part in zip(self._roads, self._parts, strict=True):
+        for road, at, part, _ in self._at(table, roads):
             whole = np.append(np.arange(p), p + part)
-            asked = road.with_car(table)
-            own, known, _ = asked.score(self._at(roads[part], p), information)
-            self.rounds = max(self.rounds, asked.rounds)
+            own, known, _ = road.score(at, information)
+            self.rounds = max(self.rounds, road.rounds)
             slopes[whole] += own
             matrix[np.ix_(whole, whole)] += known
-        return ScoreAndInformation(slopes, matrix)
+        return slopes, matrix
 
     def prepared(self, state: State) -> SameRoad:
-        """The same, quick for models that are like this one."""
-        table, other = self.table(state.gains), copy(self)
-        other._roads = [road.with_car(table) for road in self._roads]
-        for road, part in zip(other._roads, self._parts, strict=True):
-            road.prepare(self._at(state.roads[part], 0))
+        """The same drives, quick for models that are like this one."""
+        other = copy(self)
+        other._roads = []
+        for road, at, *_ in self._at(self.table(state.gains), state.roads):
+            road.prepare(at)
+            other._roads.append(road)
         return other
 
-    def prior_terms(self, roads: Array) -> tuple[Array, Array]:
-        """How far roads are from what they usually are (r,), and the precision of that (r,)."""
+    def _at(self, table: Tabulated, roads: Array) -> Iterator[tuple[UnknownRoad, RoadState, Ints, list[int]]]:
+        """Every stretch under a car of this response: its road, its numbers, where these stand among those of all
+        roads, and the runs that its drives are of."""
+        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
+            own = roads[part]
+            at = RoadState(np.zeros(len(table.slopes)), float(own[0]), float(own[1]), np.append(0.0, own[2:-1]),
+                           float(np.exp(own[-1])))
+            yield road.with_car(table), at, part, [run for run, _ in parts]
+
+    def prior_terms(self, logs: Array, moves: int, roads: Array, waviness_off: float = 0.3,
+                    place_off_m: float = 0.05) -> tuple[Array, Array]:
+        """How far a state's numbers are from what they usually are (m,), and the precision of that (m,): of the car's,
+        of so many moves of effects, which are free, and of the roads'.
+
+        waviness_off, place_off_m    how far stretches of a road usually are off in their waviness, and their places
+                                     from those of the whole way (judgements)
+        """
         off, precision = np.zeros(self.count), np.zeros(self.count)
         for part in self._parts:
-            off[part[_TILT]] = roads[part[_TILT]] - _WAVINESS
-            precision[part[_TILT]] = _WAVINESS_OFF**-2
-            places = part[_TILT + 1 : -1]
+            off[part[1]] = roads[part[1]] - STANDARD_WAVINESS
+            precision[part[1]] = waviness_off**-2
+            places = part[2:-1]
             off[places] = roads[places] - self._first[places]
-            precision[places] = _OFFSET_OFF_M**-2
-        return off, precision
+            precision[places] = place_off_m**-2
+        free = np.zeros(moves)
+        return np.concatenate([logs, free, off]), np.concatenate([self.prior.deviations**-2, free, precision])
 
     def cost(self, state: State) -> float:
         """What the state's numbers cost: squares of their deviations."""
-        off, precision = self.prior_terms(state.roads)
-        return float(((state.logs / self.prior.deviations) ** 2).sum() + precision @ off**2)
+        p = len(state.logs)
+        off, precision = self.prior_terms(state.logs, 0, state.roads)
+        return float(((state.logs / self.prior.deviations) ** 2).sum() + precision[p:] @ off[p:] ** 2)
 
     def gain(self, before: State, after: State) -> float:
-        """By how much minus twice the log-likelihood falls from one state to another, the priors counted in."""
+        """By how much minus twice the log-likelihood falls from one state to another, the priors counted in: the
+        integral of the slopes between them."""
         change, road_change = after.gains - before.gains, after.roads - before.roads
         total = 0.0
-        for node, weight in zip(0.5 * (_NODES + 1), 0.5 * _WEIGHTS, strict=True):
+        nodes, weights = np.polynomial.legendre.leggauss(3)
+        for node, weight in zip(0.5 * (nodes + 1), 0.5 * weights, strict=True):
             table = self.table(before.gains + node * change, change[None])
-            scored = self.scored(table, before.roads + node * road_change, information=False)
-            total += weight * float(scored.slopes[0] + scored.slopes[1:] @ road_change)
+            slopes, _ = self.scored(table, before.roads + node * road_change, information=False)
+            total += weight * float(slopes[0] + slopes[1:] @ road_change)
         return (2 * total + self.cost(before) - self.cost(after)) / (1 + 1 / PROBES)
 
-    def predicted_by_others(self, state: State) -> list[tuple[int, Array, Array]]:
-        """Of every drive over every stretch: its run, what was read, and what the other drives make one expect."""
-        found = []
-        table = self.table(state.gains)
-        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
-            other, at = road.with_car(table), self._at(state.roads[part], 0)
-            found += [(run, road.measured[number], other.predicted(at, number))
-                      for number, (run, _) in enumerate(parts)]
-        return found
+    def predicted_by_others(self, state: State) -> Iterator[tuple[int, Array, Array]]:
+        """Of every drive over every stretch: its run, what was read (n,), and what the other drives make one expect
+        (n,)."""
+        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
+            for number, run in enumerate(runs):
+                yield run, road.measured[number], road.predicted(at, number)
 
     def predicted_by_each(self, state: State) -> Iterator[tuple[int, int, Array, Array]]:
         """Of every two drives over a stretch, either way: the run, that which tells of it, what was read (n,), and what
         the latter alone makes one expect (n,)."""
-        table = self.table(state.gains)
-        for road, part, parts in zip(self._roads, self._parts, self.stretches, strict=True):
-            other, at = road.with_car(table), self._at(state.roads[part], 0)
-            for number, by in permutations(range(len(parts)), 2):
-                yield parts[number][0], parts[by][0], road.measured[number], other.predicted(at, number, [by])
+        for road, at, _, runs in self._at(self.table(state.gains), state.roads):
+            for number, by in permutations(range(len(runs)), 2):
+                yield runs[number], runs[by], road.measured[number], road.predicted(at, number, [by])
 
     def errors(self, state: State) -> list[float]:
         """Of every run, rms(read - expected) / rms(read), the road being known from the other drives alone; nan for one
         that no other shares a stretch with."""
-        left, whole = np.zeros(len(self.runs)), np.zeros(len(self.runs))
-        for run, read, expected in self.predicted_by_others(state):
-            left[run] += float(((read - expected) ** 2).sum())
-            whole[run] += float((read**2).sum())
-        return [float(np.sqrt(one / all_)) if all_ > 0 else float("nan") for one, all_ in zip(left, whole, strict=True)]
+        drives = list(self.predicted_by_others(state))
+        return [_error([one for one in drives if one[0] == run]) for run in range(len(self.runs))]
 
     def error(self, state: State) -> float:
-        """The same of all of them together."""
-        pairs = self.predicted_by_others(state)
-        return float(np.sqrt(sum(float(((read - expected) ** 2).sum()) for _, read, expected in pairs)
-                             / sum(float((read**2).sum()) for _, read, _ in pairs)))
+        """That error of all runs together."""
+        return _error(list(self.predicted_by_others(state)))
 
     @property
     def size_mps2(self) -> float:
-        """R.m.s. of what was read, by which errors are divided."""
+        """R.m.s. of what was read, by which errors are divided [m/s2]."""
         squares = sum(float((one**2).sum()) for road in self._roads for one in road.measured)
         return float(np.sqrt(squares / self.samples))
 
     @property
     def least_mps2(self) -> float:
-        """What is left is no less than two right simulations differ by."""
+        """The least that a model leaves: what two right simulations of a car differ by [m/s2]."""
         return DISCREPANCY * self.size_mps2
 
     @property
     def samples(self) -> int:
-        """How many there are, of all drives."""
+        """How many samples there are, of all drives."""
         return sum(len(drive.measured_mps2) for parts in self.stretches for _, drive in parts)
 
     def noise(self, state: State) -> Noise:
@@ -244,35 +244,30 @@ class SameRoad:
         return sensor_noise([Bands(one) for one in runs], [one.measured_mps2 for one in runs],
                             self.least_mps2, fitted=False)
 
-    def _at(self, own: Array, count: int) -> RoadState:
-        places = np.append(0.0, own[_TILT + 1 : -1])
-        return RoadState(np.zeros(count), float(own[_LEVEL]), float(own[_TILT]), places, float(np.exp(own[-1])))
-
     def _start(self, nominal: Tabulated) -> Array:
         """Levels and noise from the spectra; places by trying them on the longest stretch."""
         first = np.zeros(int(self._parts[-1][-1]) + 1)
         noises = []
         for road, part in zip(self._roads, self._parts, strict=True):
-            level, noise = road.first_guess(np.zeros(0))
-            first[part[_LEVEL]], first[part[_TILT]] = level, _WAVINESS
+            first[part[0]], noise = road.first_guess(np.zeros(0))
+            first[part[1]] = STANDARD_WAVINESS
             noises.append(noise)
         first[-1] = np.log(max(np.median(noises), self.least_mps2))
-        offsets = self._offsets(first)
+        offsets = self._offsets(nominal, first)
         for part, parts in zip(self._parts, self.stretches, strict=True):
             own = [offsets[run] for run, _ in parts]
-            first[part[_TILT + 1 : -1]] = np.array(own[1:]) - own[0]
+            first[part[2:-1]] = np.array(own[1:]) - own[0]
         return first
 
-    def _offsets(self, first: Array) -> Array:
+    def _offsets(self, nominal: Tabulated, first: Array) -> Array:
         """By how much each run's places are off [m] against those of the first run of the stretch that most runs share;
         where some are not over that one, by way of runs that share another stretch with both."""
         offsets: dict[int, float] = {}
-        while left := [one for one, parts in enumerate(self.stretches) if any(run not in offsets for run, _ in parts)]:
-            tied = [one for one in left if any(run in offsets for run, _ in self.stretches[one])]
-            index = max(tied or left, key=lambda one: len(self.stretches[one]))
-            runs = [run for run, _ in self.stretches[index]]
-            at = self._at(first[self._parts[index]], 0)
-            offset = partial(self._roads[index].offset, at)  # against the first run of the stretch
+        left = list(self._at(nominal, first))
+        while left := [one for one in left if any(run not in offsets for run in one[-1])]:
+            tied = [one for one in left if any(run in offsets for run in one[-1])]
+            road, at, _, runs = max(tied or left, key=lambda one: len(one[-1]))
+            offset = partial(road.offset, at)  # against the first run of the stretch
             if runs[0] not in offsets:
                 known = next((number for number, run in enumerate(runs) if run in offsets), None)
                 offsets[runs[0]] = 0.0 if known is None else offsets[runs[known]] - offset(known)
@@ -282,8 +277,13 @@ class SameRoad:
         return np.array([offsets[run] for run in range(len(self.runs))])
 
 
-def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
-    """Stretches of the way that at least two runs share: of each the runs, by number, and their drives."""
+def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
+    return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
+
+
+def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
+    """Stretches of the way, of about so many seconds, that at least two runs share: of each the runs, by number, and
+    their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
                     for places in ([run.first for run in runs], [-1] * len(runs)))
@@ -291,7 +291,7 @@ def _cut(runs: Sequence[Run]) -> list[list[tuple[int, Drive]]]:
     if len(runs) < 2 or not high > low:
         return []
     pace = float(np.median([np.median(run.speed_mps) for run in runs]))
-    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / _STRETCH_S)) + 1)
+    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / stretch_s)) + 1)
     found = []
     for start, end in pairwise(edges):
         parts = []

@@ -21,16 +21,15 @@ import numpy.typing as npt
 
 from logger.lab.unknown_road.likelihood import SameRoad, State
 from logger.vehicle.effect import Chosen
+from logger.vehicle.simulate import PASS_OF_RATE
 
 Array = npt.NDArray[np.float64]
 
-SEEN, PLAIN = 5.0, 10.0
-"""Standard deviations of chance from which on two drives are over one road (3e-7 each time; some hundred places and
-tens of cars are tried); and that one road would have to make before drives that show less are over two."""
-_LOWEST_HZ, _HIGHEST_OF_RATE, _SMOOTH_HZ, _SMOOTH_S = 0.5, 0.37, 1.5, 0.5
-_TAPER = 0.1  # of a stretch, at each end
-# Places may be a little off yet; what is shifted by more than the latter tells what chance makes.
-_NEAR_S, _FAR_S = 0.05, 1.0
+SEEN = 5.0
+"""Standard deviations of chance from which on two drives are over one road: 3e-7 each time, and some hundred places and
+tens of cars are tried."""
+PLAIN = 2 * SEEN
+"""Those that one road would have to make before drives that show less than half of them are over two."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +92,11 @@ def _likenesses(problem: SameRoad, state: State) -> list[Likeness]:
     return [_likeness(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
 
 
-def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float) -> Likeness:
-    """Of what was read and predicted (n,) of each stretch."""
-    near = round(_NEAR_S * rate_hz)
+def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
+              far_s: float = 1.0) -> Likeness:
+    """Of what was read and predicted (n,) of each stretch: together, where places may be a little off yet, over what
+    chance makes, which those tell that are shifted by far."""
+    near = round(near_s * rate_hz)
     like, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:
         ours, theirs = _even(read, predicted, rate_hz)
@@ -103,7 +104,7 @@ def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: 
         share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
         ours, theirs = (_steady(one, rate_hz) for one in (ours, theirs))
         both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
-        far = min(round(_FAR_S * rate_hz), len(both) // 4)
+        far = min(round(far_s * rate_hz), len(both) // 4)
         chance += float((both[far:-far] ** 2).mean())
         like += both[np.arange(-near, near + 1)]
         expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
@@ -113,22 +114,24 @@ def _likeness(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: 
     return Likeness(run, by, float(like.max()) / deviation, expected / deviation)
 
 
-def _even(read: Array, predicted: Array, rate_hz: float) -> tuple[Array, Array]:
-    """What was read and what was predicted (n,), both over the root of the power that was read at each frequency."""
+def _even(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
+          width_hz: float = 1.5) -> tuple[Array, Array]:
+    """What was read and what was predicted (n,), tapered by a tenth at each end, both over the root of the power that
+    was read around each frequency that the recorder passes."""
     n = len(read)
-    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (_TAPER * n)
+    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.1 * n)
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
     ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, predicted))
     f_hz = np.fft.rfftfreq(n, 1 / rate_hz)
-    power = _smooth(np.abs(ours) ** 2, round(_SMOOTH_HZ * n / rate_hz))
-    used = (f_hz >= _LOWEST_HZ) & (f_hz <= _HIGHEST_OF_RATE * rate_hz) & (power > 0)
+    power = _smooth(np.abs(ours) ** 2, round(width_hz * n / rate_hz))
+    used = (f_hz >= lowest_hz) & (f_hz <= PASS_OF_RATE * rate_hz) & (power > 0)
     gain = np.where(used, 1 / np.sqrt(np.where(used, power, 1.0)), 0.0)
     return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
 
 
-def _steady(samples: Array, rate_hz: float) -> Array:
+def _steady(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
     """Samples (n,) as strong all along: two roads that have a bump at about one place are two roads all the same."""
-    envelope = np.sqrt(_smooth(samples**2, round(_SMOOTH_S * rate_hz)))
+    envelope = np.sqrt(_smooth(samples**2, round(width_s * rate_hz)))
     return np.asarray(samples / np.maximum(envelope, 1e-300))
 
 

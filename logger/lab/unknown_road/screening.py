@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.selection.screening import scaled_by
-from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, prior_terms, sloped
+from logger.lab.unknown_road.fisher_scoring import Fitted, inverse, sloped
 from logger.lab.unknown_road.likelihood import PROBES, SameRoad
 from logger.vehicle.effect import Chosen
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,38 +31,42 @@ class Trial:
 
 
 def trials(problem: SameRoad, base: Fitted, ones: Sequence[Chosen]) -> list[Trial]:
-    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response."""
+    """Effects tried beside a fitted model, by its slopes along the change that each makes in the response: a score
+    test, the car's numbers and the roads' projected out."""
     state = base.state
     gains, own = sloped(problem, state.effects, base.moves, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)
-    scored = problem.scored(problem.table(gains, np.array([*own, *changes])), state.roads, information=True)
+    table = problem.table(gains, np.array([*own, *changes]))
+    slopes, information = problem.scored(table, state.roads, information=True)
     rest = np.r_[0:p, p + k : p + k + problem.count]
     road = np.arange(p + k, p + k + problem.count)
-    pull, prior_precision = prior_terms(problem, state.logs, len(base.moves), state.roads)
-    known = inverse(scored.information[np.ix_(rest, rest)] + np.diag(prior_precision))
-    by_road = inverse(scored.information[np.ix_(road, road)] + np.diag(prior_precision[p:]))
-    score = scored.slopes[rest] - pull
+    off, precision = problem.prior_terms(state.logs, len(base.moves), state.roads)
+    known = inverse(information[np.ix_(rest, rest)] + np.diag(precision))
+    by_road = inverse(information[np.ix_(road, road)] + np.diag(precision[p:]))
+    score = slopes[rest] - precision * off
     found = []
     for index, one in enumerate(ones, p):
-        alone, mixed = scored.information[index, index], scored.information[index, rest]
+        alone, mixed = information[index, index], information[index, rest]
         left = max(float(alone - mixed @ known @ mixed), 0.0)
-        taken = scored.information[index, road]
+        taken = information[index, road]
         share = float(1 - taken @ by_road @ taken / alone) if alone > 0 else 0.0
-        slope = float(scored.slopes[index] - mixed @ known @ score)
-        found.append(_trial(one, slope, left, alone, share))
+        slope = float(slopes[index] - mixed @ known @ score)
+        found.append(_trial(one, slope, left, alone, max(share, 0.0)))
     return found
 
 
-_STRONGEST, _WEAKEST, _NOTHING = 3.0, 0.03, 1e-4
+def _trial(one: Chosen, slope: float, left: float, alone: float, share: float, weakest: float = 0.03,
+           strongest: float = 3.0) -> Trial:
+    """A trial at the strength that its slope and its information promise, within these bounds.
 
-
-def _trial(one: Chosen, slope: float, left: float, alone: float, share: float) -> Trial:
-    if not left > _NOTHING * alone:
-        return Trial(one, 0.0, one, 0.0, max(share, 0.0))
-    strength = float(np.clip(slope / left, _WEAKEST, _STRONGEST))
+    left, alone    its information beside all that is free, and by itself; of less than 1e-4 of that rounding is most
+    """
+    if not left > 1e-4 * alone:
+        return Trial(one, 0.0, one, 0.0, share)
+    strength = float(np.clip(slope / left, weakest, strongest))
     scaled = scaled_by(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one
     gain = (2 * strength * slope - strength**2 * left) / (1 + 1 / PROBES)
-    return Trial(one, gain, scaled, float(np.sqrt(left)), max(share, 0.0))
+    return Trial(one, gain, scaled, float(np.sqrt(left)), share)

@@ -23,16 +23,16 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _STEP_HZ = 0.025
-_RATES_MPS = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
-_STRAIGHT = 1e-9
+"""Responses are tabulated so densely: eight steps are as wide as a resonance at 1 Hz with a damping ratio of 0.1."""
 
 
-def straight(laws: CornerLaws) -> bool:
-    """Whether all forces of a corner are in proportion to how it is moved."""
+def _is_straight(laws: CornerLaws) -> bool:
+    """Whether all forces of a corner are in proportion to how it is moved; of a damper, at some rates either way."""
     if laws.springs or laws.others or laws.tires or laws.dry_friction_n or not laws.tire_pulls:
         return False
-    slopes = laws.damper(_RATES_MPS) / _RATES_MPS
-    return bool(np.ptp(slopes) <= _STRAIGHT * np.abs(slopes).max())
+    rates_mps = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
+    slopes = laws.damper(rates_mps) / rates_mps
+    return bool(np.ptp(slopes) <= 1e-9 * np.abs(slopes).max())
 
 
 def frequencies_of(rate_hz: float) -> Array:
@@ -45,7 +45,7 @@ def response_of(car: Car, rate_hz: float) -> Complex:
 
     Left and right wheels see the same road. ValueError for a car whose laws are not straight.
     """
-    if not all(map(straight, car.laws)):
+    if not all(map(_is_straight, car.laws)):
         raise ValueError("expected a car that answers in proportion to the road")
     f_hz = frequencies_of(rate_hz)
     structure, s = car.structure, np.asarray(2j * np.pi * f_hz, np.complex128)

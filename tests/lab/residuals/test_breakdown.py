@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.lab.residuals.breakdown import Part, breakdown, paired, short_names
-from logger.runs import Run
+from logger.lab.residuals.breakdown import Part, breakdown
+from logger.report.residual_text import error_text, paired
+from logger.runs import Run, short_names
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
 
@@ -61,7 +62,7 @@ def test_where_nothing_was_measured_there_is_no_error() -> None:
 
     where = breakdown(beside_with(silent))
     unknown = [part for part in where.place if not np.isfinite(part.error)]
-    assert unknown and all(part.residual_mps2 > 0 and part.error_text(3) == "-" for part in unknown)
+    assert unknown and all(part.residual_mps2 > 0 and error_text(part, 3) == "-" for part in unknown)
     assert all(part.error > 0 for part in where.place if part not in unknown)
 
 

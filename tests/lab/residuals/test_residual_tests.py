@@ -13,6 +13,7 @@ from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests, worst_places
 from logger.lab.residuals.road_coherence import with_road
+from logger.report.residual_text import sentence
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 
@@ -93,7 +94,7 @@ def test_a_late_clock_is_told_from_a_wrong_place() -> None:
         assert found.found
         assert found.unit == unit
         assert found.value == pytest.approx(value, rel=0.05)
-        assert "behind the model" in found.sentence
+        assert "behind the model" in sentence(found)
 
 
 def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
@@ -106,7 +107,7 @@ def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
     wrong = ModelResiduals(measured, residuals.car, residuals.predictions, residuals.responses)
     assert drift(lags(measured, residuals.predictions)).value == pytest.approx(0.01, rel=0.03)
     found = marks(wrong)
-    assert "runs ahead by 1 m in each 100 m" in mark(found, "drift").sentence
+    assert "runs ahead by 1 m in each 100 m" in sentence(mark(found, "drift"))
     assert found.found[0].name == "drift"
     assert not mark(found, "shift").found
 
@@ -120,7 +121,7 @@ def test_the_direction_of_asymmetric_dampers(ratio: float, words: str) -> None:
     assert forces.asymmetry.value == pytest.approx(truth, rel=0.1)
     found = mark(marks(residuals), "direction")
     assert found.found
-    assert words in found.sentence
+    assert words in sentence(found)
 
 
 def test_the_curve_of_a_cubic_spring() -> None:
@@ -138,7 +139,7 @@ def test_dampers_that_yield_and_friction_bend_the_curve_by_rate() -> None:
     residuals = beside_with(recorded_by([("dry_friction", {"friction_force_n": 60.0})], NOISE_MPS2))
     found = mark(marks(residuals), "force by rate")
     assert found.found
-    assert "yields at speed" in found.sentence
+    assert "yields at speed" in sentence(found)
 
 
 def test_an_answer_out_of_proportion() -> None:
@@ -165,7 +166,7 @@ def test_excitation_and_speed_are_told_apart() -> None:
     assert mark(found, "excitation").found and not mark(found, "speed").found
     found = marks(beside_with(by_speed))
     assert mark(found, "speed").found
-    assert "times as large at 22 m/s as at 7 m/s" in mark(found, "speed").sentence
+    assert "times as large at 22 m/s as at 7 m/s" in sentence(mark(found, "speed"))
     assert mark(found, "speed").value == pytest.approx(22 / 7.3, rel=0.25)
 
 
@@ -179,7 +180,8 @@ def test_the_worst_place_is_named() -> None:
     assert (worst.name, worst.low) == ("runs/run2", 200.0)
     found = mark(marks(residuals), "place")
     assert found.found
-    assert "run2, 200 to " in found.sentence and "runs/run2" not in found.sentence
+    said = sentence(found)
+    assert "run2, 200 to " in said and "runs/run2" not in said
 
 
 def test_a_tone_is_heard() -> None:
@@ -197,7 +199,7 @@ def test_blows_lean_to_one_side() -> None:
 
     found = mark(marks(beside_with(plus_noise(blows))), "lean")
     assert found.found
-    assert "upward" in found.sentence
+    assert "upward" in sentence(found)
 
 
 def test_a_run_of_five_seconds_can_be_read() -> None:
@@ -225,3 +227,8 @@ def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
         residuals = beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed)
         tone = mark(marks(residuals), "tone")
         assert tone.value > 0 and tone.p_value <= 1
+
+
+def test_every_test_has_a_sentence_with_all_of_its_figures() -> None:
+    for one in marks(beside_with(white)).tests:
+        assert sentence(one).endswith("."), one.name

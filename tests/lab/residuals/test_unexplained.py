@@ -7,7 +7,8 @@ import pytest
 
 from logger.lab.diagnosis import refitted
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.lab.residuals.unexplained import sentences, shape_of, spatial_line_of
+from logger.lab.residuals.unexplained import shape_of, spatial_line_of
+from logger.report.residual_text import line_sentence, looks_like
 from logger.runs import Run
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.compose import compose
@@ -27,7 +28,7 @@ def test_what_a_wheel_does_in_each_turn_is_found_and_noise_is_not() -> None:
     turns = spatial_line_of(_with_turns(0.31))
     assert turns is not None and turns.found
     assert 1 / (2 * np.pi * turns.at_per_m) == pytest.approx(0.31, rel=0.02)
-    assert "A wheel of 0.31 m radius" in turns.sentence
+    assert "A wheel of 0.31 m radius" in line_sentence(turns)
     noise = [spatial_line_of(beside_with(lambda run, _, rng: rng.normal(0, 0.03, run.count), seed))
              for seed in range(10)]
     assert not [one for one in noise if one is None or one.found]
@@ -53,12 +54,13 @@ def humming(speeds_mps: list[float], swing: float, at_hz: float | None,
 def test_what_hums_at_a_steady_speed_may_repeat_in_time_or_along_the_way() -> None:
     turns = spatial_line_of(humming([14.0], 0.0, 7.0))
     assert turns is not None and turns.found and turns.steady
-    assert "every 2.00 m of the way or 7.0 times a second" in turns.sentence and "wheel" not in turns.sentence
+    said = line_sentence(turns)
+    assert "every 2.00 m of the way or 7.0 times a second" in said and "wheel" not in said
 
 
 def test_two_steady_speeds_tell_a_wheel_from_a_hum() -> None:
     wheel = spatial_line_of(humming([10.0, 14.0], 0.0, None, 0.5))
-    assert wheel is not None and wheel.found and not wheel.steady and "A wheel of 0.32 m" in wheel.sentence
+    assert wheel is not None and wheel.found and not wheel.steady and "A wheel of 0.32 m" in line_sentence(wheel)
     hum = spatial_line_of(humming([10.0, 14.0], 0.0, 7.0))
     assert hum is not None and not hum.found
 
@@ -77,5 +79,5 @@ def test_the_shape_of_a_fitted_model_is_that_of_its_residuals() -> None:
     residuals = found.residuals.residual
     for run, residual, whole in zip(posterior.runs.runs, residuals, posterior.residuals(state), strict=True):
         assert residual == pytest.approx(whole[run.first:])
-    said = sentences(found)
+    said = looks_like(found)
     assert said and all(one.endswith(".") for one in said)

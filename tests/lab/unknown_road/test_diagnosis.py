@@ -200,7 +200,7 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
 
 def test_what_was_not_fitted_says_so() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
-    found = Found((one,), (), (("as its file says", 0.4), ("refitted", 0.3)), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
+    found = Found((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
     told = as_json(found)
     assert told["candidates"][0]["error"] == 0.28 and told["candidates"][0]["fitted"] is False
