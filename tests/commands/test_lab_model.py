@@ -215,6 +215,7 @@ def test_two_effects_of_one_name(more: list[str], runs: list[str], tmp_path: Pat
         main(["diagnose", *more, "--vehicle", "rav4-2009", *runs, *files])
 
 
+@pytest.mark.slow
 def test_drives_over_two_roads_are_refused_where_no_profile_is_known(tmp_path: Path) -> None:
     runs = write_runs(tmp_path, [], lasts_s=14.0)  # each has a road of its own
     with pytest.raises(BadInput, match=r"run1 and .*run2: expected drives over the same road, found that neither "):

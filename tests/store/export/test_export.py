@@ -188,6 +188,7 @@ def a_manifest(logs: Path, stick: Path, files: int) -> bytes:
     return format_manifest(Manifest(own(logs, stick).name, listed))
 
 
+@pytest.mark.slow
 def test_a_manifest_longer_than_any_of_ours_takes_no_memory(logs: Path, stick: Path) -> None:
     text = a_manifest(logs, stick, 400_000)
     (own(logs, stick) / manifest.NAME).write_bytes(text)
@@ -204,6 +205,7 @@ def test_the_longest_manifest_that_is_read_fits_the_memory(logs: Path, stick: Pa
     assert_all_there(logs, stick)
 
 
+@pytest.mark.slow
 def test_names_without_end_on_a_stick_take_no_memory(
         logs: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(logs, stick)
