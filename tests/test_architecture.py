@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -55,7 +56,8 @@ MODULES = [name for name in TREES if name.startswith("logger.") and floor_of(nam
 DESK = {floor_of(name) for name in MODULES} - CARRIED
 
 
-def imports(module: str) -> set[str]:
+@cache
+def imports(module: str) -> frozenset[str]:
     """Every module or name that a module imports, wherever in it the import stands."""
     found = set()
     for node in ast.walk(TREES[module]):
@@ -64,7 +66,7 @@ def imports(module: str) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{module} imports relatively"
             found |= {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return found
+    return frozenset(found)
 
 
 def closure(start: list[str]) -> set[str]:

@@ -343,6 +343,7 @@ def wait_until(holds: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_drive_through_serial_ports_and_the_running_service(
     ridelog: Path, wires: None, short_dump: Path, tmp_path: Path
 ) -> None:

@@ -57,6 +57,12 @@ def no_fits(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"logger.lab.{name}", None)
 
 
+@pytest.fixture
+def fits(no_fits: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All the same."""
+    monkeypatch.undo()
+
+
 def car_with(folder: Path, effect: str) -> str:
     path = folder / "car.yaml"
     text = vehicle_file("rav4-2009").read_text("utf-8")
@@ -209,6 +215,7 @@ def test_two_effects_of_one_name(more: list[str], runs: list[str], tmp_path: Pat
         main(["diagnose", *more, "--vehicle", "rav4-2009", *runs, *files])
 
 
+@pytest.mark.slow
 def test_drives_over_two_roads_are_refused_where_no_profile_is_known(tmp_path: Path) -> None:
     runs = write_runs(tmp_path, [], lasts_s=14.0)  # each has a road of its own
     with pytest.raises(BadInput, match=r"run1 and .*run2: expected drives over the same road, found that neither "):
@@ -254,16 +261,18 @@ def command_line(ridelog: Path, *arguments: str) -> subprocess.CompletedProcess[
 
 
 @pytest.mark.parametrize("rate_hz", [49.8, 50.0])
-def test_a_record_just_fast_enough(rate_hz: float, ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+def test_a_record_just_fast_enough(rate_hz: float, fits: None, runs: list[str], tmp_path: Path,
+                                   capsys: pytest.CaptureFixture[str]) -> None:
     given = read_run(runs[0])
     thinned = {"accel_z_mps2": given.accel_z_mps2[::2], "speed_mps": given.speed_mps[::2],
                "distance_m": given.distance_m[::2]}
     write_drive(tmp_path / "drive.csv", {"t_s": np.arange(len(given.time_s[::2])) / rate_hz, **thinned})
     write_profile(tmp_path / "profile.csv", given.track)
     for more in ([], ["--out", str(tmp_path / "page.html")]):
-        done = command_line(ridelog, "compare", "--vehicle", "rav4-2009", str(tmp_path), "--json", *more)
-        assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["error"] < 1
+        assert main(["compare", "--vehicle", "rav4-2009", str(tmp_path), "--json", *more]) == 0
+        told = capsys.readouterr()
+        assert told.err == ""
+    assert json.loads(told.out)["error"] < 1
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose", "add-effect"])
@@ -344,12 +353,13 @@ def rated(source: str, folder: Path, rate_hz: float, digits: int) -> str:
     return str(folder)
 
 
-def test_times_that_are_rounded_differently_are_of_one_rate(ridelog: Path, runs: list[str], tmp_path: Path) -> None:
+def test_times_that_are_rounded_differently_are_of_one_rate(fits: None, runs: list[str], tmp_path: Path,
+                                                            capsys: pytest.CaptureFixture[str]) -> None:
     folders = [rated(runs[0], tmp_path / "60", 60.0, 3), rated(runs[1], tmp_path / "again", 60.0, 3)]
     cut = (tmp_path / "again" / "drive.csv").read_text().splitlines()[:-61]
     (tmp_path / "again" / "drive.csv").write_text("\n".join(cut) + "\n")
-    done = command_line(ridelog, "compare", "--vehicle", "rav4-2009", *folders, "--json")
-    assert (done.returncode, done.stderr) == (0, "")
+    assert main(["compare", "--vehicle", "rav4-2009", *folders, "--json"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_fast_records_are_thinned_where_an_effect_is_sought(runs: list[str], tmp_path: Path) -> None:

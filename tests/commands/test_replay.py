@@ -28,6 +28,15 @@ def rows(folder: Path) -> list[str]:
     return [line for path in sorted(folder.glob("*.csv")) for line in path.read_text().splitlines()[1:]]
 
 
+@pytest.fixture(scope="module")
+def replayed(ridelog: Path, short_dump: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder with the logs of the short drive, and what the command told as it made them."""
+    folder = tmp_path_factory.mktemp("replayed")
+    done = call(ridelog, "replay", short_dump, "--out", folder, "--rate", "0", "--json")
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
 def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path) -> None:
     done = call(ridelog, "demo", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
@@ -38,10 +47,10 @@ def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path)
     assert call(ridelog, "verify", tmp_path / "out").returncode == 0
 
 
-def test_rows_are_as_the_format_says(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
-    done = call(ridelog, "replay", short_dump, "--out", tmp_path, "--json")
-    outcome = json.loads(done.stdout)
-    (log,) = sorted(tmp_path.glob("*.csv"))
+def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
+    folder, told = replayed
+    outcome = json.loads(told)
+    (log,) = sorted(folder.glob("*.csv"))
     assert outcome["files"] == [log.name]
     text = log.read_text()
     header = text.splitlines()[0].split(",")
@@ -57,25 +66,26 @@ def test_rows_are_as_the_format_says(ridelog: Path, short_dump: Path, tmp_path: 
     assert sidecar["sensor"]["verified"] is True
 
 
-def test_the_rate_changes_nothing_but_the_time_it_takes(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
-    for rate in ("0", "40"):
-        assert call(ridelog, "replay", short_dump, "--out", tmp_path / rate, "--rate", rate).returncode == 0
-    assert rows(tmp_path / "0") == rows(tmp_path / "40")
+def test_the_rate_changes_nothing_but_the_time_it_takes(
+    ridelog: Path, short_dump: Path, replayed: tuple[Path, str], tmp_path: Path
+) -> None:
+    assert call(ridelog, "replay", short_dump, "--out", tmp_path, "--rate", "40").returncode == 0
+    assert rows(replayed[0]) == rows(tmp_path)
 
 
-def test_a_recording_that_was_cut_gives_what_it_holds(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
+def test_a_recording_that_was_cut_gives_what_it_holds(
+    ridelog: Path, short_dump: Path, replayed: tuple[Path, str], tmp_path: Path
+) -> None:
     text = gzip.decompress(short_dump.read_bytes())
     cut = tmp_path / "cut.dump"
     cut.write_bytes(text[: len(text) * 2 // 3])
     done = call(ridelog, "replay", cut, "--out", tmp_path / "out")
     assert done.returncode == 0
     assert "cut short" in done.stdout
-    whole = tmp_path / "whole"
-    call(ridelog, "replay", short_dump, "--out", whole)
     kept = rows(tmp_path / "out")
     assert len(kept) > 20
     # The last seconds could not wait for what the road behind the cut would have told of them.
-    same = [a == b for a, b in zip(kept, rows(whole), strict=False)]
+    same = [a == b for a, b in zip(kept, rows(replayed[0]), strict=False)]
     began_s = [float(row.split(",")[2]) for row in kept]
     settled = [one_s < began_s[-1] - 8.0 for one_s in began_s]
     assert sum(settled) > 15
@@ -136,9 +146,8 @@ def test_no_such_recording(ridelog: Path, tmp_path: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_a_report_never_replaces_a_device(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
-    call(ridelog, "replay", short_dump, "--out", tmp_path)
+def test_a_report_never_replaces_a_device(ridelog: Path, replayed: tuple[Path, str], tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
-    done = call(ridelog, "report", tmp_path, "--out", tmp_path / "folder")
+    done = call(ridelog, "report", replayed[0], "--out", tmp_path / "folder")
     assert done.returncode == 2
     assert "expected the name of a file" in done.stderr

@@ -75,7 +75,15 @@ def test_stored_sections_are_those_of_the_design() -> None:
 
 @pytest.mark.parametrize(
     ("wanted", "rate_hz"),
-    [(WEIGHTING, 80.0), (WEIGHTING, 500.0), (WEIGHTING, 2000.0), (WD, 100.0), (WJ, 128.0), (WF, 100.0), (WF, 200.0)],
+    [
+        (WEIGHTING, 80.0),
+        (WEIGHTING, 500.0),
+        pytest.param(WEIGHTING, 2000.0, marks=pytest.mark.slow),
+        (WD, 100.0),
+        (WJ, 128.0),
+        pytest.param(WF, 100.0, marks=pytest.mark.slow),
+        pytest.param(WF, 200.0, marks=pytest.mark.slow),
+    ],
     ids=lambda value: getattr(value, "name", value),
 )
 def test_any_weighting_at_any_rate_is_within_0_02_db(wanted: Weighting, rate_hz: float) -> None:

@@ -91,6 +91,7 @@ def patchy(block: Block) -> np.ndarray:
     return variance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variance_of", [lambda block: np.ones(block.count), patchy])
 def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[Block], np.ndarray]) -> None:
     """log N(y; 0, B D B' + noise) by dense algebra, its slope by differences; the level is put off on purpose."""

@@ -56,6 +56,7 @@ def test_the_standard_error_is_that_of_other_roads() -> None:
         assert np.sqrt(np.mean([line.standard_error**2 for line in lines])) == pytest.approx(scatter, rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [4.5, 17.9, 31.3])
 def test_lines_and_spread_agree_with_drives_in_the_time_domain(speed_mps: float) -> None:
     """scipy's simulation, the exact IRI of the profile and the weighting of a record, over 16 km of another road."""

@@ -127,6 +127,7 @@ def test_a_misplaced_window_between_rough_and_smooth_is_less_certain() -> None:
     assert added[0, edge] > 0.3 and added[0, edge] > 5 * np.median(added[0, :30])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", [FINE, COARSE])
 def test_errors_cover_windows_that_are_misplaced(sensor: Sensor) -> None:
     """The distance is off by another metre or so on each of twenty-four drives over roads of IRI 2 to 10."""

@@ -31,6 +31,7 @@ def test_damaged_input_is_refused_in_one_line_or_read_as_it_stands(name: str) ->
     assert tally.memory_mb < MEMORY_MB
 
 
+@pytest.mark.slow
 def test_what_is_huge_outside_or_inside_takes_little_time_and_memory(tmp_path: Path) -> None:
     command = [sys.executable, "-m", huge_inputs.__name__, str(tmp_path), str(HUGE_GB)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -70,6 +70,7 @@ def test_one_drive_has_nothing_in_common() -> None:
     assert common.share == 0.0
 
 
+@pytest.mark.slow
 def test_errors_of_passes_over_one_bump_are_as_large_as_they_are_said_to_be() -> None:
     told = [fitted((4.5, 4.5), (seed, seed))[1].fit for seed in range(1, 11)]
     errors = np.array([one.parameters[MASS] / 875 - 1 for one in told])

@@ -93,11 +93,13 @@ def errors() -> Array:
     return np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
 
 
+@pytest.mark.slow
 def test_mass_and_friction_are_found_on_drives_by_newtons_laws(errors: Array) -> None:
     print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
     assert np.abs(errors).max() < 3.0
 
 
+@pytest.mark.slow
 def test_their_standard_errors_are_honest(errors: Array) -> None:
     assert 0.7 < np.sqrt((errors**2).mean()) < 1.4
 

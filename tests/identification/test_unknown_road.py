@@ -94,6 +94,7 @@ def test_derivatives_of_the_response(car: Vehicle) -> None:
         assert np.abs(derivatives[index] - difference).max() < 1e-5 * max(np.abs(difference).max(), 1e-6)
 
 
+@pytest.mark.slow
 def test_slopes_and_information_are_those_of_the_dense_likelihood() -> None:
     """C built as a matrix from the same maps, its derivatives by differences, everything else from textbooks."""
     road = track(120.0, 2)
@@ -146,6 +147,7 @@ def test_what_probes_have_in_common_is_small_at_the_end() -> None:
     assert np.std(np.log(many)) < 0.5 * np.std(np.log(few))
 
 
+@pytest.mark.slow
 def test_two_drives_over_one_road_at_different_speeds() -> None:
     road = track(200.0, 4)
     drives = [driven(HALF, road, 10.0, 180.0, 1), driven(HALF, road, 18.0, 180.0, 2, off_m=-1.2)]
@@ -189,6 +191,7 @@ def test_drives_over_two_roads_are_not_over_one() -> None:
     assert [finding.kind for finding in caught.value.findings] == [APART]
 
 
+@pytest.mark.slow
 def test_roads_add_up() -> None:
     drives = [driven(HALF, track(150.0, seed), 14.0, 140.0, seed) for seed in range(2)]
     alone = found(HALF, [drives[:1]], MASS)

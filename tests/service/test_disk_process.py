@@ -18,5 +18,6 @@ def test_a_dozen_kills(tmp_path: Path) -> None:
     assert found.figures["dumps"] > SERVICES
 
 
+@pytest.mark.slow
 def test_a_service_that_may_write_no_more_stays_up_and_goes_on(tmp_path: Path) -> None:
     assert WRITES_NO_MORE.trial(tmp_path, None).wrong == ()

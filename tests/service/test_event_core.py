@@ -20,20 +20,30 @@ from logger.service.pipeline import Pipeline
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 
-from ..support.drives.replay import core_for, rows_of
+from ..support.drives.replay import Rows, core_for, rows_of
 from ..support.drives.short_drive import SHORT_PLAN
 from ..support.faults.sensors import checked
 
 
 @pytest.fixture(scope="module")
-def expected(short_drive: Drive) -> list[str]:
-    return rows_of(short_drive.header, short_drive.events).rows
+def short_rows(short_drive: Drive) -> Rows:
+    return rows_of(short_drive.header, short_drive.events)
+
+
+@pytest.fixture(scope="module")
+def expected(short_rows: Rows) -> list[str]:
+    return short_rows.rows
 
 
 @pytest.fixture(scope="module")
 def lines_drive() -> Drive:
     plan = replace(SHORT_PLAN, sensor="lines", noise_mps2=0.03)
     return simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009")))
+
+
+@pytest.fixture(scope="module")
+def lines_rows(lines_drive: Drive) -> Rows:
+    return rows_of(lines_drive.header, lines_drive.events)
 
 
 def cut_anywhere(events: list[Event], seed: int) -> list[Event]:
@@ -75,9 +85,10 @@ def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expe
 
 @settings(max_examples=4)
 @given(seed=st.integers(0, 1000))
-def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(lines_drive: Drive, seed: int) -> None:
-    whole = rows_of(lines_drive.header, lines_drive.events).rows
-    assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == whole
+def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
+    lines_drive: Drive, lines_rows: Rows, seed: int
+) -> None:
+    assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == lines_rows.rows
 
 
 @settings(max_examples=8)
@@ -133,7 +144,7 @@ def test_a_dead_accelerometer_leaves_places_without_figures(short_drive: Drive) 
     assert all("gap" in record.flags for record in placed)
 
 
-def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive) -> None:
+def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive, lines_rows: Rows) -> None:
     """A recording that holds two of them: its header says which one its rows are made of."""
     serial = [event for event in lines_drive.events if event.source != "nmea"]
     foreign = [Event(event.t_us, "bma220", b"\x00\x00\x40") for event in serial]
@@ -142,7 +153,7 @@ def test_bytes_of_another_accelerometer_are_passed_over(lines_drive: Drive) -> N
     for event in events:
         core.feed(event)
     core.finish()
-    assert rows.rows == rows_of(lines_drive.header, lines_drive.events).rows
+    assert rows.rows == lines_rows.rows
     assert core.bad_events == len(foreign)
 
 
@@ -169,12 +180,11 @@ def test_a_sensor_read_eight_times_as_fast_gives_the_same_road(expected: list[st
     assert abs(np.median(ratio) - 1) < 0.05
 
 
-def test_a_serial_sensor_gives_the_same_road(short_drive: Drive, lines_drive: Drive) -> None:
+def test_a_serial_sensor_gives_the_same_road(short_rows: Rows, lines_rows: Rows) -> None:
     """Lines over a port, in bursts: as many windows, and the comfort of the noiseless record within a few per cent."""
-    found = rows_of(lines_drive.header, lines_drive.events).records
+    found = lines_rows.records
     kept = [record for record in found if record.distance_start_m is not None and record.a_w_mps2 is not None]
-    from_chip = rows_of(short_drive.header, short_drive.events).records
-    chip = [record for record in from_chip if record.distance_start_m is not None]
+    chip = [record for record in short_rows.records if record.distance_start_m is not None]
     assert abs(len(kept) - len(chip)) <= 4
     assert sum("gap" in record.flags for record in kept) <= 1
     ours = np.sqrt(np.mean([record.a_w_mps2**2 for record in kept]))
@@ -182,13 +192,12 @@ def test_a_serial_sensor_gives_the_same_road(short_drive: Drive, lines_drive: Dr
     assert abs(ours / theirs - 1) < 0.1
 
 
-def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Drive) -> None:
+def test_a_day_without_any_event_makes_no_rows_and_takes_no_time(short_drive: Drive, short_rows: Rows) -> None:
     day_us = 86_400_000_000
     half = len(short_drive.events) // 2
     late = [event._replace(t_us=event.t_us + 300 * day_us) for event in short_drive.events[half:]]
     rows = rows_of(short_drive.header, [*short_drive.events[:half], *late])
-    once = rows_of(short_drive.header, short_drive.events)
-    assert len(rows.records) <= len(once.records) + 4
+    assert len(rows.records) <= len(short_rows.records) + 4
     assert "rotate" in rows.rows
     assert any(record.t_us > 300 * day_us and record.distance_start_m is not None for record in rows.records)
 

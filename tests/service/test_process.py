@@ -170,6 +170,7 @@ def test_kill_loses_no_finished_row_and_the_next_start_repairs(
     subprocess.run([ridelog, "verify", service.log], check=True, capture_output=True)
 
 
+@pytest.mark.slow
 def test_gps_pulled_and_put_back(
     gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
@@ -276,6 +277,7 @@ def test_a_second_service_on_the_same_folder_is_refused(
     assert service.terminate() == 0
 
 
+@pytest.mark.slow
 def test_a_serial_accelerometer_pulled_and_put_back(
     gps: SerialDevice, start: Callable[[], Service], tmp_path: Path
 ) -> None:

@@ -209,6 +209,7 @@ def test_a_wrong_wheel_is_found_from_a_start_that_is_a_little_off() -> None:
     assert found.values["scale"] == pytest.approx(1.01, abs=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [0.001, 0.004])
 def test_runs_may_each_have_their_own_factor_and_start(apart: float) -> None:
     true = noisy_runs([tire_damping(300.0)], speeds_mps=(8.0, 14.0, 11.0))

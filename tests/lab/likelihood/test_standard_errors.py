@@ -31,6 +31,7 @@ def found() -> LinearModel:
     return fit(aligned(posterior, posterior.start([tire_damping(200.0)])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [USUAL, ErrorSize(0.004, 0.03, 0.0003)], ids=["a good recorder", "one that wanders"])
 def test_numbers_are_off_by_as_much_as_their_errors_say(size: ErrorSize) -> None:
     cars, effects = [], []

@@ -84,6 +84,7 @@ def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     return normalised_rms(counted, [run.kept_mps2 for run in runs]), deviance(posterior.bands, unseen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["right", "with one that is there", "with one that is not there"])
 def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None:
     there = [hidden("sensor_offset", offset_m=0.3)] if model == "with one that is there" else []

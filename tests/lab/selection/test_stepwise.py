@@ -76,6 +76,7 @@ def test_what_the_model_has_is_neither_sought_nor_dropped() -> None:
     assert selection.now.state.names == ("sensor_gain", "sensor_offset") and [*selection.gains] == ["sensor_offset"]
 
 
+@pytest.mark.slow
 def test_two_that_are_missing_are_both_found_and_each_gains_beside_the_other() -> None:
     both = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_bandwidth", cutoff_hz=20.0)]
     sought = search(("sensor_gain", "sensor_offset", "sensor_bandwidth"))

@@ -45,6 +45,13 @@ def stick(tmp_path: Path) -> Path:
     return a_stick(tmp_path / "stick")
 
 
+@pytest.fixture
+def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The card's flushes take no time; those of the stick are its model's."""
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+
+
+@pytest.mark.usefixtures("no_waiting")
 @pytest.mark.parametrize(("hazard", "case"), cases_for_tests(HAZARDS), ids=label)
 def test_what_is_promised_is_held(tmp_path: Path, hazard: Hazard, case: object) -> None:
     assert hazard.trial(tmp_path, case).wrong == ()
@@ -181,6 +188,7 @@ def a_manifest(logs: Path, stick: Path, files: int) -> bytes:
     return format_manifest(Manifest(own(logs, stick).name, listed))
 
 
+@pytest.mark.slow
 def test_a_manifest_longer_than_any_of_ours_takes_no_memory(logs: Path, stick: Path) -> None:
     text = a_manifest(logs, stick, 400_000)
     (own(logs, stick) / manifest.NAME).write_bytes(text)
@@ -197,6 +205,7 @@ def test_the_longest_manifest_that_is_read_fits_the_memory(logs: Path, stick: Pa
     assert_all_there(logs, stick)
 
 
+@pytest.mark.slow
 def test_names_without_end_on_a_stick_take_no_memory(
         logs: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(logs, stick)
@@ -234,6 +243,7 @@ def test_a_stick_holds_no_more_files_of_a_logger_than_its_manifest(
     assert_all_there(logs, stick, NAMES[:3])
 
 
+@pytest.mark.usefixtures("no_waiting")
 def test_lists_are_written_no_more_often_than_their_length_bears(
         tmp_path: Path, stick: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is written beside the files grows as their number, not as its square: else 65,000 take hours."""
