@@ -101,21 +101,21 @@ def lab(
     >>> [one.effect.name for one in read_vehicle(folder / "lab" / "vehicle-1.yaml").effects]
     ['sensor_gain']
     """
-    from logger.report.session_text import as_json, ending
+    from logger.report.session_text import as_json, ending, steps
 
     place = Path(out)
     bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab")
     bench = replace(bench, effects=among(bench.effects, candidates))
     make_ready(bench, place)
     story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress))
-    rows = [(words, f"{error:.3f}") for words, error in story.steps]
+    rows = [(words, f"{error:.3f}") for words, error in steps(story)]
     summary = as_json(story) | {"story": str(place / STORY)}
     return LabStory(
         "\n".join([*columns([("Model", "Error"), *rows]), "", paragraphs(ending(story))]), summary, model_of(model),
         comparison_of(story.first), tuple(map(diagnosis_of, story.diagnoses)),
         tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
         tuple(comparison_of(one.comparison) for one in story.rounds), story.refused, summary["error_before"],
-        summary["error_after"], summary["noise_floor_error"], tuple(story.steps), place / STORY)
+        summary["error_after"], summary["noise_floor_error"], tuple(steps(story)), place / STORY)
 
 
 def _asking(ask: Callable[[str], str | None]) -> Ask:
