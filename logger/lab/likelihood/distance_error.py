@@ -12,24 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import comb
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
-_SLOWEST_MPS = 0.5
 _KNOT_S, _MOST_KNOTS = 0.5, 240
 """Knots lie so far apart; a run that would have more has them farther apart."""
-_CUBIC = 3
-_SMOOTH_S = 1.0
-"""No car's speed changes by more than a cubic curve within so short a time."""
-_RECORDER = 2
 _UNUSUAL = 3.0  # standard deviations
 
 
@@ -76,41 +72,41 @@ class RecordError:
     """How the record of one run may be off, by numbers k: those of its distance (coefficients of the curve, the factor,
     the share of its roughness), then two of its recorder (gain, droop).
 
-    basis    (k - 2, n) of the distance [m]
+    basis     (k - 2, n) of the distance [m]
+    knot_s    between the knots of the curve
     """
 
     run: Run
     basis: Array
     tolerance: Tolerance
+    knot_s: float
 
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
         """That of a run."""
         from scipy.interpolate import BSpline
 
-        pieces = min(max(1, round((run.count - 1) / run.rate_hz / _KNOT_S)), _MOST_KNOTS)
-        curves = BSpline.design_matrix(np.linspace(0, pieces, run.count), np.arange(-_CUBIC, pieces + _CUBIC + 1.0),
-                                       _CUBIC).toarray()
-        return RecordError(run, np.vstack([curves.T, run.distance_m - run.distance_m[0], -_roughness(run)]), tolerance)
+        lasts_s, cubic = (run.count - 1) / run.rate_hz, 3
+        pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
+        curves = BSpline.design_matrix(np.linspace(0, pieces, run.count), np.arange(-cubic, pieces + cubic + 1.0),
+                                       cubic).toarray()
+        return RecordError(run, np.vstack([curves.T, run.distance_m - run.distance_m[0], -_roughness(run)]), tolerance,
+                           lasts_s / pieces)
 
     @property
     def count(self) -> int:
         """How many numbers there are."""
-        return len(self.basis) + _RECORDER
+        return len(self.basis) + 2
 
     @property
     def coefficients(self) -> int:
         """How many of them, the first ones, are of the curve."""
         return len(self.basis) - 2
 
-    @property
-    def _knot_s(self) -> float:
-        return (self.run.count - 1) / self.run.rate_hz / (self.coefficients - _CUBIC)
-
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
         walk, start = self._precisions
-        found = walk / (size.walk_m**2 * self._knot_s) + start / size.start_m**2
+        found = walk / (size.walk_m**2 * self.knot_s) + start / size.start_m**2
         np.einsum("ii->i", found)[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
         return found
 
@@ -126,12 +122,12 @@ class RecordError:
 
     def log_determinant(self, size: ErrorSize) -> float:
         """Of the precision."""
-        walk = -(self.coefficients - 1) * np.log(size.walk_m**2 * self._knot_s)
+        walk = -(self.coefficients - 1) * np.log(size.walk_m**2 * self.knot_s)
         return float(walk - 2 * np.log([size.start_m, size.scale, self.tolerance.gain, self.tolerance.droop]).sum())
 
     def moved_m(self, k: Array) -> Array:
         """By how much the car was farther than its distance signal said (n,)."""
-        return np.asarray(k[:-_RECORDER] @ self.basis)
+        return np.asarray(k[: len(self.basis)] @ self.basis)
 
     def without_trend(self, k: Array) -> Array:
         """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
@@ -145,17 +141,17 @@ class RecordError:
         """The numbers (k,) of the curve that comes nearest to a distance farther by this (n,) [m], its recorder as it
         is."""
         curve, *_ = np.linalg.lstsq(self.basis[: self.coefficients].T, moved_m, rcond=None)
-        return np.concatenate([curve, np.zeros(2 + _RECORDER)])
+        return np.concatenate([curve, np.zeros(self.count - len(curve))])
 
     def recorded(self, prediction: Array, k: Array) -> Array:
         """A prediction (n,) as such a recorder has it."""
         rise = rate_of_change(prediction, self.run.rate_hz)
-        return np.asarray(prediction + k[-_RECORDER:] @ _by_recorder(prediction, rise, self.run))
+        return np.asarray(prediction + k[len(self.basis) :] @ _by_recorder(prediction, rise, self.run))
 
     def slopes(self, prediction: Array) -> Array:
         """What each of k does to a prediction (n,): (k, n) [m/s2 per unit]."""
         rise = rate_of_change(prediction, self.run.rate_hz)
-        by_place = rise / np.maximum(self.run.speed_mps, _SLOWEST_MPS)
+        by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
         return np.vstack([self.basis * by_place, _by_recorder(prediction, rise, self.run)])
 
 
@@ -172,11 +168,12 @@ def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:
     return found
 
 
-def _roughness(run: Run) -> Array:
-    """What of a run's distance (n,) no car drives [m]."""
+def _roughness(run: Run, smooth_s: float = 1.0) -> Array:
+    """What of a run's distance (n,) no car drives [m]: within so short a time its speed changes by no more than a cubic
+    curve does."""
     from scipy.signal import savgol_filter
 
-    size = min(round(_SMOOTH_S * run.rate_hz), run.count - 1) // 2 * 2 + 1
+    size = min(round(smooth_s * run.rate_hz), run.count - 1) // 2 * 2 + 1
     return np.asarray(run.distance_m - savgol_filter(run.distance_m, size, 3)) if size > 3 else np.zeros(run.count)
 
 
@@ -189,13 +186,14 @@ def rate_of_change(samples: Array, rate_hz: float) -> Array:
     """The derivative of evenly spaced samples (n,), right to 0.03 % up to a third of their rate: central differences of
     order 48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would be half of it at
     30 Hz."""
-    half = len(_DIFFERENCES)
+    taps = _difference_taps(24)
+    half = len(taps)
     past_ends = np.pad(samples, half, mode="reflect", reflect_type="odd")
-    return np.asarray(np.convolve(past_ends, [*_DIFFERENCES[::-1], 0.0, *-_DIFFERENCES], mode="valid") * rate_hz)
+    return np.asarray(np.convolve(past_ends, [*taps[::-1], 0.0, *-taps], mode="valid") * rate_hz)
 
 
-_HALF_ORDER = 24
-_DIFFERENCES = np.array([
-    (-1.0) ** (k + 1) * comb(2 * _HALF_ORDER, _HALF_ORDER - k) / (k * comb(2 * _HALF_ORDER, _HALF_ORDER))
-    for k in range(1, _HALF_ORDER + 1)
-])
+@cache
+def _difference_taps(half: int) -> Array:
+    """Of central differences of order 2 half: (half,), the nearest sample first."""
+    return np.array([(-1.0) ** (k + 1) * comb(2 * half, half - k) / (k * comb(2 * half, half))
+                     for k in range(1, half + 1)])

@@ -19,12 +19,9 @@ from logger.runs import Run
 Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
-_REACH_S = 0.3
-_LEAST_CORRELATION = 0.5
 _LEAST_WINDOWS = 5
-_APART = 1.3
-"""Speeds that differ by this factor tell a time from a length."""
-_SLOWEST_MPS = 0.5
+SLOWEST_MPS = 0.5
+"""A car that is slower stands: a length over its speed says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +50,9 @@ class Lags:
 class Trend:
     """A number with its standard error and how probable one so large would be by chance; NaN where nothing is known."""
 
-    value: float
-    error: float
-    p_value: float
-
-
-UNKNOWN = Trend(float("nan"), float("nan"), float("nan"))
+    value: float = float("nan")
+    error: float = float("nan")
+    p_value: float = float("nan")
 
 
 def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
@@ -85,28 +79,29 @@ def drift(windows: Lags) -> Trend:
     runs = np.unique(windows.run)
     freedom = len(windows.run) - len(runs) - 1
     if freedom < _LEAST_WINDOWS:
-        return UNKNOWN
+        return Trend()
     lag_m, along_m = (_centred(one, windows.run) for one in (windows.lag_m, windows.along_m))
     return _slope(lag_m, along_m, freedom)
 
 
-def constant(windows: Lags) -> tuple[Trend, Trend, bool | None]:
+def constant(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool | None]:
     """By how much the model is ahead all the way [s], [m], and whether it is rather the one time (True) or the one
-    length (False); None: the speeds do not tell."""
+    length (False); None: the speeds, slow and fast ones, do not differ by the factor ``apart``, and do not tell."""
     freedom = len(windows.run) - 1
     if freedom < _LEAST_WINDOWS:
-        return UNKNOWN, UNKNOWN, None
+        return Trend(), Trend(), None
     ones = np.ones_like(windows.lag_s)
     time = _slope(windows.lag_s, ones, freedom)
     length = _slope(windows.lag_s, 1 / windows.speed_mps, freedom)
-    apart = np.quantile(windows.speed_mps, 0.9) > _APART * np.quantile(windows.speed_mps, 0.1)
+    slow, fast = np.quantile(windows.speed_mps, (0.1, 0.9))
     left_time = float(np.sum((windows.lag_s - time.value) ** 2))
     left_length = float(np.sum((windows.lag_s - length.value / windows.speed_mps) ** 2))
-    return time, length, left_time < left_length if apart else None
+    return time, length, left_time < left_length if fast > apart * slow else None
 
 
-def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]]:
-    size, reach = round(WINDOW_S * run.rate_hz), round(_REACH_S * run.rate_hz)
+def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
+             least_correlation: float = 0.5) -> list[tuple[float, ...]]:
+    size, reach = round(WINDOW_S * run.rate_hz), round(reach_s * run.rate_hz)
     rate_of_change = np.gradient(prediction, 1 / run.rate_hz)
     found: list[tuple[float, ...]] = []
     about = step = 0
@@ -120,7 +115,7 @@ def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))
         alike = np.divide(shifted @ measured, scale, out=np.zeros(len(shifted)), where=scale > 0)
         best = low + int(alike.argmax())
-        if alike[best - low] < _LEAST_CORRELATION:
+        if alike[best - low] < least_correlation:
             continue
         part = slice(best, best + size)
         columns = np.stack([prediction[part], -rate_of_change[part]], axis=1)
@@ -133,7 +128,7 @@ def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]
         middle = start + size // 2
         found.append((number, run.distance_m[middle] - run.distance_m[0],
                       lag / run.rate_hz + (late / gain if gain else 0.0), error_s,
-                      max(float(run.speed_mps[start : start + size].mean()), _SLOWEST_MPS)))
+                      max(float(run.speed_mps[start : start + size].mean()), SLOWEST_MPS)))
     return found
 
 
@@ -148,7 +143,7 @@ def _slope(values: Array, against: Array, freedom: int) -> Trend:
 
     size = float(against @ against)
     if not size > 0:
-        return UNKNOWN
+        return Trend()
     slope = float(values @ against) / size
     left = values - slope * against
     error = float(np.sqrt(left @ left / freedom / size))

@@ -21,8 +21,6 @@ from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 
-_SIZE_STEP, _LEAST_SIZE_STEP = 0.8, 0.1  # of the logarithms of sizes
-_TREND = (10.0, 1.0, 10.0)  # times the usual size: start, walk, factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +114,14 @@ class LinearModel:
         return found
 
     def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
-        """By evidence, from a size or from one with a start and a factor that are unusual: what these explain, a walk
-        explains as well, and there may be an optimum at either."""
+        """By evidence, from a size or from one whose start and factor are ten times as large as usual: what these
+        explain, a walk explains as well, and there may be an optimum at either."""
         def lack(logs: Array) -> float:
             found = ErrorSize.of(logs)
             return sum(one.lack(found) for one in self._records) + found.cost
 
         here, least = _descended(lack, size.logs)
-        trend = USUAL.logs + np.log(_TREND)
+        trend = USUAL.logs + np.log([10.0, 1.0, 10.0])
         if lack(trend) < least:
             here, _ = _descended(lack, trend)
         return ErrorSize.of(here)
@@ -202,10 +200,11 @@ class LinearModel:
         return mixed, sum(float(one @ one) - float((mine**2).sum()) for one, mine in zip(own, taken, strict=True))
 
 
-def _descended(lack: Callable[[Array], float], here: Array) -> tuple[Array, float]:
+def _descended(lack: Callable[[Array], float], here: Array, step: float = 0.8,
+               least_step: float = 0.1) -> tuple[Array, float]:
     """The least of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
-    least, step = lack(here), _SIZE_STEP
-    while step > _LEAST_SIZE_STEP:
+    least = lack(here)
+    while step > least_step:
         before = least
         for index in (1, 0, 2):
             for way in (step, -step):

@@ -26,11 +26,10 @@ Array = npt.NDArray[np.float64]
 
 CONVERGED = 2.0
 """A round of a fit that gains less than this in minus twice a log-likelihood is its last."""
-_ROUNDS, _STEPS, _ALIGNING_ROUNDS = 6, 5, 40
+_STEPS = 5
+"""Of Levenberg and Marquardt's, before slopes are taken anew."""
 _WORTH_ALIGNING = 0.02
-_SMALL_GAIN = 0.15
-# Slopes by the car's numbers are taken over so many of their deviations at most, once these are known.
-_STEP_IN_DEVIATIONS = 5.0
+"""Of an alignment in the course of a fit, a round that gains a smaller share of what is gained is the last."""
 _NEAR_M = 0.02
 """A model that lies no farther off than this, a quarter of the shortest wave at walking pace, is aligned to the same
 places."""
@@ -60,7 +59,7 @@ class MapFit:
         return LinearModel(self.posterior, self.state, self.numbers)
 
 
-def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = _ROUNDS,
+def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6,
         worth: float = 0.0) -> LinearModel:
     """A model fitted in full, beside its state.
 
@@ -74,7 +73,7 @@ def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int 
     least = best.score
     enough = max(CONVERGED, worth)
     for done in range(1, rounds + 1):
-        now = laid_out(posterior, minimised(now, now.state, moves, _STEPS), numbers, least)
+        now = laid_out(posterior, minimised(now, now.state, moves), numbers, least)
         gained = least - now.score
         if gained > 0:
             best, least = now, now.score
@@ -118,10 +117,10 @@ def _followed(posterior: Posterior, state: State) -> State | None:
     return posterior.at(state.effects, state.logs, record, state.size)
 
 
-def _aligned_from(start: LinearModel, worth: float) -> LinearModel:
+def _aligned_from(start: LinearModel, worth: float, most: int = 40) -> LinearModel:
     best = now = start
     first = least = start.score
-    for _ in range(_ALIGNING_ROUNDS):
+    for _ in range(most):
         state, found = now.state, now.eliminated(now.state.predictions)
         now = LinearModel(now.posterior, now.posterior.at(state.effects, state.logs, found.record, now.size))
         gained = least - now.score
@@ -144,7 +143,7 @@ class _Point:
     cost: float
 
 
-def minimised(linear: LinearModel, state: State, moves: Sequence[Move], most: int) -> State:
+def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_gain: float = 0.15) -> State:
     """Levenberg and Marquardt's steps on the car's numbers and those of the effects that move, with the most likely
     distance errors to first order at each; at most so many."""
     own: list[Array] | None = None
@@ -172,7 +171,7 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], most: in
         return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
 
     start = np.concatenate([state.logs[:p], coordinates_of(state.effects, moves)])
-    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: _SMALL_GAIN, most_rounds=most).at
+    best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS).at
     record = linear.eliminated(best.predictions, best.record).record
     return State(best.effects, best.logs, record, linear.size, best.predictions)
 
@@ -201,6 +200,6 @@ def own_slopes(linear: LinearModel) -> list[Array] | None:
 
 
 def _fine_steps(linear: LinearModel) -> Array:
-    """Of the logarithms of the car's numbers (p,), by how well they are known."""
+    """Of the logarithms of the car's numbers (p,): at most five deviations, once these are known."""
     sizes = np.sqrt(np.diag(linear.information(linear.state.logs)))
-    return np.minimum(linear.posterior.prior.steps, _STEP_IN_DEVIATIONS / sizes)
+    return np.minimum(linear.posterior.prior.steps, 5.0 / sizes)

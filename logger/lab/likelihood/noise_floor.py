@@ -19,16 +19,15 @@ from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 
 Array = npt.NDArray[np.float64]
 
-# A band is louder than the noise from so many deviations of the difference on; than the quietest of twenty alone, which
-# is two deviations of its own below the others by chance, from so many.
-_LOUDER, _LOUDER_THAN_QUIETEST = 2.5, (2.5 + 2.0) / np.sqrt(2)
+# A band is louder than the noise from so many deviations of the difference on.
+_LOUDER = 2.5
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
 # over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).
 _FILTERED = 0.75
 # Where no fit was made, bands that hold so large a share and are equally loud are flat noise if next to nothing of it
 # is left behind the filter: what a car leaves falls towards the highest of them, and the sensor's own noise is
-# still there. Below so many hertz all bands are full of what the road does.
-_FLAT, _DEAF, _MOVED_HZ = 0.22, 0.01, 30.0
+# still there.
+_FLAT, _DEAF = 0.22, 0.01
 UNEXPLAINED = 0.10
 """A residual above the noise by this share of it, or more, is unexplained."""
 
@@ -65,12 +64,13 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
     louder = _LOUDER
     if power < _FILTERED * by_level[0][0]:
         (power, freedom), *by_level = by_level
-        louder = _LOUDER_THAN_QUIETEST
+        louder = (_LOUDER + 2.0) / np.sqrt(2)  # the quietest of twenty is two of its own below the others by chance
     for level, n in by_level:
         if level > power * (1 + louder * np.sqrt(2 / n + 2 / freedom)):
             break
         power, freedom, louder = (power * freedom + level * n) / (freedom + n), freedom + n, _LOUDER
-    flat = freedom > _FLAT * sum(freedoms) and all(one.edges_hz[-1] > _MOVED_HZ for one in bands)
+    # Below 30 Hz all bands are full of what the road does.
+    flat = freedom > _FLAT * sum(freedoms) and all(one.edges_hz[-1] > 30.0 for one in bands)
     if not fitted and not (flat and highest[0] < _DEAF * power):
         power, freedom = highest
     power = max(power, least_mps2**2)

@@ -18,9 +18,6 @@ from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-_LENGTHS = ("cg_distance_m", "contact_patch_m")
-# Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
-_STEP, _LENGTH_STEP = 0.002, 1e-4
 _WALL_FROM, _WALL_WEIGHT = 2.0, 100.0
 
 
@@ -58,9 +55,10 @@ class VehiclePrior:
     def of(vehicle: Vehicle, tolerance: Tolerance) -> VehiclePrior:
         """What may be a little off in this vehicle."""
         names = sized(vehicle)
-        lengths = np.array([name.endswith(_LENGTHS) for name in names], dtype=bool)
+        lengths = np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
+        # Slopes are taken over so much of a logarithm: of a length, by which waves come late, over much less.
         return VehiclePrior(names, np.where(lengths, tolerance.lengths, tolerance.numbers),
-                            np.where(lengths, _LENGTH_STEP, _STEP))
+                            np.where(lengths, 1e-4, 0.002))
 
     def without_wall(self) -> VehiclePrior:
         """The same, normal all the way: it shows how far a car has to bend."""

@@ -19,9 +19,6 @@ from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
 
 Array = npt.NDArray[np.float64]
 
-_TINY_STEP = 1e-4
-_SINGULAR = 1e-10
-
 
 def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     """The effects of a fitted model with standard errors, and those of the logarithms of the car's numbers (p,).
@@ -34,17 +31,19 @@ def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
     scale = np.where(seen, size, 1.0)
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=_SINGULAR, hermitian=True)
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
     deviations = np.where(seen, np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale, np.inf)
     return with_errors(state.effects, moves, deviations[linear.count:]), deviations[: linear.count]
 
 
-def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array) -> tuple[Chosen, ...]:
-    """The effects with standard errors, of which those of the numbers that moved are given on their scales (m,)."""
+def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,
+                share: float = 1e-4) -> tuple[Chosen, ...]:
+    """The effects with standard errors, of which those of the numbers that moved are given on their scales (m,);
+    scales are straight over such a share of a number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     for move, here, deviation in zip(moves, coordinates_of(effects, moves), deviations, strict=True):
         parameter = effects[move.effect].effect.parameters[move.parameter]
-        step = _TINY_STEP * max(abs(here), _TINY_STEP)
+        step = share * max(abs(here), share)
         # At a bound a value goes one way only: it rises by so much over the way that it went.
         high, low = parameter.value(here + step), parameter.value(here - step)
         way = abs(parameter.coordinate(high) - parameter.coordinate(low))

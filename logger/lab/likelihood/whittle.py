@@ -24,8 +24,9 @@ DISCREPANCY = 0.003
 dry friction, whose force comes late by part of a step. A judgement: with 1 %, searches called right models unexplained.
 """
 _BLOCK_S = 3.0
+"""Of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 _HIGHEST_OF_RATE = 0.37
-_TINY = 1e-12  # [m2/s4]
+"""Above it recorders' filters take away what no two of them take away alike."""
 _ROUNDED = 1e-3  # samples: a rate is read off times that were rounded
 # Ends of the bands at 100 samples a second [Hz].
 _EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
@@ -58,7 +59,7 @@ class Bands:
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
         self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept
-        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2), _TINY)
+        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2), 1e-12)
 
     def power(self, residual: Array) -> Array:
         """Mean power (b,) of a residual (n,), whole, as if it were white [m2/s4]."""

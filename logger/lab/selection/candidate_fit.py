@@ -12,8 +12,6 @@ from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
-_STEPS, _ROUNDS = 5, 3
-
 
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
@@ -50,7 +48,7 @@ def roughly_fitted(score: float, base: Baseline, screened: Screened) -> list[Can
     return sorted((_rough_fit(score, base, trial) for trial in screened.trials), key=lambda one: -one.gain)
 
 
-def refined(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = _ROUNDS) -> CandidateFit:
+def refined(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """The same with slopes of its own."""
     found = MapFit.of(fit(one.found.linear(), one.found.numbers, rounds, worth))
     return CandidateFit(found, score - found.score)
@@ -64,7 +62,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
         linear = base.linear.holding(trial.one.effect.replaces)
         state = State((*base.state.effects, trial.one), posterior.prior.within_wall(trial.logs), linear.state.record,
                       linear.size, [])
-    state = minimised(linear, state, moves_of(state.effects), _STEPS)
+    state = minimised(linear, state, moves_of(state.effects))
     there = laid_out(posterior, state, linear.numbers, score)
     found = MapFit.of(there)
     return CandidateFit(found, score - found.score)

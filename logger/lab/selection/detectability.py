@@ -19,7 +19,6 @@ from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 DETECTABLE_SIGMA = 6.0
 """An effect that stands out by fewer standard deviations would hardly be found among twenty: as much evidence as they
 give is what the search asks for."""
-_NOTHING = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class _Sensitivity:
         search begins at."""
         found = self._deviations(chosen(effect, effect.usual))
         strengthless = all(one.null is None for one in effect.parameters)
-        if isinstance(effect, VehicleEffect) and (strengthless or found < _NOTHING):
+        if isinstance(effect, VehicleEffect) and (strengthless or found < 0.1):
             found = max(self._deviations(chosen(effect, values)) for values in effect.trials())
         return found
 

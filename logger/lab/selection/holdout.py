@@ -21,7 +21,7 @@ from logger.runs import Run, normalised_rms
 Array = npt.NDArray[np.float64]
 
 _STRETCH_S, _FOLDS = 6.0, 3
-_RIDGE = 1e-9
+"""Stretches are longer than a car remembers its road, some seconds, and each run has some of every set."""
 
 
 @dataclass(frozen=True)
@@ -73,5 +73,5 @@ def _solved(information: Array, gradient: Array) -> Array:
     """Columns that do nothing stay where they are."""
     size = np.sqrt(np.diag(information))
     scale = np.where(size > 0, size, 1.0)
-    scaled = information / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
+    scaled = information / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
     return np.asarray(np.linalg.solve(scaled, gradient / scale) / scale)

@@ -30,9 +30,6 @@ Array = npt.NDArray[np.float64]
 # How much stronger or weaker than in a trial an effect is taken to be; what moves all waves alike may be tried with
 # next to nothing.
 _STRONGEST, _STRONGEST_IF_IT_REALIGNS, _WEAKEST = 10.0, 1000.0, 0.03
-_OPTIMA = 2
-_WORTH_ALIGNING = 0.004
-"""Of an alignment that only has to tell which start is likelier, a round that gains a smaller share is the last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +181,7 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Sc
         alike = found.setdefault(choice, {})
         if (there := values.get(shape, 0.0)) not in alike or trial.gain > alike[there].gain:
             alike[there] = trial
-    best = [one for alike in found.values() for one in _optima([alike[value] for value in sorted(alike)])[:_OPTIMA]]
+    best = [one for alike in found.values() for one in _optima([alike[value] for value in sorted(alike)])[:2]]
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
 
 
@@ -268,7 +265,8 @@ def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
     record = [error.through(error.moved_m(k) - _shift_m(one, error.run)) for error, k in zip(
         posterior.record_errors, state.record, strict=True)]
     starts = [posterior.at(effects, state.logs), posterior.at(effects, state.logs, record, state.size)]
-    models = [aligned(posterior, start, _WORTH_ALIGNING) for start in starts]
+    # They only have to tell which start is likelier: a round that gains a share of 0.4 % is the last.
+    models = [aligned(posterior, start, 0.004) for start in starts]
     best = min(models, key=lambda model: model.score)
     return replace(trial, one=one, gain=base.score - best.score, logs=state.logs, start=best.state)
 
@@ -302,12 +300,12 @@ def misalignment_of_record(base: Baseline) -> Misalignment:
     return Misalignment(float(1 / (1 + longer)), float(-earlier_s))
 
 
-def misalignment(posterior: Posterior, state: State) -> Misalignment:
+def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Misalignment:
     """How the runs would have to be moved against the model to fit it best: all of them by one factor of their
     distance, or by one time. Both are looked for in the slow part of the motion, whose waves are long."""
     pairs: list[tuple[Run, Array, Array]] = []
     for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
-        size = max(1, round(_SMOOTH_S * run.rate_hz))
+        size = max(1, round(slow_s * run.rate_hz))
         hat = np.hanning(size + 2)[1:-1]
         slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, predicted)]
         pairs.append((run, slow[0], slow[1]))
@@ -326,13 +324,9 @@ def misalignment(posterior: Posterior, state: State) -> Misalignment:
         return both / of if of > 0 else 0.0
 
     still = alike(1.0, 0.0)
-    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), _WIDEST, _SCALE_STEP)
-    delay_s = _scanned(lambda off: alike(1.0, off), _LATEST_S, _DELAY_STEP_S)
+    scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), 0.08, 5e-4)
+    delay_s = _scanned(lambda off: alike(1.0, off), 1.5, 0.02)
     return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0)
-
-
-_SMOOTH_S = 0.2
-_WIDEST, _SCALE_STEP, _LATEST_S, _DELAY_STEP_S = 0.08, 5e-4, 1.5, 0.02
 
 
 def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:

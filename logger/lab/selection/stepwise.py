@@ -25,16 +25,27 @@ from logger.vehicle.effect_parameters import moves_of
 
 Progress = Callable[[str], None]
 
-MOST_EFFECTS = 4
-"""No more than so many are looked for."""
-_MOST_FITTED, _MOST_REFINED = 6, 3
-_WORTH_FITTING, _WORTH_REFINING = 0.03, 0.25
-"""Of the gain of the best one: an effect that promises less is not fitted, or not with slopes of its own."""
-_AS_GOOD = 0.9
-"""Fits of one effect from different starts that gain so much of what the best of them gains are all refined."""
-_WORTH_A_ROUND = 0.02
-"""A round of a fit that gains less than this share of what is left to explain is its last: little has to be settled
-where much is still to be found."""
+
+@dataclass(frozen=True)
+class Effort:
+    """How much work a search takes; more of it finds no less.
+
+    effects                      no more than so many are looked for
+    fitted, refined              how many effects are fitted at most, and how many of them with slopes of their own
+    worth_fitting, worth_refining    of the gain of the best one: what an effect has to promise for that
+    as_good                      fits of one effect from different starts that gain so much of what the best of them
+                                 gains are all refined
+    worth_a_round                of what is left to explain: what a round of a fit has to gain to be worth another one;
+                                 little has to be settled where much is still to be found
+    """
+
+    effects: int = 4
+    fitted: int = 6
+    refined: int = 3
+    worth_fitting: float = 0.03
+    worth_refining: float = 0.25
+    as_good: float = 0.9
+    worth_a_round: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +85,7 @@ class Search:
     seen: Misalignment
     progress: Progress = lambda words: None
     workers: int = 2
+    effort: Effort = Effort()
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[Baseline | None, dict[str, Baseline]] = (None, {})
 
@@ -82,7 +94,7 @@ class Search:
         now = before
         steps: list[tuple[str, Baseline]] = []
         first = Round((), ())
-        while len(now.state.effects) - self.present < MOST_EFFECTS:
+        while len(now.state.effects) - self.present < self.effort.effects:
             left = [one for one in self.effects if one.name not in now.state.names]
             if not left:
                 break
@@ -111,20 +123,21 @@ class Search:
     def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
         """Every effect tried on a model; and beside its runs as they were recorded, where it lies far from there: what
         an effect does may have been taken for a start or a factor of the distance."""
+        effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
             promises = self._screened(pool, now, effects)
-            worth = [(now, one) for one in _worth_fitting(promises)]
+            worth = [(now, one) for one in self._worth_fitting(promises)]
             if now.state.size.is_unusual:
                 there = as_recorded(now)
-                worth += [(there, one) for one in _worth_fitting(self._screened(pool, there, effects))]
+                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, effects))]
             self.progress(f"fitting {len(worth)} of them")
             tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
             rough = _best_of_each(tries)
-            best = {one.effect.name: one.gain for one in rough[:_MOST_REFINED]
-                    if one.gain > _WORTH_REFINING * rough[0].gain}
-            near = [one for one in tries if one.gain > _AS_GOOD * best.get(one.effect.name, np.inf)]
+            best = {one.effect.name: one.gain for one in rough[: effort.refined]
+                    if one.gain > effort.worth_refining * rough[0].gain}
+            near = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
             self.progress(f"refining {len(near)} of them")
-            fine = list(pool.map(lambda one: refined(now.score, one, _WORTH_A_ROUND * now.explanation), near))
+            fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), near))
         # A fit that is much worse than the model without the effect went astray: its promise says more.
         fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in near)])
                 if one.gain > -least_gain(len(self.effects))]
@@ -139,6 +152,11 @@ class Search:
             self.progress(f"screened {done} of {len(effects)} effects")
             found.append(one)
         return sorted(found, key=lambda one: -one.gain)
+
+    def _worth_fitting(self, promises: Sequence[Screened]) -> list[Screened]:
+        """Those that promise enough, of some that are sorted by what they promise."""
+        enough = self.effort.worth_fitting * promises[0].gain
+        return [one for one in promises[: self.effort.fitted] if one.gain > enough]
 
     def accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
@@ -170,7 +188,7 @@ class Search:
         if away.effect.realigns:
             return Baseline.of(fit(aligned(posterior, posterior.at(rest, now.state.logs))))
         start = LinearModel(posterior, posterior.at(rest, now.state.logs, now.state.record, now.state.size))
-        return Baseline.of(fit(start, now.linear.numbers, worth=_WORTH_A_ROUND * now.explanation))
+        return Baseline.of(fit(start, now.linear.numbers, worth=self.effort.worth_a_round * now.explanation))
 
     def _refit(self, one: CandidateFit) -> Baseline:
         posterior = one.found.posterior
@@ -214,11 +232,6 @@ class Search:
             now = others[least]
             names.remove(least)
         return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
-
-
-def _worth_fitting(promises: Sequence[Screened]) -> list[Screened]:
-    """Those that promise enough, of some that are sorted by what they promise."""
-    return [one for one in promises[:_MOST_FITTED] if one.gain > _WORTH_FITTING * promises[0].gain]
 
 
 def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
