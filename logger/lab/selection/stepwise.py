@@ -86,6 +86,7 @@ class Search:
     progress: Progress = lambda words: None
     workers: int = 2
     effort: Effort = Effort()
+    _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[Baseline | None, dict[str, Baseline]] = (None, {})
 
@@ -121,15 +122,18 @@ class Search:
         return replace(found, now=now, gains=gains)
 
     def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
-        """Every effect tried on a model; and beside its runs as they were recorded, where it lies far from there: what
-        an effect does may have been taken for a start or a factor of the distance."""
+        """Every effect tried on a model; those that realign runs beside these as they were recorded as well, where the
+        model lies far from there: what such an effect does may have been taken for a start or a factor of the
+        distance."""
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
             promises = self._screened(pool, now, effects)
             worth = [(now, one) for one in self._worth_fitting(promises)]
-            if now.state.size.is_unusual:
+            self._promising |= {one.effect.name for _, one in worth}
+            aligning = [one for one in effects if one.realigns]
+            if now.state.size.is_unusual and aligning:
                 there = as_recorded(now)
-                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, effects))]
+                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, aligning))]
             self.progress(f"fitting {len(worth)} of them")
             tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
             rough = _best_of_each(tries)
@@ -195,13 +199,13 @@ class Search:
         return Baseline.of(fit(aligned(posterior, one.found.state), one.found.numbers))
 
     def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
-        """The model with whatever gains most in the place of an effect, which may be the same effect elsewhere; and
-        what it gains."""
+        """The model with whatever gains most in the place of an effect, of all that any round found worth a fit, which
+        may be the same effect elsewhere; and what it gains."""
         self.progress(f"is {name} still what it was?")
         without = self.without(now, name)
         gain = without.score - now.score
-        tried = self.round(without, [one for one in self.effects
-                                     if one.name == name or one.name not in now.state.names])
+        tried = self.round(without, [one for one in self.effects if one.name in self._promising and (
+            one.name == name or one.name not in now.state.names)])
         best = self._simplest(without, tried)
         if best is not None and best.gain > gain + CONFUSED:
             now, gain = self._refit(best), best.gain

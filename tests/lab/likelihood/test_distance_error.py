@@ -79,7 +79,7 @@ def test_the_curve_goes_through_a_straight_line() -> None:
     assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
 
 
-@pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 43), (100.0, 203), (150.0, 243), (400.0, 243)])
+@pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 63), (100.0, 303), (150.0, 363), (400.0, 363)])
 def test_longer_runs_have_more_coefficients_up_to_a_limit(lasts_s: float, coefficients: int) -> None:
     assert RecordError.of(a_run("run", 5.0, lasts_s, 1), Tolerance()).coefficients == coefficients
 
