@@ -202,9 +202,9 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[Step, ...]:
     """The models on the way."""
     steps = [Step("the vehicle as its file says", nominal_error),
              Step("its numbers refitted", selection.before.hold_out.error)]
-    steps += [Step(f"with {name}", model.hold_out.error) for name, model in selection.steps]
-    last = selection.steps[-1][1] if selection.steps else selection.before
-    if selection.now is not last:
+    steps += [Step(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
+    last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
+    if selection.now.hold_out is not last:
         steps.append(Step("as it ends", selection.now.hold_out.error))
     return tuple(steps)
 
@@ -217,7 +217,7 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[Candida
     stages = dict(selection.steps)
     found = []
     for name, gain in selection.gains.items():
-        there = stages.get(name, selection.now).hold_out
+        there = stages.get(name) or selection.now.hold_out
         found.append(Candidate(effects[name], values[name], there.error, probability_by_chance(gain, count), gain,
                                before.deviance - there.deviance, selection.rivals.get(name, ())))
     fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]

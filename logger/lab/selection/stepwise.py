@@ -19,6 +19,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
+from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import Baseline, Screened, as_recorded, misalignment_of_record, screened
 from logger.vehicle.effect import Effect, Misalignment
 from logger.vehicle.effect_parameters import moves_of
@@ -65,7 +66,7 @@ class Selection:
     gains      what each of these gains beside the others, by name, the most first
     rivals     effects that explain as well in the place of each, by name
     first      the first round
-    steps      names of the effects that were added, with the model as it was then
+    steps      names of the effects that were added, with the model as it was then on what its fit did not see
     """
 
     before: Baseline
@@ -73,7 +74,7 @@ class Selection:
     gains: dict[str, float]
     rivals: dict[str, tuple[str, ...]]
     first: Round
-    steps: tuple[tuple[str, Baseline], ...]
+    steps: tuple[tuple[str, HoldOut], ...]
 
 
 @dataclass(eq=False)
@@ -93,7 +94,7 @@ class Search:
     def run(self, before: Baseline) -> Selection:
         """From a model without effects that it lacks."""
         now = before
-        steps: list[tuple[str, Baseline]] = []
+        steps: list[tuple[str, HoldOut]] = []
         first = Round((), ())
         while len(now.state.effects) - self.present < self.effort.effects:
             left = [one for one in self.effects if one.name not in now.state.names]
@@ -109,11 +110,12 @@ class Search:
             self._rivals[best.effect.name] = self._alike(best.gain, best.effect.name, tried)
             now = self._refit(best)
             earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
-            steps.append((best.effect.name, now))
+            steps.append((best.effect.name, now.hold_out))
             for name in earlier:
                 now, _ = self._reconsidered(now, name)
         now, gains = self._needed(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
+        self._reduced = None, {}
         return Selection(before, now, gains, rivals, first, tuple(steps))
 
     def left_out(self, found: Selection, name: str) -> Selection:

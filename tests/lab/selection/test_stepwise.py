@@ -58,7 +58,7 @@ def test_what_is_missing_is_found_and_nothing_else(offset_base: Baseline, found:
     assert [*found.gains] == ["sensor_offset"]
     assert found.gains["sensor_offset"] == pytest.approx(offset_base.score - found.now.score)
     assert found.now.state.effects[0].values["offset_m"] == pytest.approx(0.4, abs=0.03)
-    assert [name for name, _ in found.steps] == ["sensor_offset"] and found.steps[0][1] is found.now
+    assert [name for name, _ in found.steps] == ["sensor_offset"] and found.steps[0][1] is found.now.hold_out
     assert found.first.fits[0].effect.name == "sensor_offset"
     assert [one.gain for one in found.first.fits] == sorted((one.gain for one in found.first.fits), reverse=True)
 
