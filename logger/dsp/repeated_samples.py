@@ -30,6 +30,7 @@ SMALL, LARGE = 2.5, 3.5  # steps; between whole ones, as steps are written round
 CHANCE_STILL = 0.5  # that a stretch of small moves is none at all: 1 in 5 by the flat density, with room
 LEAST_SHARE = 0.03  # fewer repeats raise a weighted r.m.s. by 2 % at most
 _OUTER = 0.05
+_WIDE = 16.0  # steps
 _FOLLOW = 0.1
 _ON_COMB = 1.0  # samples: a held reading is written at the next instant
 
@@ -71,8 +72,9 @@ def moves(samples: Array) -> Array:
     return steps
 
 
-def find_repeats(samples: Array) -> Repeats | None:
-    """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance."""
+def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
+    """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance, which
+    gives some with a probability of ``false_alarm`` at most."""
     fresh = np.ones(len(samples), dtype=np.bool_)
     fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
     share = 1.0 - float(fresh.mean())
@@ -80,7 +82,7 @@ def find_repeats(samples: Array) -> Repeats | None:
         return None
     still, stretches = _turning_points(samples, fresh)
     chance = chernoff(still, stretches, CHANCE_STILL)
-    if chance > FALSE_ALARM:
+    if chance > false_alarm:
         return None
     return Repeats(share, chance, fresh, _period(np.flatnonzero(fresh)))
 
@@ -93,11 +95,19 @@ def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
     first, end = edges[::2], edges[1::2]
     inside = (first > 0) & (end < len(move))
     first, end = first[inside], end[inside]
-    at_end = ((samples == samples.max(axis=0)) | (samples == samples.min(axis=0))).any(axis=1)
+    at_end = _at_an_end(samples)
     good = large[first - 1] & large[end] & ~at_end[first]
     first, end = first[good], end[good]
     still = np.concatenate([[0], np.cumsum(fresh[1:])])
     return int(np.count_nonzero(still[end] == still[first])), len(first)
+
+
+def _at_an_end(samples: Array) -> Bools:
+    """(n,) where an axis has its largest or smallest value; an axis of few steps, which has it often, does not count
+    beside one of many."""
+    spans = [float(np.ptp(axis)) / step if (step := resolution(axis)) > 0 else 0.0 for axis in samples.T]
+    wide = samples[:, np.array(spans) >= min(_WIDE, max(spans))]
+    return np.asarray(((wide == wide.max(axis=0)) | (wide == wide.min(axis=0))).any(axis=1))
 
 
 def chernoff(hits: int, tries: int, chance: float) -> float:

@@ -72,6 +72,16 @@ def test_a_held_record_comes_back_on_the_grid_it_was_taken_at() -> None:
         assert np.abs(rounded(at(times_s, fine), 0.0383) - values[found.fresh]).mean() < 0.06
 
 
+def test_an_axis_that_hardly_moves_hides_nothing() -> None:
+    """A dead axis, and one of a few codes, beside one that is held."""
+    rng = np.random.default_rng(4)
+    t_s, values = held(ride(31, rng, 0.5), np.arange(0.5, 30.5, 1 / 51), 200, 0.01)
+    _, few = held(0.3 * rng.standard_normal(31_000), np.arange(0.5, 30.5, 1 / 51), 200, 0.613)
+    assert find_repeats(np.stack([np.full(len(t_s), 0.1), few, values], axis=1)) is not None
+    alive = rng.standard_normal(len(t_s))
+    assert find_repeats(np.stack([alive, few, values], axis=1)) is None
+
+
 def test_the_end_of_a_range_is_no_repeat() -> None:
     clipped = np.clip(rounded(ride(60, np.random.default_rng(1), 2.0)[:: FINE_HZ // 200], 0.01), -1.5, 1.5)
     assert find_repeats(clipped[:, None]) is None
