@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.sampling_comb import sampling_period
+from drivers.sampling_comb import is_ticked, sampling_period
 
 Times = npt.NDArray[np.int64]
 
@@ -47,8 +47,9 @@ class SampleClock:
        tolerance of the rate found. One that was kept through all of them and is outside of it is the rate instead.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
        ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
-       where that is more, samples were lost: the line moves by as many periods and leaves a hole. (A link that is late
-       by 30 ms at random has such a second now and then: once in 1,000 samples.) Arrivals that stay more than
+       where that is more and the arrivals do not show a smaller one, samples were lost: the line moves by as many
+       periods and leaves a hole. (A link that is late by 30 ms at random has such a second now and then: once in 1,000
+       samples.) Arrivals that stay more than
        ``OFF_US`` late, or that come that much too early, make the clock settle anew.
     5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
        those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
@@ -79,6 +80,8 @@ class SampleClock:
     BLOCK_US = 1_280_000
     BLOCKS = 8
     PIECES = 16  # of a block: of 80 ms, so that between two losses, which are 0.2 s apart or more, lie some of them
+    BLOCKS_SEEN, JITTERS, WITHOUT_LOSS = 3, 4.0, 0.75
+    TIMER_US = 20_000  # of adapters: 16 ms, if they are left as they come
     SEEN_TOLERANCE = JITTER_US / (BLOCKS * BLOCK_US)  # 490 ppm: a tighter tolerance the arrivals cannot tell
     GAIN = 0.25
     SLOWEST = 0.95
@@ -168,7 +171,7 @@ class SampleClock:
         if early[0]:
             self._lose_line(find=True)
             return None
-        near = np.flatnonzero(above_us < self._step_least_us)
+        near = np.flatnonzero(above_us < self._loss_least_us)
         following = np.searchsorted(near, np.arange(count))
         back = np.append(near, len(waiting) - 1)[following]
         stays_off = (following == len(near)) | (heard_us[back] > heard_us[:count] + self.LOOK_AHEAD_US)
@@ -182,7 +185,7 @@ class SampleClock:
         """The first sample and those after it stay above the line. A step that another follows at once did not come
         here: what lies before that one is late by chance, and belongs to the line."""
         least_us, lasting_us = float(above_us[:late].min()), float(above_us[soon:late].min(initial=np.inf))
-        before = np.flatnonzero(above_us[:soon] <= lasting_us - self._step_least_us)
+        before = np.flatnonzero(above_us[:soon] <= lasting_us - self._loss_least_us)
         if len(before) and lasting_us < np.inf:
             return min(int(before[-1]) + 1, count)
         if least_us > self.OFF_US:
@@ -209,7 +212,7 @@ class SampleClock:
         self._shortest_us = period_us * (1 - tolerance)
         self._longest_us = period_us * (1 + tolerance)
         self._climb_us_max = period_us * tolerance
-        self._step_least_us = max(self.STEP_SHARE * period_us, self.JITTER_US)
+        self._step_least_us = self._loss_least_us = max(self.STEP_SHARE * period_us, self.JITTER_US)
         self._block = max(16, round(self.BLOCK_US / period_us))
 
     def _find(self, arrivals_us: Times) -> None:
@@ -315,6 +318,7 @@ class SampleClock:
         self._points = [*self._points, lowest][-self.BLOCKS :]
         pieces = [point for _, point in self._lowest_of_pieces.values()]
         self._pieces = [*self._pieces, *pieces][-self.BLOCKS * self.PIECES :]
+        self._loss_least_us = max(self.STEP_SHARE * self._found_us, self._seen_jitter_us())
         self._number += self._index
         self._steps_by_block, self._steps = [*self._steps_by_block, self._steps][-self.BLOCKS :], 0
         most = self.STEPS_MAX * self.BLOCKS * self.BLOCK_US / self.LOOK_AHEAD_US
@@ -323,6 +327,18 @@ class SampleClock:
             self._look_at_the_rate()
         climb_us = min(self.GAIN * max(least_us, 0.0) / self._block, self._climb_us_max)
         self._begin_block(self._base_us + self._step_us * self._index + self._pulled_us, self._period_us + climb_us)
+
+    def _seen_jitter_us(self) -> float:
+        """How much the lowest arrivals of neighbouring pieces differ, if not by a loss, with room; what is usual where
+        they stand on the comb of an adapter's timer, which drifts against the samples and then leaps as a loss does."""
+        if self.STEP_SHARE * self._found_us >= self.JITTER_US or len(self._pieces) < self.BLOCKS_SEEN * self.PIECES:
+            return self.JITTER_US
+        late_us = [one.arrival_us - self._period_us * (one.number + one.lost) for one in self._pieces]
+        seen_us = self.JITTERS * float(np.quantile(np.abs(np.diff(late_us)), self.WITHOUT_LOSS))
+        instants_us = np.array([one.arrival_us for one in self._pieces], dtype=np.float64)
+        if seen_us >= self.JITTER_US or is_ticked(instants_us, self._period_us, self.TIMER_US):
+            return self.JITTER_US
+        return seen_us
 
     def _look_at_the_rate(self) -> None:
         """Renew the period, and see whether the device keeps it."""

@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 
 CHANCE = 1e-6  # of a comb where there is none: tried each 1.28 s, once in 15 days of driving
 CLEARER = 2.0  # than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without
+NEARLY = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
+TICKED = 0.7
 STEPS_PER_CYCLE = 8  # of the whole span: a comb between two of the periods tried loses 1 % at most
 
 
@@ -53,6 +55,18 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
     if resultant(instants_us, multiples).max() >= lengths[best]:
         return None  # the comb of an adapter's timer or of what reads the line: of the sampler's own all teeth are seen
     return period_us
+
+
+def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
+    """Tell whether arrivals (m,) [us] stand on the ticks of a timer of nearly a multiple of the samples' period, up to
+    ``longest_us``: of the samples themselves all teeth are seen, not every second or third."""
+    step = 1.0 / (STEPS_PER_CYCLE * (instants_us[-1] - instants_us[0]))
+    frequencies = [
+        np.arange((1 - NEARLY) / multiple_us, (1 + NEARLY) / multiple_us, step)
+        for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)
+    ]
+    tried = np.concatenate([np.empty(0), *frequencies])
+    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > TICKED
 
 
 def resultant(instants_us: Floats, periods_us: Floats) -> Floats:

@@ -16,6 +16,7 @@ from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
 from logger.store.formats import drive_file
+from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
@@ -75,10 +76,38 @@ def read_run(path: Path | str) -> Run:
     (1115,)
     """
     place = Path(path)
-    drive = drive_file.read_drive(place / drive_file.DRIVE if place.is_dir() else place)
+    drive = drive_file.read_drive(_file_of(place))
+    return Run(**vars(drive) | {"path": place}, profile=_profile_beside(place))
+
+
+def _file_of(place: Path) -> Path:
+    return place / drive_file.DRIVE if place.is_dir() else place
+
+
+def _profile_beside(place: Path) -> Profile | None:
     profile = place / drive_file.PROFILE
-    known = read_profile(profile) if place.is_dir() and profile.exists() else None
-    return Run(**vars(drive) | {"path": place}, profile=known)
+    return read_profile(profile) if place.is_dir() and profile.exists() else None
+
+
+def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
+    """A run, or its file, judged and, where that was ``asked`` for, mended; and what was found.
+
+    Raises BadInput as ``read_run``, and for what would give a wrong result.
+    """
+    if isinstance(run, Run):
+        names = (*drive_file.COLUMNS, *drive_file.PLACE)
+        arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg)
+        columns = {name: one for name, one in zip(names, arrays, strict=True) if one is not None}
+        place, profile = run.path, run.profile
+    else:
+        place = Path(run)
+        columns, profile = drive_file.read_columns(_file_of(place)), _profile_beside(place)
+    found = even_columns(columns, str(_file_of(place)), asked)
+    if found.resampled is None and asked.unit is None and isinstance(run, Run):
+        return run, found
+    even = {drive_file.TIME: np.array([found.start_s]), **found.accel_mps2, **found.others}
+    drive = drive_file.drive_of(place, found.rate_hz, even)
+    return Run(**vars(drive), profile=profile), found
 
 
 def write_run(folder: Path | str, run: Run) -> None:
@@ -215,6 +244,7 @@ class Estimate(CommandResult):
     limit_std_m_per_km   (w,) standard error that an estimator would reach which knew everything but the road
     flags                w sets of words
     profile              the road, as far as the readings tell it, in its parts; it is smoother than the road
+    doubts               what may be wrong with the drive's record, a line each
     """
 
     mean_iri_m_per_km: float
@@ -226,6 +256,7 @@ class Estimate(CommandResult):
     limit_std_m_per_km: Array
     flags: tuple[frozenset[str], ...]
     profile: tuple[Profile, ...]
+    doubts: tuple[str, ...] = ()
 
     def charts(self) -> Sequence[Chart]:
         """The IRI along the way with its standard error, and that of the profile where it is known."""
@@ -242,7 +273,7 @@ class Estimate(CommandResult):
 
 def estimate(
     run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float = 0.05, step_mps2: float = 0.0,
-    window_m: float = WINDOW_M,
+    window_m: float = WINDOW_M, unit: str | None = None, resample_hz: float | None = None,
 ) -> Estimate:
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
@@ -252,8 +283,10 @@ def estimate(
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]
     step_mps2     step that readings are rounded to; 0: none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
+    unit, resample_hz    as ``comfort``
 
-    Raises BadInput for a drive that cannot be used, a vehicle with effects, and as ``read_run`` and ``read_vehicle``.
+    Raises BadInput for a drive that cannot be used, what makes the result wrong (repeated samples, gravity in g), a
+    vehicle with effects, and as ``read_run`` and ``read_vehicle``.
     Source: a smoother of the road's state as ISO 8608 lets expect it (``logger.estimation``).
 
     >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
@@ -262,6 +295,7 @@ def estimate(
     """
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines
+    from logger.report.record_checks_text import checks_json, checks_lines
 
     model = model_of(vehicle)
     if model.effects:
@@ -269,14 +303,17 @@ def estimate(
     NOISE.check("noise_mps2", noise_mps2)
     ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
-    drive = run if isinstance(run, Run) else read_run(run)
+    drive, checked = checked_run(run, Asked(unit, resample_hz))
     found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
-    summary, windows = as_json(str(drive.path), found), found.windows
+    summary = as_json(str(drive.path), found) | checks_json(checked)
+    windows = found.windows
     parts = found.road.parts if found.road else ()
-    return Estimate("\n".join(lines(found, summary)), summary, summary.get("iri_m_per_km", np.nan), windows.edges_m,
+    text = "\n".join([*checks_lines(checked), *lines(found, summary)])
+    return Estimate(text, summary, summary.get("iri_m_per_km", np.nan), windows.edges_m,
                     windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
                     found.least_error_m_per_km, windows.flags,
-                    tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts))
+                    tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),
+                    tuple(doubt.words for doubt in checked.doubts))
 
 
 def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:

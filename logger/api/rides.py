@@ -14,6 +14,7 @@ from logger.api.drives import Run
 from logger.api.shown import CommandResult, Shown, line, table
 from logger.errors import BadInput
 from logger.store.formats import record_file
+from logger.store.formats.record_checks import Asked, EvenRecord, even_record
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -68,6 +69,7 @@ class Comfort(CommandResult):
     vdv_mps175      vibration dose [m/s1.75]
     crest_factor    largest value over a_w
     comfort         in a word; None for motion sickness
+    doubts          what may be wrong with the record, a line each
     """
 
     weighting: str
@@ -76,17 +78,25 @@ class Comfort(CommandResult):
     vdv_mps175: float
     crest_factor: float
     comfort: str | None
+    doubts: tuple[str, ...] = ()
 
 
-def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_hours: float | None = None) -> Comfort:
+def comfort(
+    record: Record | Run | Path | str, weighting: str = "wk", *, daily_hours: float | None = None,
+    unit: str | None = None, resample_hz: float | None = None,
+) -> Comfort:
     """The comfort and health values of an acceleration record (ISO 2631-1:1997), by the formula of the standard.
 
     record         at the seat, 80 samples a second or more, 1 s or longer; or a run, or a file
     weighting      of the vertical axis, by a name that ``ridelog comfort --help`` lists. With wk, x and y are weighted
                    by wd and combined with it
     daily_hours    of such riding, for the health values; None: as long as the record
+    unit           "g" takes the accelerations as g, "mps2" as m/s2 without asking; None: as m/s2, if they look like it
+    resample_hz    of a file: drop repeated samples, and lay uneven ones on an even grid of this rate through an
+                   anti-alias filter; 0: of its own rate, 100 Hz at least
 
-    Raises BadInput for what is none of this, and as ``read_record``.
+    Raises BadInput for what is none of this, for what makes the values wrong (repeated samples, gravity in g), and as
+    ``read_record``. What is doubtful is in ``doubts``, a line each.
 
     >>> found = comfort(read_run(folder))
     >>> found.comfort, round(found.a_w_mps2, 2)
@@ -95,6 +105,7 @@ def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_h
     from logger.comfort.ride_comfort import ride_comfort
     from logger.plugins import catalogue
     from logger.report.comfort_text import as_json, lines
+    from logger.report.record_checks_text import checks_json, checks_lines
 
     weightings = catalogue("logger.dsp.weightings", "WEIGHTING")
     if weighting not in weightings:
@@ -102,14 +113,27 @@ def comfort(record: Record | Run | Path | str, weighting: str = "wk", *, daily_h
     if daily_hours is not None and not 0.0 < daily_hours <= 24.0:
         raise BadInput(f"comfort: expected more than 0 and at most 24 hours a day, found {daily_hours:g}")
     name = "record" if isinstance(record, Record) else str(record.path if isinstance(record, Run) else record)
-    if isinstance(record, Run):
-        record = Record(float(record.time_s[0]), record.rate_hz, record.accel_z_mps2)
-    ride = record if isinstance(record, Record) else read_record(record)
+    ride = _even(record, name, Asked(unit, resample_hz))
+    axes = {axis: ride.accel_mps2.get(f"accel_{axis}_mps2") for axis in "zxy"}
+    taken_hz = None if ride.resampled is None else ride.resampled.from_hz
     used = weightings[weighting]
     try:
-        found = ride_comfort(ride.by_axis, ride.rate_hz, used, weightings.get(used.horizontal), daily_hours)
+        found = ride_comfort(axes, ride.rate_hz, used, weightings.get(used.horizontal), daily_hours, taken_hz)
     except ValueError as error:
         raise BadInput(f"{name}: {error}") from None
-    summary, vertical = as_json(found), found.vertical
-    return Comfort("\n".join(lines(found, Path(name).name)), summary, weighting, vertical.a_w_mps2, vertical.mtvv_mps2,
-                   vertical.vdv_mps175, vertical.crest_factor, summary["comfort"])
+    summary, vertical = as_json(found) | checks_json(ride), found.vertical
+    return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, weighting,
+                   vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
+                   summary["comfort"], tuple(doubt.words for doubt in ride.doubts))
+
+
+def _even(record: Record | Run | Path | str, name: str, asked: Asked) -> EvenRecord:
+    """The accelerations to weigh, checked."""
+    if isinstance(record, Run):
+        return even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
+    if not isinstance(record, Record):
+        t_s, accel = record_file.read_columns(record)
+        return even_record(t_s, accel, {}, name, asked)
+    t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz
+    accel = {f"accel_{axis}_mps2": one for axis, one in record.by_axis.items() if one is not None}
+    return even_record(t_s, accel, {}, name, asked)

@@ -13,6 +13,8 @@ from logger.dsp.weightings.weighting import Weighting
 Array = npt.NDArray[np.float64]
 
 LOWEST_RATE_HZ = 80.0
+LEAST_TAKEN_HZ = 40.0
+"""Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above."""
 SHORTEST_S = 1.0
 # Rounded times make an 80 Hz record look a little slower.
 _RATE_ROUNDING = 1e-3
@@ -24,6 +26,7 @@ class RideComfort:
 
     daily_hours    hours a day of such riding, for the health values
     left_out       an axis was recorded and not combined
+    taken_hz       samples a second that were taken, where they were laid on another grid; None: ``rate_hz``
     """
 
     rate_hz: float
@@ -31,6 +34,7 @@ class RideComfort:
     axes: dict[str, AxisFigures]
     by: dict[str, Weighting]
     left_out: bool
+    taken_hz: float | None = None
 
     @property
     def weighting(self) -> Weighting:
@@ -50,26 +54,30 @@ class RideComfort:
     @property
     def unseen_from_hz(self) -> float | None:
         """Where the record ends and the weighting does not [Hz]; None when the record holds all that counts."""
-        return self.rate_hz / 2 if self.rate_hz / 2 < self.weighting.counts_up_to_hz else None
+        end_hz = (self.rate_hz if self.taken_hz is None else min(self.rate_hz, self.taken_hz)) / 2
+        return end_hz if end_hz < self.weighting.counts_up_to_hz else None
 
 
 def ride_comfort(
     accel_mps2: dict[str, Array | None], rate_hz: float, weighting: Weighting, horizontal: Weighting | None,
-    daily_hours: float | None = None,
+    daily_hours: float | None = None, taken_hz: float | None = None,
 ) -> RideComfort:
     """Weigh the axes of a record that belong together and take their figures.
 
     accel_mps2     (n,) by axis, ``z``, ``x`` and ``y``; None: not recorded
     weighting      of ``z``; ``horizontal`` that of the others beside it, None: they are not combined with it
     daily_hours    None: as long as the record
+    taken_hz       of a record that was laid on this grid, the rate at which its samples were taken [Hz]
 
-    ValueError for fewer than 80 samples a second, or less than 1 s.
+    ValueError for fewer than 80 samples a second, fewer than 40 that were taken, or less than 1 s.
     """
     vertical = accel_mps2["z"]
     assert vertical is not None
     duration_s = len(vertical) / rate_hz
     if rate_hz < LOWEST_RATE_HZ * (1.0 - _RATE_ROUNDING):
         raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}")
+    if taken_hz is not None and taken_hz < LEAST_TAKEN_HZ:
+        raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
     if duration_s < SHORTEST_S:
         raise ValueError(f"expected at least {SHORTEST_S:g} s, found {duration_s:.3g} s")
     axes, by = {"z": axis_figures(weighting.weigh(vertical, rate_hz), rate_hz)}, {"z": weighting}
@@ -79,4 +87,4 @@ def ride_comfort(
         for axis, accel in others.items():
             axes[axis], by[axis] = axis_figures(horizontal.weigh(accel, rate_hz), rate_hz), horizontal
     hours = daily_hours if daily_hours is not None else duration_s / 3600.0
-    return RideComfort(rate_hz, hours, axes, by, left_out=bool(others) and not combined)
+    return RideComfort(rate_hz, hours, axes, by, bool(others) and not combined, taken_hz)

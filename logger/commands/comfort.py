@@ -3,6 +3,9 @@
 FILE is CSV with the columns t_s and accel_z_mps2 (vertical, at the seat), evenly sampled at 80 Hz or more, perhaps
 accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is the standard's formula, magnitude and
 phase, applied to the whole record by Fourier transform.
+
+A record that repeats samples, whose times are uneven, or that is in g is refused, with the option that mends it. What
+is doubtful is told on stderr: samples at an end of the sensor's range, accelerations that no moving car has.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import json
 from pathlib import Path
 
 from drivers.catalogue import names
+from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
 
 USUAL = "wk"
@@ -25,30 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "With wk, accel_x_mps2 and accel_y_mps2 are weighted by wd and combined with it")
     parser.add_argument("--daily-hours", type=float, metavar="H",
                         help="hours a day of such riding, for the health values (default: the length of the record)")
+    add_record_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog comfort``."""
-    from logger.comfort.ride_comfort import ride_comfort
-    from logger.plugins import catalogue
-    from logger.report.comfort_text import as_json, lines
-    from logger.store.formats.record_file import read_record
+    from logger.api.rides import comfort
 
-    weightings = catalogue(*_WEIGHTINGS)
+    weightings = names(*_WEIGHTINGS)
     if args.weighting not in weightings:
         raise BadInput(f"--weighting: expected one of {', '.join(weightings)}, found {args.weighting!r}")
     if args.daily_hours is not None and not 0.0 < args.daily_hours <= 24.0:
         raise BadInput(f"--daily-hours: expected more than 0 and at most 24 hours, found {args.daily_hours:g}")
-    record = read_record(args.file)
-    weighting = weightings[args.weighting]
-    try:
-        result = ride_comfort(record.by_axis, record.rate_hz, weighting, weightings.get(weighting.horizontal),
-                              args.daily_hours)
-    except ValueError as error:
-        raise BadInput(f"{args.file}: {error}") from None
-    if args.json:
-        print(json.dumps(as_json(result), allow_nan=False))
-    else:
-        print("\n".join(lines(result, args.file.name)))
+    found = comfort(args.file, args.weighting, daily_hours=args.daily_hours, unit=args.unit,
+                    resample_hz=args.resample)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
+    tell_doubts(args.file, found.doubts)
     return EXIT_DONE

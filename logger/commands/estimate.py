@@ -9,6 +9,7 @@ that knew the road's spectrum, the sensor's noise and the car exactly.
 
 A distance may go back by up to 1 m, as one corrected by GPS does; it is then laid anew, as the integral of speed_mps
 plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to 100 Hz.
+Repeated samples, uneven times and values in g are refused, with the option that mends them.
 
 The profile holds only the wavelengths that the readings tell: it is smoother than the road, and its own IRI too low. A
 drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI:
@@ -26,6 +27,7 @@ from typing import TYPE_CHECKING
 
 from logger.api.ranges import ADDED, NOISE, WINDOW
 from logger.commands.numbers import add_number
+from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -49,15 +51,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
+    add_record_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
-    from logger.api.drives import assessed, read_run
+    from logger.api.drives import assessed, checked_run
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines, window_lines
+    from logger.report.record_checks_text import checks_json, checks_lines
     from logger.shipped import vehicle_path
+    from logger.store.formats.record_checks import Asked
     from logger.store.formats.vehicle_file import read_vehicle
     from logger.units import WINDOW_M
 
@@ -65,12 +70,15 @@ def run(args: argparse.Namespace) -> int:
     vehicle_yaml = vehicle_path(args.vehicle)
     vehicle = read_vehicle(vehicle_yaml)
     _check_files(args, vehicle_yaml)
-    found = assessed(read_run(args.run), vehicle, Sensor(args.noise, args.step), window_m)
+    drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
+    found = assessed(drive, vehicle, Sensor(args.noise, args.step), window_m)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")
-    told = as_json(str(args.run), found, list(map(str, files)))
-    print(json.dumps(told, allow_nan=False) if args.json else "\n".join(lines(found, told)))
+    told = as_json(str(args.run), found, list(map(str, files))) | checks_json(checked)
+    print(json.dumps(told, allow_nan=False) if args.json else
+          "\n".join([*checks_lines(checked), *lines(found, told)]))
+    tell_doubts(args.run, (doubt.words for doubt in checked.doubts))
     if args.profile_out is not None and not files:
         print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "
               "longest of them", file=sys.stderr if args.json else sys.stdout)

@@ -30,6 +30,8 @@ COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 """ISO 2631 words, best first."""
 
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
+_NOT_COUNTED = frozenset({"unsettled"})
+"""Windows whose figures stand in no mean and no share: the filters still knew nothing of the ride."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,9 @@ class DriveSummary:
 
     start_utc_us, end_utc_us    of the first and the last row with UTC
     duration_s                  time inside windows; blind_s of it without speed, so without distance
-    mean_iri_m_per_km           mean over the distance that has an IRI
-    a_w_mps2                    weighted r.m.s. acceleration over the time inside windows
-    iri_classes, comfort        shares of the distance, best first; what has no value comes last
+    mean_iri_m_per_km           mean over the distance that has an IRI, but for windows flagged ``unsettled``
+    a_w_mps2                    weighted r.m.s. acceleration over the time inside windows, but for those
+    iri_classes, comfort        shares of the distance, best first; what has no value that counts comes last
     roughest                    worst first
     flags                       word to number of rows, the most frequent first
     """
@@ -93,9 +95,10 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
     blind_s = sum(record.duration_s for record in records if record.distance_end_m is None)
     duration_s = sum(record.duration_s for record in records)
     dated = [record for record in records if record.utc_us is not None]
-    mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True))
+    mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True)
+                     if counts(record))
     mean_square = _mean((None if record.a_w_mps2 is None else record.a_w_mps2**2, record.duration_s)
-                        for record in records)
+                        for record in records if counts(record))
     return DriveSummary(
         windows=len(records),
         drives=len(split_drives(records)),
@@ -112,6 +115,11 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
         roughest=_roughest(records),
         flags=dict(Counter(flag for record in records for flag in record.flags).most_common()),
     )
+
+
+def counts(record: WindowRecord) -> bool:
+    """Tell whether a row's figures may stand in a mean."""
+    return not _NOT_COUNTED.intersection(record.flags)
 
 
 def summary_json(summary: DriveSummary) -> dict[str, Any]:
@@ -147,7 +155,7 @@ def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: 
     sums: dict[str, float] = dict.fromkeys(names, 0.0)
     rest = 0.0
     for record, length in zip(records, lengths_m, strict=True):
-        if name_of(record) in sums:
+        if counts(record) and name_of(record) in sums:
             sums[name_of(record)] += length
         else:
             rest += length

@@ -133,7 +133,7 @@ class EventCore:
     @property
     def accelerometer_doubt(self) -> str:
         """What is wrong with the samples that come; empty: nothing."""
-        return self._accelerometer.doubt
+        return self._accelerometer.doubt or self._pipeline.repetition.doubt
 
     @property
     def gps_doubt(self) -> str:

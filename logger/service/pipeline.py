@@ -23,6 +23,7 @@ from logger.roads.iso8608 import iri_class
 from logger.service.frozen_sensor import Stillness
 from logger.service.iri_queue import RoughnessQueue, Waiting
 from logger.service.odometer import Odometer
+from logger.service.repetition import Repetition
 from logger.service.signal_chain import GRID_STEP_US, SignalChain
 from logger.service.speed_check import SpeedCheck
 from logger.service.timebase import Timebase
@@ -87,6 +88,7 @@ class Pipeline:
         self.timebase = Timebase(settings.latency_s)
         self.odometer = Odometer(settings.bridge_s, settings.stationary_mps)
         self.stillness = Stillness()
+        self.repetition = Repetition()
         self.speed_check = SpeedCheck()
 
     @property
@@ -103,6 +105,7 @@ class Pipeline:
             self.odometer.add(timed)
             self.speed_check.take(timed)
         self.stillness.take(block, fixes)
+        self.repetition.take(block)
         self._pending += self._chain.push(block)
         self._pending += self._chain.advance(self._start_us, now_us)
         self._release(self._settled_until_us(now_us))
@@ -189,6 +192,7 @@ class Pipeline:
             if len(moving):
                 self._active_us = int(part.t_us[moving[-1]])
             doubtful = self.stillness.during(part.t_us) | self.speed_check.during(part.t_us)
+            doubtful |= self.repetition.during(part.t_us)
             believed = replace(part, present=part.present & ~doubtful)
             self._roughness.read(believed, distance_m + self._settings.front_axle_ahead_m, leg)
             self._enqueue(self._cutter.push_known(part, distance_m, speed_mps, travel.bridged[low:high], leg))
@@ -223,12 +227,13 @@ class Pipeline:
         if offset_us is None:
             flags.add("time_unset")
         end_us = window.t_us + round(window.duration_s * US_PER_S)
-        if self.stillness.covers(window.t_us, end_us):
-            flags.add("frozen")
-            window = window.without_figures()
+        for word, found in (("frozen", self.stillness), ("repeated", self.repetition)):
+            if found.covers(window.t_us, end_us):
+                flags.add(word)
+                window = window.without_figures()
         if window.start_m is not None and self.speed_check.covers(window.t_us, end_us):
             flags.add("speed_doubtful")
-        if flags & {"frozen", "speed_doubtful"}:
+        if flags & {"frozen", "repeated", "speed_doubtful"}:
             estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan)
         if estimate is not None:
             flags |= estimate.flags

@@ -245,14 +245,17 @@ def test_readings_that_may_be_in_g_are_said_to_be(
     in_g = columns["accel_z_mps2"] / 9.80665
     rms = in_g.std()
     hints = {}
-    for name, readings, noise in (("m/s2", columns["accel_z_mps2"], 0.05), ("g with gravity", 1 + in_g, 0.05),
+    drive = write(tmp_path, columns | {"accel_z_mps2": 1 + in_g})
+    with pytest.raises(BadInput, match=r"drive\.csv: expected accelerations in m/s2, found a mean of 1\.000.*--unit g"):
+        main(["estimate", str(drive), "--vehicle", CAR])
+    for name, readings, noise in (("m/s2", columns["accel_z_mps2"], 0.05), ("nearly gravity", 1.06 + in_g, 0.05),
                                   ("little", in_g, 1.05 * rms), ("enough", in_g, 0.95 * rms)):
         drive = write(tmp_path, columns | {"accel_z_mps2": readings})
         capsys.readouterr()
         assert main(["estimate", str(drive), "--vehicle", CAR, "--noise", f"{noise:.4f}"]) == 0
         hints[name] = [line for line in capsys.readouterr().out.splitlines() if "in g?" in line]
     assert hints["m/s2"] == hints["enough"] == []
-    assert hints["g with gravity"][0].startswith("Acceleration in g? On the way it is 1.00 on the mean and ")
+    assert hints["nearly gravity"][0].startswith("Acceleration in g? On the way it is 1.06 on the mean and ")
     assert hints["little"][0].endswith(f"less than the noise of {1.05 * rms:.4f} (--noise).")
 
 

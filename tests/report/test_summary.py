@@ -73,6 +73,20 @@ def test_a_doubtful_window_is_no_rough_place(drive, flag: str) -> None:
     assert all(place.iri_m_per_km == 2.0 for place in summarise(rows).roughest)
 
 
+def test_an_unsettled_window_is_in_no_mean_and_no_share(drive) -> None:
+    """The first of a drive may read 19.5 m/km."""
+    wild = {"iri_m_per_km": 19.5, "iri_class": "H", "a_w_mps2": 9.0, "comfort": "extremely_uncomfortable"}
+    plain, counted = summarise(drive(20)[1:]), summarise(drive(20, {0: wild}))
+    started = summarise(drive(20, {0: wild | {"flags": ("partial", "unsettled")}}))
+    assert started.mean_iri_m_per_km == pytest.approx(plain.mean_iri_m_per_km)
+    assert started.a_w_mps2 == pytest.approx(plain.a_w_mps2)
+    assert counted.mean_iri_m_per_km > 1.3 * plain.mean_iri_m_per_km
+    assert [share.name for share in started.iri_classes] == [*(one.name for one in plain.iri_classes), ""]
+    assert [share.name for share in started.comfort] == [*(one.name for one in plain.comfort), ""]
+    assert (started.windows, started.distance_m) == (20, counted.distance_m)
+    assert summarise(drive(1, {0: wild | {"flags": ("unsettled",)}})).mean_iri_m_per_km is None
+
+
 def test_drives_are_told_apart_by_their_number_or_a_new_count(drive) -> None:
     rows = [*drive(3), *drive(2, number=2), *drive(4, number=2)]
     assert summarise(rows).drives == 3

@@ -20,7 +20,7 @@ from logger.profiles.track import Track
 from logger.store.formats.csv_table import parse_columns
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import Profile, read_profile
-from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, even_rate_hz
+from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, check_times, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 
@@ -80,19 +80,31 @@ def read_run(folder: Path | str) -> DriveOnRoad:
 
 def read_drive(path: Path | str) -> Drive:
     """Read a ``drive.csv``. Times and errors as in ``read_run``."""
+    columns = read_columns(path)
+    return drive_of(path, even_rate_hz(columns[TIME], str(path)), columns)
+
+
+def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> Drive:
+    """A drive of columns (n,) by name, at an even rate; the first of ``t_s`` is where its times begin."""
+    time_s = columns[TIME][0] + np.arange(len(columns[VERTICAL])) / rate_hz
+    lat_deg, lon_deg = (columns.get(name) for name in PLACE)
+    return Drive(
+        Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg
+    )
+
+
+def read_columns(path: Path | str) -> dict[str, Array]:
+    """The columns (n,) of a ``drive.csv`` by name, as they are written: their times may be uneven. Errors as in
+    ``read_run``."""
     file = str(path)
     names, table = parse_columns(read_bounded(file, MAX_BYTES), file, _choose, _HEADER)
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
     columns = dict(zip(names, table.T.copy(), strict=True))
-    rate_hz = even_rate_hz(columns[TIME], file)
+    check_times(columns[TIME], file)
     _check_size(columns[VERTICAL], VERTICAL, MAX_MPS2, "m/s2", file)
     _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
-    time_s = columns[TIME][0] + np.arange(len(table)) / rate_hz
-    lat_deg, lon_deg = (columns.get(name) for name in PLACE)
-    return Drive(
-        Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg
-    )
+    return columns
 
 
 def read_speeds(path: Path | str) -> tuple[Array, Array]:

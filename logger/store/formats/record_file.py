@@ -64,18 +64,28 @@ def read_record(path: Path | str) -> AccelerationRecord:
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
+    t_s, accel = read_columns(path)
+    rate_hz = even_rate_hz(t_s, str(path))
+    return AccelerationRecord(float(t_s[0]), rate_hz, accel[VERTICAL], *(accel.get(name) for name in HORIZONTAL))
+
+
+def read_columns(path: Path | str) -> tuple[Array, dict[str, Array]]:
+    """The times (n,) [s] and accelerations by column (n,) of a record, the vertical first, as they are written.
+
+    Raises BadInput ("file:line: expected ..., found ...") but for times that are not even.
+    """
     file = str(path)
     wanted, table = parse_columns(read_bounded(path, MAX_BYTES), file, _choose, _HEADER)
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
-    t_s = table[:, 0]
-    rate_hz = even_rate_hz(t_s, file)
+    t_s = table[:, 0].copy()
+    check_times(t_s, file)
     accel = dict(zip(wanted[1:], table.T[1:].copy(), strict=True))
     for name, samples in accel.items():
         if (wild := np.abs(samples) > MAX_MPS2).any():
             line = int(np.argmax(wild)) + 2
             raise BadInput(f"{file}:{line}: expected {name} within {MAX_MPS2:g} m/s2, found {samples[line - 2]:g}")
-    return AccelerationRecord(float(t_s[0]), rate_hz, accel[VERTICAL], *(accel.get(name) for name in HORIZONTAL))
+    return t_s, accel
 
 
 def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
@@ -84,22 +94,31 @@ def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 
 
-def even_rate_hz(t_s: Array, file: str) -> float:
-    """The rate of the times; BadInput with the line where they leave an even grid."""
+def check_times(t_s: Array, file: str) -> None:
+    """BadInput for times that no clock has."""
     if (far := np.abs(t_s) > MAX_TIME_S).any():
         sample = int(np.argmax(far))
         raise BadInput(f"{file}:{sample + 2}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
+
+
+def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
+    """The rate of the times; BadInput with the line where they leave an even grid, and what would ``mend`` it."""
+    check_times(t_s, file)
     steps = np.diff(t_s)
     if (early := steps < 1.0 / MAX_RATE_HZ).any():
         sample = int(np.argmax(early)) + 1
-        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found {t_s[sample]:.10g}")
+        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found "
+                       f"{t_s[sample]:.10g}{mend}")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)
     tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
     off = np.abs(t_s - (t_s[0] + step_s * np.arange(len(t_s))))
     if (off > tolerance_s).any():
         usual_s = float(np.median(steps))
         odd = np.abs(steps - usual_s) > min(_ROUNDING_S, _ROUNDING_STEPS * usual_s)
-        sample = int(np.argmax(odd)) + 1 if odd.any() else int(np.argmax(off))
+        if not odd.any():
+            raise BadInput(f"{file}:{int(np.argmax(off)) + 2}: expected samples evenly {step_s:.6g} s apart, found one "
+                           f"{off.max():.3g} s off: the clock drifts{mend}")
+        sample = int(np.argmax(odd)) + 1
         raise BadInput(f"{file}:{sample + 2}: expected samples evenly {usual_s:.6g} s apart, found a step of "
-                       f"{steps[sample - 1]:.6g} s")
+                       f"{steps[sample - 1]:.6g} s{mend}")
     return 1.0 / step_s

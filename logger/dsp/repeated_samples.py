@@ -1,0 +1,159 @@
+"""Samples that were written more often than they were taken, told from a coarse sensor that rightly stays on one code.
+
+Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that no
+car makes stand between the held values, and the ride reads too rough. A sensor with coarse steps repeats values too,
+for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not tell one from the other.
+
+Solution: where a sensor moves by several steps before and after, a sample at which it hardly moves is a turning point,
+and there a move by one or two steps either way is as likely as none: the density of moves is flat over so few steps.
+So among the stretches of small moves between two large ones (``SMALL`` and ``LARGE`` steps) at most about one in five
+stands still, on all axes at once. In a held record nearly all of them do. That so many more than half of them do has,
+without repeats, at most the probability of Chernoff's bound (H. Chernoff, Ann. Math. Stat. 23, 1952): repeats are told
+of where it is below ``FALSE_ALARM``. Stretches at the largest or smallest value of an axis are left out: there a sensor
+may stand at the end of its range. What never moves by several steps between two samples is not judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, log
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+FALSE_ALARM = 1e-6
+"""Most probability with which a record without repeats is said to have some."""
+SMALL, LARGE = 2.5, 3.5  # steps; between whole ones, as steps are written rounded
+CHANCE_STILL = 0.5  # that a stretch of small moves is none at all: 1 in 5 by the flat density, with room
+LEAST_SHARE = 0.03  # fewer repeats raise a weighted r.m.s. by 2 % at most
+_OUTER = 0.05
+_WIDE = 16.0  # steps
+_FOLLOW = 0.1
+_ON_COMB = 1.0  # samples: a held reading is written at the next instant
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """Samples that repeat the one before.
+
+    share         of all samples that repeat
+    chance        probability bound of so many without a fault
+    fresh         (n,) which samples are new
+    period        samples between two new ones, in the middle
+    """
+
+    share: float
+    chance: float
+    fresh: Bools
+    period: float
+
+
+def resolution(values: Array) -> float:
+    """The step between neighbouring values of an axis (n,): the median over those that occur, without the outermost,
+    0 where it never changes. Of values that are not rounded it is about their range over their number."""
+    low, high = np.quantile(values, [_OUTER, 1 - _OUTER])
+    there = np.unique(values[(values >= low) & (values <= high)])
+    if len(there) < 2:
+        there = np.unique(values)
+    return float(np.median(np.diff(there))) if len(there) > 1 else 0.0
+
+
+def moves(samples: Array) -> Array:
+    """How far each sample is from the one before, in steps of its axis, on the axis where that is most: samples
+    (n, axes) to (n - 1,)."""
+    steps = np.zeros(max(0, len(samples) - 1))
+    for axis in samples.T:
+        step = resolution(axis)
+        if step > 0:
+            np.maximum(steps, np.abs(np.diff(axis)) / step, out=steps)
+    return steps
+
+
+def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
+    """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance, which
+    gives some with a probability of ``false_alarm`` at most."""
+    fresh = np.ones(len(samples), dtype=np.bool_)
+    fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
+    share = 1.0 - float(fresh.mean())
+    if share < LEAST_SHARE:
+        return None
+    still, stretches = _turning_points(samples, fresh)
+    chance = chernoff(still, stretches, CHANCE_STILL)
+    if chance > false_alarm:
+        return None
+    return Repeats(share, chance, fresh, _period(np.flatnonzero(fresh)))
+
+
+def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
+    """How many stretches of small moves between two large ones stand still, and how many there are."""
+    move = moves(samples)
+    small, large = move < SMALL, move > LARGE
+    edges = np.flatnonzero(np.diff(small.astype(np.int8), prepend=0, append=0))
+    first, end = edges[::2], edges[1::2]
+    inside = (first > 0) & (end < len(move))
+    first, end = first[inside], end[inside]
+    at_end = _at_an_end(samples)
+    good = large[first - 1] & large[end] & ~at_end[first]
+    first, end = first[good], end[good]
+    still = np.concatenate([[0], np.cumsum(fresh[1:])])
+    return int(np.count_nonzero(still[end] == still[first])), len(first)
+
+
+def _at_an_end(samples: Array) -> Bools:
+    """(n,) where an axis has its largest or smallest value; an axis of few steps, which has it often, does not count
+    beside one of many."""
+    spans = [float(np.ptp(axis)) / step if (step := resolution(axis)) > 0 else 0.0 for axis in samples.T]
+    wide = samples[:, np.array(spans) >= min(_WIDE, max(spans))]
+    return np.asarray(((wide == wide.max(axis=0)) | (wide == wide.min(axis=0))).any(axis=1))
+
+
+def chernoff(hits: int, tries: int, chance: float) -> float:
+    """Bound of the probability of ``hits`` or more in ``tries`` of one ``chance`` each (Chernoff 1952)."""
+    share = hits / tries if tries else 0.0
+    if share <= chance:
+        return 1.0
+    divergence = share * log(share / chance)
+    if share < 1:
+        divergence += (1 - share) * log((1 - share) / (1 - chance))
+    return exp(-tries * divergence)
+
+
+def _period(places: npt.NDArray[np.int64]) -> float:
+    """Usual distance of new samples: a mean that leaves out where a new one happened to equal the one before."""
+    gaps = np.diff(places)
+    return float(gaps[gaps <= np.quantile(gaps, _OUTER) + 1].mean())
+
+
+def fresh_times(repeats: Repeats, t_s: Array) -> Array:
+    """When the new samples (m,) of a record with times (n,) [s] were taken: on an even grid where theirs can be one,
+    for a held reading is written up to a sample late; else when they were written."""
+    places = np.flatnonzero(repeats.fresh)
+    number = _teeth(places.tolist(), repeats.period)
+    for _ in range(3):
+        slope, start = np.polyfit(number, places, 1)
+        if np.abs(places - start - slope * number).max() <= _ON_COMB:
+            return np.asarray(np.interp(start + slope * number, np.arange(len(t_s)), t_s))
+        again = np.rint((places - start) / slope)
+        if (np.diff(again) <= 0).any():
+            break
+        number = again
+    return t_s[places]
+
+
+def _teeth(places: list[int], period: float) -> Array:
+    """Numbers (m,) on a comb of about this period of the samples nearest to its teeth; the comb follows them slowly."""
+    number, tooth = 0, float(places[0])
+    numbers: list[float] = []
+    for place in places:
+        ahead = round((place - tooth) / period)
+        if numbers:
+            ahead = max(1, ahead)
+        number += ahead
+        tooth += ahead * period
+        tooth += _FOLLOW * (place - tooth)
+        period += _FOLLOW**2 / 4 * (place - tooth)
+        numbers.append(float(number))
+    return np.array(numbers)

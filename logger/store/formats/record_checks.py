@@ -1,0 +1,227 @@
+"""Acceleration records that are not what they seem: recognised, mended where that was asked for, else told or refused.
+
+Problem: repeated samples, values in g, the end of a sensor's range and a recorder's uneven clock all give figures that
+look like any others. Solution: what makes a result wrong is refused, with the option that mends it; what is doubtful
+is told beside the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.readings import STANDARD_GRAVITY_MPS2
+from logger.dsp.bursts import burst_ends, spread
+from logger.dsp.range_ends import range_ends
+from logger.dsp.repeated_samples import Repeats, find_repeats, fresh_times
+from logger.errors import BadInput
+from logger.store.formats.drive_file import SPEED
+from logger.store.formats.record_file import MAX_RATE_HZ, TIME, VERTICAL, even_rate_hz
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+UNITS = ("mps2", "g")
+OWN_RATE = 0.0
+LEAST_RATE_HZ = 100.0
+MOST_RATE_HZ = 10_000.0
+WIDEST_STEP_S = 0.5
+_GRAVITY, _GRAVITY_NEAR, _GRAVITY_CALM = 1.0, 0.03, 0.35
+"""A mean so near to 1 with so little about it is a record in g: 3 % is what sensors are off."""
+_QUIET_MPS2, _LOUD_MPS2 = 0.1, 30.0
+"""R.m.s. about the mean: on a moving car it is more (0.15 on a new motorway, a tenth of it in g) and less."""
+_MOVING_MPS = 3.0
+_LEAST_FOR_ROADS_HZ = 79.9
+_HOLES = 0.02  # of the time
+_HOLE_STEPS = 2.5
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is said of a record. ``unit``: one of ``UNITS``, None: to be judged; ``resample_hz``: lay it on an even grid
+    of this rate, ``OWN_RATE``: of its own (``LEAST_RATE_HZ`` at least); None: it has to be even, without repeats."""
+
+    unit: str | None = None
+    resample_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit is not None and self.unit not in UNITS:
+            raise BadInput(f"unit: expected one of {', '.join(UNITS)}, found {self.unit!r}")
+        if self.resample_hz is not None and self.resample_hz != OWN_RATE and not (
+                LEAST_RATE_HZ * 0.8 <= self.resample_hz <= MOST_RATE_HZ):
+            raise BadInput(f"resample: expected {LEAST_RATE_HZ * 0.8:g} to {MOST_RATE_HZ:g} Hz, found "
+                           f"{self.resample_hz:g}")
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What may be wrong with a record: a word, one line, and its numbers."""
+
+    what: str
+    words: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """The same for a program."""
+        return {"what": self.what, "words": self.words, **self.numbers}
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """How a record was laid on an even grid: its own rate [Hz], its widest step [s], the share of repeated samples that
+    were dropped before."""
+
+    from_hz: float
+    to_hz: float
+    widest_step_s: float
+    repeats_dropped: float
+
+
+@dataclass(frozen=True, eq=False)
+class EvenRecord:
+    """Samples at start_s + k / rate_hz: acceleration by name, (n,) each [m/s2], and what else was recorded beside it.
+
+    start_s, rate_hz    [s], [Hz]
+    doubts      what may be wrong with it
+    resampled   None: it is as it was recorded
+    """
+
+    start_s: float
+    rate_hz: float
+    accel_mps2: dict[str, Array]
+    others: dict[str, Array]
+    doubts: tuple[Doubt, ...]
+    resampled: Resampled | None
+
+
+def even_record(
+    t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Array], file: str, asked: Asked,
+    moving: Bools | None = None,
+) -> EvenRecord:
+    """A record with times (n,) [s], judged and, where that was asked for, mended.
+
+    accel     (n,) by name, vertical first; in m/s2 or, where ``asked`` says so, in g
+    others    (n,) by name; straight lines are laid between them
+    moving    (n,) where the car was driving; None: not known
+
+    Raises BadInput ("file: expected ..., found ...") for what would give a wrong result.
+    """
+    scale = STANDARD_GRAVITY_MPS2 if asked.unit == "g" else 1.0
+    samples = np.stack([scale * one for one in accel.values()], axis=1)
+    doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)
+    repeats = find_repeats(samples)
+    if repeats is not None and asked.resample_hz is None:
+        even_rate_hz(t_s, file, _MEND)
+        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
+                       f"before ({_true_rate_hz(repeats, t_s):.3g} Hz written at {_rate_hz(t_s):.4g}): --resample "
+                       "drops the repeats")
+    kept = slice(None) if repeats is None else repeats.fresh
+    doubts += [doubt for name, axis in zip(accel, samples[kept].T, strict=True) for doubt in end_doubts(name, axis)]
+    if asked.resample_hz is None:
+        rate_hz = even_rate_hz(t_s, file, _MEND)
+        columns = dict(zip(accel, samples.T.copy(), strict=True))
+        return EvenRecord(float(t_s[0]), rate_hz, columns, dict(others), tuple(doubts), None)
+    return _resampled(t_s, samples, accel, others, repeats, file, asked.resample_hz, doubts)
+
+
+def even_columns(columns: Mapping[str, Array], file: str, asked: Asked) -> EvenRecord:
+    """A drive's columns (n,) by name (``drive_file.COLUMNS``), as ``even_record``. Repeats are dropped; but what is not
+    in the samples cannot be told a road by, so BadInput where fewer than 80 a second are left."""
+    names = [name for name in columns if name not in (TIME, VERTICAL)]
+    moving = np.abs(columns[SPEED]) > _MOVING_MPS
+    found = even_record(columns[TIME], {VERTICAL: columns[VERTICAL]}, {name: columns[name] for name in names}, file,
+                        asked, moving)
+    if found.resampled is not None and found.resampled.from_hz < _LEAST_FOR_ROADS_HZ:
+        raise BadInput(f"{file}: expected at least {_LEAST_FOR_ROADS_HZ:g} samples a second that were taken, found "
+                       f"{found.resampled.from_hz:.4g}")
+    return found
+
+
+_MEND = " (--resample lays samples on an even grid)"
+
+
+def _resampled(
+    t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array], repeats: Repeats | None,
+    file: str, rate_hz: float, doubts: list[Doubt],
+) -> EvenRecord:
+    from logger.dsp.uneven import mean_rate_hz, on_even_grid
+
+    times_s = even_times_of(t_s, file)
+    taken_s, taken = times_s, samples
+    if repeats is not None:
+        taken_s, taken = fresh_times(repeats, times_s), samples[repeats.fresh]
+    steps = np.diff(taken_s)
+    widest_s = float(steps.max()) if len(steps) else 0.0
+    if widest_s > WIDEST_STEP_S:
+        row = int(np.searchsorted(times_s, taken_s[int(np.argmax(steps)) + 1]))
+        raise BadInput(f"{file}:{row + 2}: expected no hole above {WIDEST_STEP_S:g} s, found one of {widest_s:.4g} s: "
+                       "cut the record there")
+    if len(steps) < 2:
+        raise BadInput(f"{file}: expected three samples or more, found {len(taken_s)}")
+    own_hz = mean_rate_hz(taken_s)
+    holes = steps[steps > _HOLE_STEPS / own_hz].sum() / (taken_s[-1] - taken_s[0])
+    if holes > _HOLES:
+        doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time lies in holes, across which straight lines were "
+                                 "laid: the ride is harder than the values say", {"share": float(holes)})]
+    wanted_hz = rate_hz if rate_hz != OWN_RATE else max(LEAST_RATE_HZ, own_hz)
+    laid = on_even_grid(taken_s, taken, own_hz, wanted_hz)
+    grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
+    beside = {name: np.interp(grid_s, times_s, one) for name, one in others.items()}
+    dropped = 0.0 if repeats is None else repeats.share
+    return EvenRecord(float(taken_s[0]), wanted_hz, dict(zip(names, laid.T.copy(), strict=True)), beside, tuple(doubts),
+                      Resampled(own_hz, wanted_hz, widest_s, dropped))
+
+
+def even_times_of(t_s: Array, file: str) -> Array:
+    """Growing times of samples [s]: as they are, or, of such that came in bursts, evenly spread. BadInput where that
+    cannot be, or a time is before the one before it."""
+    if (back := np.diff(t_s) < 0).any():
+        row = int(np.argmax(back)) + 1
+        raise BadInput(f"{file}:{row + 2}: expected no time before {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
+    ends = burst_ends(t_s)
+    if ends is not None:
+        try:
+            return spread(t_s, ends)
+        except ValueError as error:
+            raise BadInput(f"{file}: expected samples that were taken at some even rate, {error}") from None
+    if (same := np.diff(t_s) < 1.0 / MAX_RATE_HZ).any():
+        row = int(np.argmax(same)) + 1
+        raise BadInput(f"{file}:{row + 2}: expected a time after {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
+    return t_s
+
+
+def _rate_hz(t_s: Array) -> float:
+    return float((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+
+
+def _true_rate_hz(repeats: Repeats, t_s: Array) -> float:
+    return float(1.0 / np.median(np.diff(fresh_times(repeats, t_s))))
+
+
+def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
+    """What makes one doubt that samples (n, axes) are in m/s2. BadInput where they are in g: gravity is in them."""
+    counted = samples if moving is None or not moving.any() else samples[moving]
+    mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
+    for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
+        if abs(gravity - _GRAVITY) < _GRAVITY_NEAR and rms < _GRAVITY_CALM:
+            raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
+                           "has it: --unit g takes them as g, --unit mps2 as they are")
+    if moving is not None and not moving.any():
+        return []
+    numbers = {"rms_mps2": rms}
+    if 0.0 < rms < _QUIET_MPS2:
+        return [Doubt("quiet", f"{rms:.2g} m/s2 r.m.s. is less than a moving car has: is it in g? (--unit g)", numbers)]
+    if rms > _LOUD_MPS2:
+        return [Doubt("loud", f"{rms:.3g} m/s2 r.m.s. is more than any car has: is it in m/s2?", numbers)]
+    return []
+
+
+def end_doubts(name: str, values: Array) -> list[Doubt]:
+    """Where samples (n,) of an axis stand at an end of the sensor's range."""
+    return [Doubt("range_end", f"{one.samples} samples of {name} stand at {one.at:.4g} m/s2, the end of a range: the "
+                  "ride is harder than the values say; record with a larger range",
+                  {"at_mps2": one.at, "samples": one.samples}) for one in range_ends(values)]

@@ -1,0 +1,139 @@
+"""Records that are not what they seem, at the command line: refused with the option that mends them, or told of."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ..support.drives.records import at, held, ride, rounded, write_record
+
+SECONDS = 40
+FINE = ride(SECONDS + 2, np.random.default_rng(5), 0.6)
+EVEN_S = np.arange(1, SECONDS, 0.01)
+
+
+@pytest.fixture
+def comfort(ridelog: Path, tmp_path: Path):
+    """Exit status, JSON or none, and lines on stderr of ``ridelog comfort`` on a record."""
+
+    def run(t_s: np.ndarray, accel: np.ndarray, *arguments: str) -> tuple[int, dict, list[str]]:
+        path = write_record(tmp_path / "ride.csv", t_s, accel_z_mps2=accel)
+        done = subprocess.run([ridelog, "comfort", path, "--json", *arguments], capture_output=True, text=True,
+                              check=False)
+        assert "Traceback" not in done.stderr
+        return done.returncode, json.loads(done.stdout or "{}"), done.stderr.splitlines()
+
+    return run
+
+
+@pytest.mark.parametrize("step", [0.0, 0.0383, 0.098, 0.613])
+@pytest.mark.parametrize("level", [0.0, 9.81])
+def test_a_good_record_is_not_doubted(comfort, step: float, level: float) -> None:
+    status, told, complaints = comfort(EVEN_S, rounded(at(EVEN_S, FINE) + level, step))
+    assert (status, told["doubts"], told["resampled"], complaints) == (0, [], None, [])
+
+
+def test_a_standing_car_is_not_refused(comfort) -> None:
+    status, told, _ = comfort(EVEN_S, np.full(len(EVEN_S), 9.8))
+    assert (status, told["a_w_mps2"]) == (0, pytest.approx(0, abs=1e-9))
+
+
+@pytest.mark.parametrize("taken_hz", [51, 90])
+def test_repeated_samples_are_refused_and_dropped(comfort, taken_hz: float) -> None:
+    taken_s = np.arange(1, SECONDS, 1 / taken_hz)
+    honest = comfort(taken_s, rounded(at(taken_s, FINE), 0.0192), "--resample", "100")[1]
+    t_s, values = held(FINE, taken_s, 200, 0.0192)
+    status, _, complaints = comfort(t_s, values)
+    assert (status, len(complaints)) == (2, 1)
+    assert "ride.csv: expected every sample to be taken anew, found" in complaints[0]
+    assert f"({taken_hz} Hz written at 200): --resample drops the repeats" in complaints[0]
+    status, told, complaints = comfort(t_s, values, "--resample", "100")
+    assert (status, complaints) == (0, [])
+    assert told["a_w_mps2"] == pytest.approx(honest["a_w_mps2"], rel=0.01)
+    assert told["resampled"]["from_hz"] == pytest.approx(taken_hz, rel=1e-3)
+    assert told["resampled"]["repeats_dropped"] == pytest.approx(1 - taken_hz / 200, abs=0.03)
+    assert told["unseen_from_hz"] == pytest.approx(taken_hz / 2, rel=1e-3)
+
+
+def test_values_in_g_are_refused_and_converted(comfort) -> None:
+    right = comfort(EVEN_S, at(EVEN_S, FINE))[1]
+    in_g = 0.995 + at(EVEN_S, FINE) / 9.80665
+    status, _, complaints = comfort(EVEN_S, in_g)
+    assert (status, len(complaints)) == (2, 1)
+    assert "found a mean of 0.995, as gravity in g has it: --unit g" in complaints[0]
+    status, told, complaints = comfort(EVEN_S, in_g, "--unit", "g")
+    assert (status, complaints) == (0, [])
+    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=1e-4)
+    assert comfort(EVEN_S, in_g, "--unit", "mps2")[0] == 0
+    status, told, complaints = comfort(EVEN_S, in_g - 0.995)
+    assert (status, [doubt["what"] for doubt in told["doubts"]], len(complaints)) == (0, ["quiet"], 1)
+    assert "is it in g?" in complaints[0]
+
+
+def test_the_end_of_a_range_is_told_of(comfort) -> None:
+    status, told, complaints = comfort(EVEN_S, np.clip(at(EVEN_S, FINE), -5, 0.9))
+    assert (status, len(complaints)) == (0, 1)
+    assert "samples of accel_z_mps2 stand at 0.9 m/s2, the end of a range" in complaints[0]
+    assert told["doubts"][0]["at_mps2"] == 0.9
+
+
+@pytest.mark.parametrize(("t_s", "words"), [
+    (EVEN_S + 0.003 * np.random.default_rng(1).uniform(-1, 1, len(EVEN_S)), "found a step of"),
+    (EVEN_S * (1 + 1e-5 * EVEN_S), "the clock drifts"),
+])
+def test_uneven_times_are_refused_and_laid_on_a_grid(comfort, t_s: np.ndarray, words: str) -> None:
+    right = comfort(EVEN_S, at(EVEN_S, FINE))[1]
+    status, _, complaints = comfort(t_s, at(t_s, FINE))
+    assert (status, len(complaints)) == (2, 1)
+    assert words in complaints[0]
+    assert "--resample" in complaints[0]
+    status, told, complaints = comfort(t_s, at(t_s, FINE), "--resample")
+    assert (status, complaints) == (0, [])
+    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
+
+
+def test_bursts_are_refused_and_spread(comfort) -> None:
+    right = comfort(EVEN_S, at(EVEN_S, FINE))[1]
+    arrived_s = np.ceil(EVEN_S * 12 - 1e-9) / 12
+    status, _, complaints = comfort(arrived_s, at(EVEN_S, FINE))
+    assert (status, "--resample" in complaints[0]) == (2, True)
+    status, told, _ = comfort(arrived_s, at(EVEN_S, FINE), "--resample")
+    assert status == 0
+    assert told["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=0.01)
+
+
+def test_what_cannot_be_mended_is_refused_all_the_same(comfort) -> None:
+    hole_s = np.where(EVEN_S < 20, EVEN_S, EVEN_S + 3)
+    assert "expected no hole above 0.5 s, found one of 3.01 s" in comfort(hole_s, at(EVEN_S, FINE), "--resample")[2][0]
+    back_s = EVEN_S.copy()
+    back_s[500] -= 1
+    assert "ride.csv:502: expected no time before" in comfort(back_s, at(EVEN_S, FINE), "--resample")[2][0]
+    assert comfort(EVEN_S, at(EVEN_S, FINE), "--resample", "3")[0] == 2
+
+
+def test_estimate_refuses_and_mends_as_well(ridelog: Path, tmp_path: Path) -> None:
+    road, drive = tmp_path / "road.csv", tmp_path / "drive.csv"
+    subprocess.run([ridelog, "road", "generate", "--class", "B", "--length", "400", "--out", road], check=True,
+                   capture_output=True)
+    subprocess.run([ridelog, "simulate", "--vehicle", "rav4-2009", "--profile", road, "--speed", "15", "--noise",
+                    "0.05", "--out", drive], check=True, capture_output=True)
+
+    def estimate(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([ridelog, "estimate", drive, "--vehicle", "rav4-2009", "--json", *arguments],
+                              capture_output=True, text=True, check=False)
+
+    right = json.loads(estimate().stdout)
+    assert right["doubts"] == []
+    t_s, accel, speed_mps, distance_m = np.loadtxt(drive, delimiter=",", skiprows=1).T
+    twice_s = np.arange(2 * len(t_s) - 1) / 200
+    write_record(drive, twice_s, accel_z_mps2=np.repeat(accel, 2)[:-1], speed_mps=np.interp(twice_s, t_s, speed_mps),
+                 distance_m=np.interp(twice_s, t_s, distance_m))
+    refused = estimate()
+    assert refused.returncode == 2
+    assert "(100 Hz written at 200): --resample drops the repeats" in refused.stderr
+    mended = json.loads(estimate("--resample").stdout)
+    assert mended["iri_m_per_km"] == pytest.approx(right["iri_m_per_km"], rel=0.01)

@@ -1,0 +1,40 @@
+"""Ticks of an adapter's timer, told from the teeth of the samples themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers.sample_clock import SampleClock
+from drivers.sampling_comb import is_ticked
+
+
+@pytest.mark.parametrize("timer_us", [16_003.0, 8_010.0, 15_950.0])
+def test_a_timer_near_a_multiple_of_the_period_is_seen(timer_us: float) -> None:
+    rng = np.random.default_rng(1)
+    ticks_us = np.arange(128) * 5 * timer_us + rng.uniform(0, 300, 128)
+    assert is_ticked(ticks_us, 4_001.3, 20_000)
+
+
+def test_the_teeth_of_the_samples_are_no_timer() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        teeth_us = 4_001.3 * np.cumsum(rng.integers(12, 28, 128)) + rng.uniform(0, 300, 128)
+        assert not is_ticked(teeth_us, 4_001.3, 20_000)
+    assert not is_ticked(teeth_us, 12_000.0, 20_000)  # no multiple is short enough
+
+
+@pytest.mark.parametrize("timer_us", [0.0, 16_003.0])
+def test_a_timer_makes_no_losses_and_a_single_one_is_seen_without(timer_us: float) -> None:
+    """250 Hz for a minute; the timer drifts against four samples by a sample in half a minute."""
+    rng = np.random.default_rng(2)
+    numbers = np.arange(15_000)
+    if not timer_us:
+        numbers = numbers[numbers != 9000]
+    there_us = numbers * 4_001.3
+    read_us = np.ceil(there_us / timer_us) * timer_us if timer_us else there_us
+    arrivals_us = np.maximum.accumulate(read_us + rng.exponential(80, len(read_us))).astype(np.int64)
+    clock = SampleClock(100, 0.02)
+    clock.feed(arrivals_us)
+    clock.restart()
+    assert (clock.lost, clock.resyncs) == (0 if timer_us else 1, 0)
