@@ -28,6 +28,8 @@ WAIT_S = 5.0
 PART_BLOCKS = 6
 """So many blocks together are compared with what was before: four minutes of driving."""
 LONGEST_READINGS = 100_000
+LONGEST_SILENCE_S = 60.0
+"""Of the sensor: the fixes that came in it are of no use."""
 _BEFORE_S = float(DELAYS_S[-1]) + 0.1
 _AFTER_S = 0.1 - float(DELAYS_S[0])
 
@@ -71,6 +73,8 @@ class DriveAlignment:
 
     def take_fix(self, time_s: float, speed_mps: float) -> None:
         """The next fix, late by the delay that is sought [s, m/s]."""
+        if self._fixes and time_s - self._fixes[0][0] > BLOCK_S + LONGEST_SILENCE_S:
+            self._fixes.clear()
         if not self._fixes or time_s > self._fixes[-1][0]:
             self._fixes.append((time_s, speed_mps))
 

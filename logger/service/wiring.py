@@ -16,6 +16,7 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
+from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
@@ -76,7 +77,8 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     estimator = RoadEstimator(
         structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error
     )
-    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
+    alignment = DriveAlignment(axis.column, axis.sign)
+    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator, alignment)
 
 
 def notices(vehicle: Vehicle) -> tuple[str, ...]:
