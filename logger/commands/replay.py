@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 @dataclass(frozen=True)
 class Outcome:
     """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive told
-    of the receiver's delay, of which the settings say ``latency_s``."""
+    of the receiver's delay, of which the rows took ``known``."""
 
     directory: Path
     files: list[Path]
@@ -57,7 +57,7 @@ class Outcome:
     torn_tail: bool
     summary: Any
     receiver: dict[str, Any]
-    latency_s: float
+    known: Any
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, SI units in the names."""
@@ -82,7 +82,7 @@ class Outcome:
         lines = [screen(self.summary, sys.stdout.encoding or "ascii")]
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
-        lines += drive_words(self.receiver, self.latency_s)
+        lines += drive_words(self.receiver, self.known)
         lines.append(f"Logs: {self.directory} ({len(self.files)} files, {self.rows} rows)")
         return "\n".join(lines)
 
@@ -102,13 +102,14 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         config = replace(config, log=replace(config.log, directory=out))
         sensor = wiring.instrument(config.accelerometer)
         car = read_vehicle(config.vehicle)
-        facts = wiring.sidecar(config, sensor, car) | {"replayed_from": dump.name}
+        known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
+        facts = wiring.sidecar(config, sensor, car, known) | {"replayed_from": dump.name}
         out.mkdir(parents=True, exist_ok=True)
         with FolderLock(out):
             repair(out)
             session = next_session(out)
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-            pipeline = wiring.pipeline(config, sensor, car)
+            pipeline = wiring.pipeline(config, sensor, car, known)
             core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
             player = Player(core, config.accelerometer, rate, _progress(quiet))
             started_s = time.monotonic()
@@ -118,8 +119,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
     files, summary = _written(out, session)
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
-    return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver,
-                   config.gps.latency_s)
+    return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known)
 
 
 def _written(out: Path, session: int) -> tuple[list[Path], Any]:

@@ -51,6 +51,7 @@ class DriveAlignment:
         self._means: list[Array] = []
         self._before: Sitting | None = None
         self._first_s: float | None = None
+        self._found: DelayEstimate | None = None
         self.moved = ""
 
     def take_readings(self, time_s: Array, accel: Array) -> None:
@@ -85,7 +86,9 @@ class DriveAlignment:
 
     def estimate(self) -> DelayEstimate:
         """The delay and forward, as far as they are known by now."""
-        return estimate(self._known)
+        if self._found is None:
+            self._found = estimate(self._known)
+        return self._found
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -105,6 +108,7 @@ class DriveAlignment:
         stretch = Stretch(time_s[low:high], accel[low:high], fixes[:, 0], fixes[:, 1])
         block = told(self._known, stretch)
         if block is not None:
+            self._found = None
             self._known = with_block(self._known, block)
             self._part = with_block(self._part, block)
             self._means.append(block.mean)

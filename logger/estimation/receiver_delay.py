@@ -215,8 +215,8 @@ def combined(before: Belief, found: DelayEstimate, drift_s: float = 0.01) -> Bel
     if before.drives and abs(found.delay_s - before.delay_s) > 4 * hypot(before_std_s, found.std_s):
         return Belief(found.delay_s, found.std_s, 1)
     weight = before_std_s**2 / (before_std_s**2 + found.std_s**2)
-    return Belief(before.delay_s + weight * (found.delay_s - before.delay_s), found.std_s * sqrt(weight),
-                  before.drives + 1)
+    std_s = max(found.std_s * sqrt(weight), FLOOR_S)
+    return Belief(before.delay_s + weight * (found.delay_s - before.delay_s), std_s, before.drives + 1)
 
 
 # --- one block ---

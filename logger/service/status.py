@@ -101,6 +101,7 @@ class ServiceStatus:
     last_window     the newest row; None before the first
     notices         what the settings allow and somebody should know all the same
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
+    receiver_delay  how late fixes come, and how that is known; empty: not told
     """
 
     state: ServiceState
@@ -122,6 +123,7 @@ class ServiceStatus:
     storage: StorageStatus = StorageStatus()
     notices: tuple[str, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
+    receiver_delay: str = ""
 
 
 def write_status(path: Path, status: ServiceStatus) -> None:

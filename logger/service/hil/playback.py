@@ -141,7 +141,8 @@ def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRe
     config = wiring.config_for_dump(recording.header, config, None, place)
     instrument = wiring.instrument(config.accelerometer)
     rows = _Rows()
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle))
+    receiver = wiring.receiver_for_dump(recording.header, config, place)
+    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle), receiver)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:
         core.feed(event)
