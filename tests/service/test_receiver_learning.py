@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.disk import FileSystem
-from drivers.dump import DumpHeader
+from drivers.dump import DumpHeader, open_dump
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import Belief, DelayEstimate
@@ -27,6 +27,13 @@ from logger.service.receiver_learning import (
 )
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+
+from ..support.drives.replay import rows_of
+
+
+def config_of(header: DumpHeader, gps: GpsConfig) -> Config:
+    """The settings that a recording's header asks for, with these of the receiver."""
+    return replace(wiring.config_for_dump(header, None, None), gps=gps)
 
 
 class Told(DriveAlignment):
@@ -127,6 +134,15 @@ def test_a_header_that_cannot_be_is_refused(gps: dict[str, Any]) -> None:
     header = DumpHeader(None, {"driver": "bma220"}, {"baud": 9600, **gps}, "rav4-2009")
     with pytest.raises(BadInput, match=r"dump:1: expected latency_s"):
         wiring.receiver_for_dump(header, Config(), place="dump:1")
+
+
+def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> None:
+    with open_dump(short_dump) as reader:
+        header, events = reader.header, list(reader)[:6000]
+    learnt = replace(header, gps={**header.gps, **header_fields(Belief(0.25, 0.0, 3))})
+    rows = rows_of(learnt, events).rows
+    assert rows == rows_of(header, events, config_of(header, SET)).rows
+    assert rows != rows_of(header, events).rows
 
 
 def test_a_sidecar_says_what_its_rows_went_by() -> None:
