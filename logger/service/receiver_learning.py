@@ -99,6 +99,11 @@ class ReceiverLearning:
         now = combined(self._learnt or UNKNOWN, self._alignment.estimate())
         return now if now.drives else None
 
+    @property
+    def shown(self) -> Belief:
+        """The best that is known: a number in the settings, what is learnt by now, or what is usual."""
+        return self.known if self.known.std_s == 0.0 else self.now or self.known
+
     def tend(self, now_us: int) -> None:
         """To be called now and then: saves what is new."""
         if self._tried_us is None:

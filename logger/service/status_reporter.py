@@ -96,6 +96,7 @@ class StatusReporter:
         """Everything that ``ridelog status`` shows."""
         fix = self._core.last_fix
         storage = self._storage.status()
+        delay = self._learning.shown if self._learning is not None else None
         place = self._config.accelerometer.kind.place(self._config.accelerometer.settings)
         return ServiceStatus(
             state=self._state(now_us),
@@ -117,6 +118,8 @@ class StatusReporter:
             storage=storage,
             notices=self._notices + (self._learning.notices() if self._learning is not None else ()),
             receiver_delay=self._learning.words() if self._learning is not None else "",
+            receiver_delay_s=delay.delay_s if delay is not None else None,
+            receiver_delay_std_s=delay.std_s if delay is not None else None,
             counters={
                 "missed_samples": self._sensors["accelerometer"].missed,
                 "late_samples": self._pipeline.late_samples,
