@@ -94,8 +94,10 @@ def main() -> int:
             continue
         error_s, std_s = np.array(told).T
         off += list(error_s / std_s)
+        print(f"    bias {error_s.mean():+.4f} s, mean standard error {std_s.mean():.4f} s, within two of them "
+              f"{np.mean(np.abs(error_s) < 2 * std_s):.2f}", flush=True)
         if case.goal_s is None:
-            print(f"    r.m.s. error {np.sqrt(np.mean(error_s**2)):.3f} s, mean standard error {std_s.mean():.3f} s")
+            print(f"    r.m.s. error {np.sqrt(np.mean(error_s**2)):.4f} s", flush=True)
         else:
             figures.at_most(f"{case.name}: r.m.s. error", float(np.sqrt(np.mean(error_s**2))), case.goal_s, "s")
     figures.at_least("truth within two standard errors", float(np.mean(np.abs(off) < 2)), 0.95, "")
