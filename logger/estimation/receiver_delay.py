@@ -34,7 +34,7 @@ with it (0.005 s too little in simulated cars that pitch by 4 degrees per g).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import hypot, sqrt
 
@@ -43,6 +43,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Strength = tuple[float, float, float, float]
+Rows = tuple[Array, Array, Array]
 
 DELAYS_S = np.round(np.arange(-0.20, 1.2001, 0.02), 2)
 """Delays that are looked at [s]; at an end of them nothing is said."""
@@ -52,7 +53,10 @@ GROUPS = 12
 FEWEST_BLOCKS = 6
 FEWEST_FIXES = 10
 SLOWEST_MPS = 1.0
-"""Slower than this receivers hold their speed at zero, and have no sign for a car that backs up."""
+"""Slower than this receivers hold their speed at zero, and have no sign for a car that backs up: such a fix counts only
+where those before and after it say as well that the car stands."""
+EARLY_BLOCKS = 8
+"""So many are kept, and weighed once more when all of them have told the delay: at first it is a guess."""
 THINNED_S = 0.5
 """Fixes that come faster than this are averaged: their noise is not independent."""
 LONGEST_HOLE_S = 0.1
@@ -89,7 +93,7 @@ class Stretch:
 @dataclass(frozen=True)
 class Information:
     """What blocks tell: ``a`` (g, d, 3, 3), ``b`` (g, d, 3) and ``c`` (g,) by group and delay; ``gravity`` (3,) sum of
-    the blocks' mean readings; their number; ``log_likelihood`` (s,) of each of ``STRENGTHS``."""
+    the blocks' mean readings; their number; ``log_likelihood`` (s,) of each of ``STRENGTHS``; the first blocks."""
 
     a: Array
     b: Array
@@ -97,6 +101,7 @@ class Information:
     gravity: Array
     blocks: int
     log_likelihood: Array
+    early: tuple[BlockTold, ...] = ()
 
     @classmethod
     def none(cls) -> Information:
@@ -133,22 +138,26 @@ class Belief:
 
 @dataclass(frozen=True)
 class BlockTold:
-    """What one block tells: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,)."""
+    """What one block tells: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,); and what
+    it was made of: ``rows`` X (d, k, 3), z (k,), t (k,)."""
 
     a: Array
     b: Array
     c: float
     mean: Array
     log_likelihood: Array
+    rows: Rows
 
 
 def told(known: Information, stretch: Stretch) -> BlockTold | None:
     """What a stretch tells, its fixes weighed by what is known. None: the car hardly moves, or the readings have a
     hole."""
-    x, z, t_s = _rows(stretch)
-    if len(z) < FEWEST_FIXES:
-        return None
-    mean = stretch.accel.mean(axis=0)
+    rows = _rows(stretch)
+    return _weighed(known, rows, stretch.accel.mean(axis=0)) if len(rows[1]) >= FEWEST_FIXES else None
+
+
+def _weighed(known: Information, rows: Rows, mean: Array) -> BlockTold:
+    x, z, t_s = rows
     strength = STRENGTHS[int(np.argmax(known.log_likelihood))] if known.blocks else _USUAL
     weight, residual = np.ones(len(z)), z
     so_far = known.a.sum(axis=0), known.b.sum(axis=0)
@@ -158,11 +167,21 @@ def told(known: Information, stretch: Stretch) -> BlockTold | None:
         residual = z - x[index] @ w
         weight = _weights(residual, t_s, strength, weight)
     likelihood = np.array([_log_likelihood(residual, t_s, each, weight) for each in STRENGTHS])
-    return BlockTold(*_sums(x, z, t_s, strength, weight), mean, likelihood)
+    return BlockTold(*_sums(x, z, t_s, strength, weight), mean, likelihood, rows)
 
 
 def with_block(known: Information, block: BlockTold) -> Information:
     """Add what a block tells."""
+    known = replace(_added(known, block), early=(*known.early, block) if known.blocks < EARLY_BLOCKS else ())
+    if known.blocks != EARLY_BLOCKS:
+        return known
+    anew = Information.none()
+    for early in known.early:
+        anew = _added(anew, _weighed(known, early.rows, early.mean))
+    return anew
+
+
+def _added(known: Information, block: BlockTold) -> Information:
     sums = known.a.copy(), known.b.copy(), known.c.copy()
     for total, part in zip(sums, (block.a, block.b, block.c), strict=True):
         total[known.blocks % GROUPS] += part
@@ -223,15 +242,17 @@ def combined(before: Belief, found: DelayEstimate, drift_s: float = 0.01) -> Bel
 # --- one block ---
 
 
-def _rows(stretch: Stretch) -> tuple[Array, Array, Array]:
+def _rows(stretch: Stretch) -> Rows:
     """Rows X (d, k, 3), speeds z (k,) [m/s] and times (k,) [s], thinned and without what is too slow."""
     nothing = np.empty((len(DELAYS_S), 0, 3)), np.empty(0), np.empty(0)
     if len(stretch.time_s) < 2 or np.max(np.diff(stretch.time_s)) > LONGEST_HOLE_S:
         return nothing
+    slow = np.concatenate([[False], stretch.speed_mps < SLOWEST_MPS, [False]])
+    stands = slow[:-2] & slow[1:-1] & slow[2:]
     inside = (stretch.fix_time_s - DELAYS_S[-1] >= stretch.time_s[0]) & \
-        (stretch.fix_time_s - DELAYS_S[0] <= stretch.time_s[-1]) & (stretch.speed_mps >= SLOWEST_MPS)
+        (stretch.fix_time_s - DELAYS_S[0] <= stretch.time_s[-1]) & (stands | ~slow[1:-1])
     t_s, z = stretch.fix_time_s[inside], stretch.speed_mps[inside]
-    if len(z) < FEWEST_FIXES:
+    if np.count_nonzero(z >= SLOWEST_MPS) < FEWEST_FIXES:
         return nothing
     felt = stretch.accel - stretch.accel.mean(axis=0)
     steps_s = np.diff(stretch.time_s)[:, None]
