@@ -46,7 +46,8 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a replay made: the folder, the files in it, the rows as a summary, and how fast it went."""
+    """What a replay made: the folder, the files in it, the rows as a summary, how fast it went, and what the drive told
+    of the receiver's delay, of which the rows took ``known``."""
 
     directory: Path
     files: list[Path]
@@ -55,6 +56,8 @@ class Outcome:
     wall_s: float
     torn_tail: bool
     summary: Any
+    receiver: dict[str, Any]
+    known: Any
 
     def as_json(self) -> dict[str, Any]:
         """Named fields, SI units in the names."""
@@ -67,16 +70,19 @@ class Outcome:
             "played_s": self.duration_s,
             "wall_s": self.wall_s,
             "torn_tail": self.torn_tail,
+            "receiver": self.receiver,
             "summary": summary_json(self.summary),
         }
 
     def text(self) -> str:
         """For a person."""
         from logger.report.terminal import screen
+        from logger.service.receiver_learning import drive_words
 
         lines = [screen(self.summary, sys.stdout.encoding or "ascii")]
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
+        lines += drive_words(self.receiver, self.known)
         lines.append(f"Logs: {self.directory} ({len(self.files)} files, {self.rows} rows)")
         return "\n".join(lines)
 
@@ -86,6 +92,7 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     from logger.service import wiring
     from logger.service.dump_player import Player
     from logger.service.event_core import EventCore
+    from logger.service.receiver_learning import drive_fields
     from logger.store.formats.vehicle_file import read_vehicle
     from logger.store.log.folder_lock import FolderLock
     from logger.store.log.log_writer import SegmentLog, next_session, repair
@@ -95,13 +102,14 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
         config = replace(config, log=replace(config.log, directory=out))
         sensor = wiring.instrument(config.accelerometer)
         car = read_vehicle(config.vehicle)
-        facts = wiring.sidecar(config, sensor, car) | {"replayed_from": dump.name}
+        known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
+        facts = wiring.sidecar(config, sensor, car, known) | {"replayed_from": dump.name}
         out.mkdir(parents=True, exist_ok=True)
         with FolderLock(out):
             repair(out)
             session = next_session(out)
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes)
-            pipeline = wiring.pipeline(config, sensor, car)
+            pipeline = wiring.pipeline(config, sensor, car, known)
             core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
             player = Player(core, config.accelerometer, rate, _progress(quiet))
             started_s = time.monotonic()
@@ -109,16 +117,19 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
             wall_s = time.monotonic() - started_s
     if not quiet:
         print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
-    return _outcome(out, session, core.rows, played.duration_s, wall_s, reader.torn_tail)
+    files, summary = _written(out, session)
+    receiver = drive_fields(pipeline.alignment, config.accelerometer)
+    return Outcome(out, files, core.rows, played.duration_s, wall_s, reader.torn_tail, summary, receiver, known)
 
 
-def _outcome(out: Path, session: int, rows: int, duration_s: float, wall_s: float, torn: bool) -> Outcome:
+def _written(out: Path, session: int) -> tuple[list[Path], Any]:
+    """The files of a session, and their rows as a summary."""
     from logger.report.summary import summarise
     from logger.store.log.row_format import read_log
 
     files = sorted(out.glob(f"{session:05d}-*.csv"))
     records = [record for path in files for record in read_log(path).records]
-    return Outcome(out, files, rows, duration_s, wall_s, torn, summarise(records))
+    return files, summarise(records)
 
 
 def _progress(quiet: bool) -> Callable[[float], None]:

@@ -62,6 +62,8 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
         f"  log             {status.current_file or 'no file open'}; {status.rows_written} rows, "
         f"{status.distance_m / 1000:.1f} km since the start",
     ]
+    if status.receiver_delay:
+        lines.append(f"  receiver delay  {printable(status.receiver_delay)}")
     if status.last_window is not None:
         lines.append(f"  last window     {_window_words(status)}")
     lines += ["", "What to do", *(f"  {line}" for line in advice(status))]

@@ -86,6 +86,7 @@ class _Piece:
     iri: WindowIri
     told: float
     missing: str = ""
+    speed_mps: float = 0.0
 
 
 class RoadEstimator:
@@ -99,6 +100,7 @@ class RoadEstimator:
     vehicle_error    share that each axle's gain may be off: readings are not trusted beyond it, which keeps waves that
                  lift one axle while the other sinks from being made too much of
     on_road      is given each piece of estimated road
+    late_std_s   standard error of the delay by which the distance is late: the faster, the further off
     """
 
     def __init__(
@@ -110,10 +112,12 @@ class RoadEstimator:
         place_std_m: float = 0.0,
         vehicle_error: float = VEHICLE_ERROR,
         on_road: Callable[[RoadPiece], None] | None = None,
+        late_std_s: float = 0.0,
     ) -> None:
         self._car = CarResponse(structure, output)
         self._sensor = sensor
         self._place_std_m = place_std_m
+        self._late_std_s = late_std_s
         self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
         self._piece_m = window_m / self._pieces_per_window
         self._points = ceil(self._piece_m / _SPACING_M)
@@ -237,7 +241,8 @@ class RoadEstimator:
         louder = self._errors.at(speed_mps, raised(spectrum), variance)
         told = knowledge.told * (1 - float(unseen.mean()))
         missing = "" if told >= FAINT_BELOW else "faint" if knowledge.told < FAINT_BELOW else "unsettled"
-        return _Piece(window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m), told, missing)
+        iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
+        return _Piece(iri, told, missing, speed_mps)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
         """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
@@ -254,7 +259,8 @@ class RoadEstimator:
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
         mean = sum(one.iri_m_per_km for one in iri) / len(iri)
-        misplaced = self._place_std_m * sum(one.change_per_m for one in iri) / len(iri)
+        late_m = self._late_std_s * sum(one.speed_mps for one in pieces) / len(pieces)
+        misplaced = hypot(self._place_std_m, late_m) * sum(one.change_per_m for one in iri) / len(iri)
         std = hypot(own, shared, misplaced)
         return [WindowEstimate(number // self._pieces_per_window, mean, std, told, flags)]
 

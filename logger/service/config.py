@@ -53,12 +53,13 @@ class AccelerometerConfig:
 
 @dataclass(frozen=True)
 class GpsConfig:
-    """The receiver's line; its latency, the longest loss that is bridged, 1024-week periods to add; where its antenna
-    sits, and how far off the places are that it gives from one window to another (standard deviation)."""
+    """The receiver's line; its latency (None: as it was learnt), the longest loss that is bridged, 1024-week periods to
+    add; where its antenna sits, and how far off the places are that it gives from one window to another (standard
+    deviation)."""
 
     port: str = "/dev/serial0"
     baud: int = 9600
-    latency_s: float = 0.10
+    latency_s: float | None = None
     bridge_s: float = 10.0
     week_rollovers: int = 0
     antenna_behind_front_axle_m: float = 0.0
@@ -243,7 +244,7 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
 _gps = _section(GpsConfig, {
     "port": Node.text,
     "baud": _reader(BAUDS),
-    "latency_s": _number(0, 2),
+    "latency_s": _or_none("auto", _number(0, 2)),
     "bridge_s": _number(0, 60),
     "week_rollovers": _whole(0, ROLLOVERS_MAX),
     "antenna_behind_front_axle_m": _number(-3, 15),

@@ -16,6 +16,7 @@ import numpy as np
 from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
+from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
@@ -67,10 +68,11 @@ def longest_wait_us(bridge_s: float) -> int:
 
 
 class Pipeline:
-    """The whole way from readings to records of one service run."""
+    """The whole way from readings to records of one service run. ``alignment`` learns beside it and changes no row."""
 
     def __init__(
-        self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator
+        self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
+        alignment: DriveAlignment,
     ) -> None:
         self._settings = settings
         self._chain = chain
@@ -90,6 +92,7 @@ class Pipeline:
         self.stillness = Stillness()
         self.repetition = Repetition()
         self.speed_check = SpeedCheck()
+        self.alignment = alignment
 
     @property
     def waiting_samples(self) -> int:
@@ -104,6 +107,9 @@ class Pipeline:
             timed = self.timebase.place(fix)
             self.odometer.add(timed)
             self.speed_check.take(timed)
+            if fix.valid and fix.speed_mps is not None:
+                self.alignment.take_fix(timed.t_us / US_PER_S + self._settings.latency_s, fix.speed_mps)
+        self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
         self.stillness.take(block, fixes)
         self.repetition.take(block)
         self._pending += self._chain.push(block)

@@ -21,6 +21,7 @@ from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.listener import Listener, monotonic_us
 from logger.service.main_loop import MainLoop
+from logger.service.receiver_learning import ReceiverLearning, at_start, read_learnt
 from logger.service.scheduling import go_first
 from logger.service.shutdown_signals import Stop
 from logger.service.status_reporter import StatusReporter
@@ -46,13 +47,16 @@ def serve(config: Config, stop: Stop) -> None:
 def _serve(config: Config, stop: Stop) -> None:
     sensor = wiring.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
-    facts = wiring.sidecar(config, sensor, vehicle)
-    header = wiring.dump_header(config) if config.log.record_dump else None
+    learnt = read_learnt(config.log.directory)
+    receiver_delay = at_start(config.gps, learnt)
+    facts = wiring.sidecar(config, sensor, vehicle, receiver_delay)
+    header = wiring.dump_header(config, receiver_delay) if config.log.record_dump else None
     limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
                       pairing=config.pairing)
     decoder = wiring.gps_decoder(config)
-    pipeline = wiring.pipeline(config, sensor, vehicle)
+    pipeline = wiring.pipeline(config, sensor, vehicle, receiver_delay)
+    learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
     machine = Machine(monotonic_us, time.sleep)
@@ -66,11 +70,12 @@ def _serve(config: Config, stop: Stop) -> None:
     notices = wiring.notices(vehicle)
     for notice in notices:
         log.warning("%s", notice)
-    observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices)
+    observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, learning)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
         observer.write(now_us)
+        learning.tend(now_us)
         if not any(listener.hangs(now_us) for listener in listeners):
             notifier.watchdog()
         notifier.status(observer.line())
@@ -79,6 +84,7 @@ def _serve(config: Config, stop: Stop) -> None:
     beat_s = min(LONGEST_BEAT_S, watchdog_interval_s() or LONGEST_BEAT_S)
     MainLoop(core, storage, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
     notifier.stopping()
+    learning.save()
     observer.remove()
     log.info("stopped: %d rows written", core.rows)
 

@@ -101,6 +101,8 @@ class ServiceStatus:
     last_window     the newest row; None before the first
     notices         what the settings allow and somebody should know all the same
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
+    receiver_delay  how late fixes come, and how that is known; empty: not told; receiver_delay_s and
+                    receiver_delay_std_s: as numbers, with the standard error [s]
     """
 
     state: ServiceState
@@ -122,6 +124,9 @@ class ServiceStatus:
     storage: StorageStatus = StorageStatus()
     notices: tuple[str, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
+    receiver_delay: str = ""
+    receiver_delay_s: float | None = None
+    receiver_delay_std_s: float | None = None
 
 
 def write_status(path: Path, status: ServiceStatus) -> None:
@@ -147,6 +152,7 @@ def read_status(path: Path) -> ServiceStatus | None:
         storage = fields["storage"]
         fields["storage"] = StorageStatus(**{**storage, "notices": tuple(map(str, storage["notices"]))})
         fields["notices"] = tuple(map(str, fields["notices"]))
+        fields["receiver_delay"] = str(fields.get("receiver_delay", ""))
         status = ServiceStatus(**fields)
     except FileNotFoundError:
         return None

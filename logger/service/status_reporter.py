@@ -12,6 +12,7 @@ from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.listener import monotonic_us
 from logger.service.pipeline import Pipeline
+from logger.service.receiver_learning import ReceiverLearning
 from logger.service.signal_chain import Axis
 from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
 from logger.service.storage import Storage
@@ -40,6 +41,7 @@ class StatusReporter:
         gps: Supervisor,
         counters: Mapping[str, Callable[[], dict[str, int]]],
         notices: tuple[str, ...] = (),
+        learning: ReceiverLearning | None = None,
     ) -> None:
         self._config = config
         self._core = core
@@ -48,6 +50,7 @@ class StatusReporter:
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
         self._notices = notices
+        self._learning = learning
         self._began_us = monotonic_us()
         self._told_us = self._began_us
         self._state_since: dict[str, tuple[str, int]] = {}
@@ -93,6 +96,7 @@ class StatusReporter:
         """Everything that ``ridelog status`` shows."""
         fix = self._core.last_fix
         storage = self._storage.status()
+        delay = self._learning.shown if self._learning is not None else None
         place = self._config.accelerometer.kind.place(self._config.accelerometer.settings)
         return ServiceStatus(
             state=self._state(now_us),
@@ -112,7 +116,10 @@ class StatusReporter:
             free_bytes=_free_bytes(str(self._config.log.directory)),
             last_window=self._core.last_record,
             storage=storage,
-            notices=self._notices,
+            notices=self._notices + (self._learning.notices() if self._learning is not None else ()),
+            receiver_delay=self._learning.words() if self._learning is not None else "",
+            receiver_delay_s=delay.delay_s if delay is not None else None,
+            receiver_delay_std_s=delay.std_s if delay is not None else None,
             counters={
                 "missed_samples": self._sensors["accelerometer"].missed,
                 "late_samples": self._pipeline.late_samples,

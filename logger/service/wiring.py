@@ -16,11 +16,14 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
+from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.service.config import AXES, AccelerometerConfig, Config
 from logger.service.pipeline import Pipeline, PipelineSettings
+from logger.service.receiver_learning import at_start, from_fields, header_fields
 from logger.service.signal_chain import Axis, SignalChain, recorder_gain
 from logger.shipped import vehicle_file, vehicle_names, version
 from logger.vehicle.models import structure_of
@@ -55,8 +58,9 @@ def gps_decoder(config: Config) -> NmeaDecoder:
     return NmeaDecoder(week_rollovers=config.gps.week_rollovers)
 
 
-def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
-    """The pipeline as the settings want it."""
+def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> Pipeline:
+    """The pipeline as the settings want it. ``receiver``: what is known of its delay; None: as before any drive."""
+    receiver = receiver or at_start(config.gps, None)
     settings = PipelineSettings(
         window_m=config.pipeline.window_m,
         blind_window_s=config.pipeline.blind_window_s,
@@ -64,7 +68,7 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
         slow_mps=config.pipeline.slow_mps,
         stationary_mps=config.pipeline.stationary_mps,
         drive_end_s=config.pipeline.drive_end_s,
-        latency_s=config.gps.latency_s,
+        latency_s=receiver.delay_s,
         front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
     )
     axis = Axis.from_word(config.accelerometer.vertical_axis)
@@ -74,9 +78,11 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     structure = structure_of(vehicle)
     place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
     estimator = RoadEstimator(
-        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error
+        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
+        late_std_s=receiver.std_s,
     )
-    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
+    alignment = DriveAlignment(axis.column, axis.sign)
+    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator, alignment)
 
 
 def notices(vehicle: Vehicle) -> tuple[str, ...]:
@@ -88,26 +94,28 @@ def notices(vehicle: Vehicle) -> tuple[str, ...]:
             "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
 
 
-def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle) -> dict[str, Any]:
+def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {
         "ridelog_version": version(),
         "sensor": sensor.description,
         "vehicle": asdict(vehicle),
         "settings": _plain(_as_written(config)),
+        "receiver": header_fields(receiver or at_start(config.gps, None)),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
 
 
-def dump_header(config: Config) -> DumpHeader:
+def dump_header(config: Config, receiver: Belief | None = None) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
+    gps = {"baud": config.gps.baud, **header_fields(receiver or at_start(config.gps, None))}
     sensor = config.accelerometer
     accelerometer = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis,
                      **sensor.kind.header(sensor.settings)}
     stem = config.vehicle.stem
     is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
-    return DumpHeader(None, accelerometer, {"baud": config.gps.baud}, stem if is_shipped else str(config.vehicle))
+    return DumpHeader(None, accelerometer, gps, stem if is_shipped else str(config.vehicle))
 
 
 def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
@@ -134,6 +142,15 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
     if given is None or vehicle is not None:
         config = replace(config, vehicle=_vehicle_file(vehicle or header.vehicle, place))
     return replace(config, accelerometer=sensor)
+
+
+def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> Belief:
+    """What was known of the receiver's delay when the recording began, unless the settings say a number. Raises
+    BadInput, beginning with ``place``, where the recording says what cannot be."""
+    try:
+        return at_start(config.gps, from_fields(header.gps))
+    except ValueError as error:
+        raise BadInput(f"{place}: {error}") from None
 
 
 def _vehicle_file(name: str, place: str) -> Path:

@@ -41,6 +41,7 @@ def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path)
     done = call(ridelog, "demo", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "Roughest places" in done.stdout
+    assert "Receiver's delay: 0." in done.stdout
     assert str(tmp_path / "out") in done.stdout
     assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
     assert len(rows(tmp_path / "out")) > 400
@@ -59,6 +60,9 @@ def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
     for line in text.splitlines()[1:]:
         body, _, check = line.rpartition(",")
         assert check == f"{zlib.crc32(body.encode()):08x}"
+    assert outcome["receiver"]["delay_s"] is None  # a minute and a half: too short
+    assert outcome["receiver"]["unknown_because"] == "too little has been driven"
+    assert outcome["receiver"]["mounting"] == []
     records = list(csv.DictReader(text.splitlines()))
     assert outcome["rows"] == len(records)
     assert [int(record["segment"]) for record in records] == list(range(1, len(records) + 1))

@@ -50,6 +50,19 @@ def estimated(
     return found + estimator.finish()
 
 
+def test_a_delay_that_is_not_known_counts_by_the_speed() -> None:
+    """0.1 s are 1.5 m at 15 m/s."""
+    _, accel, distance_m = bumpy(1.0, 0.05, 1.0, 15.0)
+    reading = read(accel, FINE, 1)
+    late = RoadEstimator(RAV4, body_point(RAV4), FINE, WINDOW_M, vehicle_error=0.0, late_std_s=0.1)
+    everywhere = np.ones(len(reading), dtype=bool)
+    found = late.push(reading, everywhere, np.zeros(len(reading)), distance_m) + late.finish()
+    off = {one.number: one for one in estimated(FINE, reading, distance_m, place_std_m=1.5)}
+    for one in found:
+        assert one.iri_m_per_km == pytest.approx(off[one.number].iri_m_per_km, nan_ok=True)
+        assert one.iri_std_m_per_km == pytest.approx(off[one.number].iri_std_m_per_km, rel=0.01, nan_ok=True)
+
+
 def exact_iri(road: np.ndarray, window_m: float = WINDOW_M) -> np.ndarray:
     """(n,) of every whole window of a road."""
     edges = window_m * np.arange(int((len(road) - 10) * SPACING_M / window_m))

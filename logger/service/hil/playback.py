@@ -33,6 +33,7 @@ from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.event_merger import EventMerger
+from logger.service.receiver_learning import at_start, read_learnt
 from logger.service.signal_chain import Axis
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.log.log_writer import ClockMap
@@ -124,7 +125,8 @@ def send(
 
 
 def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRecord]:
-    """The rows that a service with these settings makes of the recording; all have UTC when any has.
+    """The rows that a service with these settings, and what it has learnt by now, makes of the recording; all have UTC
+    when any has.
 
     Raises BadInput for settings under which the service does not listen to what the wires bring.
     """
@@ -141,7 +143,8 @@ def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRe
     config = wiring.config_for_dump(recording.header, config, None, place)
     instrument = wiring.instrument(config.accelerometer)
     rows = _Rows()
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle))
+    receiver = at_start(config.gps, read_learnt(config.log.directory))  # as the service began, not as the recording
+    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle), receiver)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:
         core.feed(event)

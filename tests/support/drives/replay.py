@@ -46,7 +46,7 @@ def parts_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCo
     sensor = wiring.instrument(config.accelerometer)
     vehicle = read_vehicle(config.vehicle)
     rows = Rows()
-    pipeline = wiring.pipeline(config, sensor, vehicle)
+    pipeline = wiring.pipeline(config, sensor, vehicle, wiring.receiver_for_dump(header, config))
     return EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, rows), rows, pipeline
 
 

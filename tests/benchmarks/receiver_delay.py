@@ -1,0 +1,110 @@
+"""A late receiver on simulated drives: error of the delay that is learnt, and how often the truth is within the errors.
+
+Sensors at any angle about the vertical, tilted by up to 8 degrees, delays of 0.05 to 0.4 s, 20 minutes each. With a
+number as argument: so many drives of each kind.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.mounting import angle_rad
+from logger.estimation.receiver_delay import DelayEstimate
+
+from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive
+from .figures import Figures
+
+BMA220 = Instrument()
+FINE = Instrument(step_mps2=0.0, noise_mps2=0.03)
+DRIVES = 40
+SECONDS = 1200.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of drive; goal_s: r.m.s. error of the delay [s], None: none is asked for."""
+
+    name: str
+    receiver: Receiver
+    instrument: Instrument = BMA220
+    slope_rms: float = 0.02
+    kind: str = "town"
+    goal_s: float | None = 0.02
+
+
+CASES = (
+    Case("town, BMA220, 0.1 m/s", Receiver()),
+    Case("town, BMA220, 0.05 m/s", Receiver(noise_mps=0.05)),
+    Case("town, BMA220, 0.2 m/s", Receiver(noise_mps=0.2), goal_s=None),
+    Case("town, BMA220, hilly", Receiver(), slope_rms=0.05, goal_s=None),
+    Case("town, fine sensor, 0.1 m/s", Receiver(), FINE),
+    Case("town, BMA220, 10 Hz, lasting noise", Receiver(noise_mps=0.05, lasting_mps=0.1, rate_hz=10)),
+    Case("town, BMA220, 5 Hz, tunnels", Receiver(rate_hz=5, gaps_s=((200, 260), (600, 680)))),
+    Case("highway, BMA220, 0.1 m/s", Receiver(), kind="highway", goal_s=None),
+)
+
+
+def learnt(seen: SeenDrive, chunk: int = 500) -> DriveAlignment:
+    """All of a drive, as it comes."""
+    drive_alignment = DriveAlignment(2, 1.0)
+    fix = 0
+    for low in range(0, len(seen.time_s), chunk):
+        time_s = seen.time_s[low : low + chunk]
+        while fix < len(seen.fix_time_s) and seen.fix_time_s[fix] <= time_s[-1]:
+            drive_alignment.take_fix(float(seen.fix_time_s[fix]), float(seen.fix_speed_mps[fix]))
+            fix += 1
+        drive_alignment.take_readings(time_s, seen.accel[low : low + chunk])
+    return drive_alignment
+
+
+def trial(case: Case, seed: int) -> tuple[DelayEstimate, float, float, int]:
+    """Estimate, true delay [s], error of forward about the vertical [rad], number of complaints."""
+    rng = np.random.default_rng([7, seed])
+    delay_s = float(rng.uniform(0.05, 0.4))
+    mounting = Mounting(float(rng.uniform(-180, 180)), *map(float, rng.uniform(-8, 8, 2)))
+    receiver = replace(case.receiver, delay_s=delay_s)
+    seen = drive(case.kind, SECONDS, mounting, receiver, case.instrument, seed, case.slope_rms)
+    found = learnt(seen)
+    guess = found.estimate()
+    off_rad = np.nan
+    if guess.forward is not None:
+        level = guess.forward - seen.upward * (guess.forward @ seen.upward)
+        off_rad = angle_rad(level, seen.forward)
+    return guess, delay_s, off_rad, len(found.complaints)
+
+
+def main() -> int:
+    """Print the figures; exit 1 when a goal is missed."""
+    drives = int(sys.argv[1]) if len(sys.argv) > 1 else DRIVES
+    figures = Figures()
+    off, complaints = [], 0
+    for case in CASES:
+        trials = [trial(case, seed) for seed in range(drives)]
+        complaints += sum(each[3] for each in trials)
+        told = [(guess.delay_s - truth_s, guess.std_s) for guess, truth_s, _, _ in trials
+                if guess.delay_s is not None and guess.std_s is not None]
+        off_deg = [np.degrees(each[2]) for each in trials if np.isfinite(each[2])]
+        print(f"  {case.name}: told in {len(told)} of {drives} drives; forward within {max(off_deg, default=0):.1f} "
+              "degrees", flush=True)
+        if not told:
+            continue
+        error_s, std_s = np.array(told).T
+        off += list(error_s / std_s)
+        print(f"    bias {error_s.mean():+.4f} s, mean standard error {std_s.mean():.4f} s, within two of them "
+              f"{np.mean(np.abs(error_s) < 2 * std_s):.2f}", flush=True)
+        if case.goal_s is None:
+            print(f"    r.m.s. error {np.sqrt(np.mean(error_s**2)):.4f} s", flush=True)
+        else:
+            figures.at_most(f"{case.name}: r.m.s. error", float(np.sqrt(np.mean(error_s**2))), case.goal_s, "s")
+    figures.at_least("truth within two standard errors", float(np.mean(np.abs(off) < 2)), 0.95, "")
+    figures.at_least("truth within one standard error", float(np.mean(np.abs(off) < 1)), 0.64, "")
+    figures.at_most("complaints without a cause, per drive", complaints / drives / len(CASES), 0.05, "")
+    return 1 if figures.missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
