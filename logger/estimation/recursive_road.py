@@ -9,7 +9,7 @@ rounds.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, log, pi, sqrt
+from math import log, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -163,10 +163,9 @@ class FollowedRoad:
             self._gaussian = self._improved(readings, samples, read, block, solution, variance, learns)
         else:
             residual, told_waves = readings.value_mps2 - solution.fitted_mps2, 2 * seen_share * float(told.sum())
-            before_log_noise = self._belief.log_noise
             self._belief = with_noise(self._belief, residual, weight, told_waves)
             if learns and self._learner is not None:
-                self._learn_from_residual(noise_slope(residual, weight, told_waves), before_log_noise, weight)
+                self._learn_from_residual(noise_slope(residual, weight, told_waves), weight)
         return SolvedBlock(solution.road, typical)
 
     def _as_gaussian(self, samples: Samples) -> Readings:
@@ -203,14 +202,14 @@ class FollowedRoad:
         expected, others, low, high = (row[part][inner] for row in (expected, others, low, high))
         self._believe(interval_score(expected, others, low, high, self._sensor.noise_rms_mps2))
 
-    def _learn_from_residual(self, told: tuple[float, float], log_noise: float, weight: Array) -> None:
-        """What a block says of the noise, as far as its readings are new; ``told`` as ``noise_slope`` gives it for
-        ``log_noise`` of the belief and a weight (t,)."""
+    def _learn_from_residual(self, told: tuple[float, float], weight: Array) -> None:
+        """What a block says of the noise, as far as its readings are new; ``told`` as ``noise_slope`` gives it for a
+        weight (t,). The car's own error, if it has one, counts as noise."""
         slope, free = told
-        variance = self._sensor.variance_mps2_2 * exp(log_noise)
-        own = variance * float(weight.max())  # the rest is the car's own error
+        if not free:
+            return
         share = min(self._unscored / len(weight), 1.0) / _MEDIAN_COST
-        self._believe(NoiseScore(0.5 * log(variance), 2 * slope * own * share, 2 * free * own**2 * share))
+        self._believe(NoiseScore(-0.5 * log(float(weight.max())), 2 * slope * share, 2 * free * share))
 
     def _believe(self, score: NoiseScore) -> None:
         assert self._learner is not None
