@@ -20,8 +20,8 @@ one that is too large."""
 _FIRST_SHARE_OF_STEP = 1 / 3  # from above it is found sooner: noise that is taken for road roughens the road
 # However long the drive: what road and car do that the model does not know, and how rough the propagation is where the
 # noise does not blur the steps, as found on drives of known noise (tests/benchmarks/noise.py).
-_MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 0.005
-_AT_THE_LEAST_LOG_STD = 0.7
+_MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 0.0065
+_BOUND_BELOW_SHARE_OF_STEP, _BOUND_LOG_STD = 0.15, 0.7  # there it says little more than that it is no larger
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
 _FORGOTTEN_PER_STRETCH = 0.005
 _FORGOTTEN_PER_STEP = 5.0  # what was told about another noise is no longer quite true of this one
@@ -124,8 +124,8 @@ class NoiseLearner:
             return NoiseBelief(self._mean, own)
         expected = _EXPECTED_STRETCHES / self._stretches * self._told
         excess = (self._scatter + expected) / (self._told + expected)
-        rough = _ROUGH_LOG_STD * (self._step_mps2 / exp(self._mean))**2
-        std = hypot(own * sqrt(max(excess, 1.0)), _MODEL_LOG_STD, rough)
-        if self._mean <= self._least:
-            std = max(std, _AT_THE_LEAST_LOG_STD)
+        noise_mps2 = exp(self._mean)
+        std = hypot(own * sqrt(max(excess, 1.0)), _MODEL_LOG_STD, _ROUGH_LOG_STD * (self._step_mps2 / noise_mps2)**2)
+        if noise_mps2 < _BOUND_BELOW_SHARE_OF_STEP * self._step_mps2:
+            std = max(std, _BOUND_LOG_STD)
         return NoiseBelief(self._mean, min(std, UNKNOWN_LOG_STD))

@@ -16,6 +16,7 @@ from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
@@ -31,12 +32,17 @@ from logger.vehicle.vehicle import Vehicle
 @dataclass(frozen=True)
 class Instrument:
     """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
-    description for the logs."""
+    description for the logs.
+
+    noise    what is believed of the noise of a reading on the grid, which the pipeline then learns; None: the sensor's,
+             for granted
+    """
 
     decoder: Decoder
     oversample: int
     sensor: Sensor
     description: dict[str, Any]
+    noise: NoiseBelief | None = None
 
 
 def instrument(config: AccelerometerConfig) -> Instrument:
@@ -74,7 +80,8 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle) -> Pipeline:
     structure = structure_of(vehicle)
     place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
     estimator = RoadEstimator(
-        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error
+        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
+        noise=sensor.noise,
     )
     return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator)
 
