@@ -60,8 +60,9 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
-def left_by_others(left: Callable[[float], float], variance: Array) -> Array:
-    """Variance (t,) that all other readings leave of each acceleration [(m/s2)2], where some tell much and some little.
+def left_by_others(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
+    """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
+    variance (t,) of even readings that tell as much [(m/s2)2].
 
     left        variance that even readings of a variance leave of each acceleration, their own included
     variance    (t,) of the readings as they are
@@ -85,7 +86,7 @@ def left_by_others(left: Callable[[float], float], variance: Array) -> Array:
         whole = np.exp(-np.interp(np.log(even), np.log(trials), log_left))
         others = 1 / np.maximum(whole - 1 / even, _LEAST_OTHERS / even)
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
-    return others
+    return others, even
 
 
 def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:

@@ -148,19 +148,27 @@ class FollowedRoad:
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
 
+        moving = block.moving & read
+        typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
+        gain = solution.gain
+        if self._is_coarse:
+            others, even = self._left_by_others(block, variance)
+            if moving.any():
+                uneven, typical = typical, 1 / float((1 / even[moving]).mean())
+                gain = gain * (uneven / typical)
+
         innovations = np.fft.irfft(solution.waves, block.count)
-        told = mean_told(solution.gain, local[seen > 0])
+        told = mean_told(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
         expected = sqrt(2 * float(told.sum()) / block.count)
         white = np.clip(innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
-        self._local.learn(first, innovations, local, solution.gain, seen)
+        self._local.learn(first, innovations, local, gain, seen)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
-        moving = weight[block.moving & read]
-        typical = 1 / float(moving.mean()) if len(moving) else float(variance.mean())
         if self._is_coarse:
-            self._gaussian = self._improved(readings, samples, read, block, solution, variance, learns)
+            usable = moving if learns and self._learner is not None else None
+            self._gaussian = self._improved(readings, samples, read, solution, others, usable)
         else:
             residual, told_waves = readings.value_mps2 - solution.fitted_mps2, 2 * seen_share * float(told.sum())
             self._belief = with_noise(self._belief, residual, weight, told_waves)
@@ -175,24 +183,27 @@ class FollowedRoad:
         return first_guess(samples.reading_mps2, self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
-        self, readings: Readings, samples: Samples, read: Bools, block: Block, solution: Solution, variance: Array,
-        learns: bool,
+        self, readings: Readings, samples: Samples, read: Bools, solution: Solution, others: Array, usable: Bools | None
     ) -> Readings:
-        """Another round for the bounds; ``variance`` (t,) is what the solution was found with."""
+        """Another round for the bounds, with the variance (t,) that all other readings leave of each acceleration. The
+        noise is learnt of the readings that are ``usable`` (t,), if any."""
         low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
+        others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
+        fitted_variance = 1 / (1 / others + 1 / readings.variance)
+        if usable is not None:
+            expected = without_own(readings, solution.fitted_mps2, fitted_variance)
+            self._learn_from_bounds(*expected, low, high, usable)
+        return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
+
+    def _left_by_others(self, block: Block, variance: Array) -> tuple[Array, Array]:
+        """``left_by_others`` in a block whose readings have variances (t,)."""
         speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
 
         def left(even: float) -> float:
             noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
             return acceleration_variance_left(self._car, speed_mps, spectrum, noise_psd)
 
-        others = left_by_others(left, variance)
-        others += unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
-        fitted_variance = 1 / (1 / others + 1 / readings.variance)
-        if learns and self._learner is not None:
-            expected = without_own(readings, solution.fitted_mps2, fitted_variance)
-            self._learn_from_bounds(*expected, low, high, block.moving & read)
-        return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
+        return left_by_others(left, variance)
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""

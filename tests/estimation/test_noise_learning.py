@@ -103,7 +103,8 @@ def test_nothing_read_says_nothing() -> None:
 
 
 def test_even_readings_leave_what_algebra_says() -> None:
-    others = left_by_others(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
+    others, even = left_by_others(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
+    assert even == pytest.approx(np.full(256, 0.02))
     assert others == pytest.approx(np.full(256, 0.04), rel=0.01)
 
 
@@ -125,7 +126,8 @@ def test_uneven_readings_leave_what_dense_algebra_says() -> None:
 
     inverse = np.linalg.inv(prior + np.diag(variance))
     exact = 1 / np.diag(inverse) - variance
-    found = left_by_others(left, variance)
+    found, even = left_by_others(left, variance)
+    assert 1 / np.mean(1 / even) > 1 / np.mean(1 / variance)
     assert found.mean() == pytest.approx(exact.mean(), rel=0.15)
     by_mean_precision = 1 / (1 / left(1 / np.mean(1 / variance)) - np.mean(1 / variance))
     assert by_mean_precision < 0.8 * exact.mean()  # what the mean of the precisions would say
