@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import ADDED, NOISE, RATE, SPEED, WINDOW
+from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
@@ -272,15 +272,16 @@ class Estimate(CommandResult):
 
 
 def estimate(
-    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float = 0.05, step_mps2: float = 0.0,
-    window_m: float = WINDOW_M, unit: str | None = None, resample_hz: float | None = None,
+    run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] = NOISE_MPS2,
+    step_mps2: float = 0.0, window_m: float = WINDOW_M, unit: str | None = None, resample_hz: float | None = None,
 ) -> Estimate:
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
 
     run           as ``read_run``; its distance may go back by up to 1 m, and is then laid anew
     vehicle       without effects; where its sensor sits is in it
-    noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]
+    noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
+                  its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
     step_mps2     step that readings are rounded to; 0: none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
     unit, resample_hz    as ``comfort``
@@ -300,11 +301,13 @@ def estimate(
     model = model_of(vehicle)
     if model.effects:
         raise BadInput(f"{model.vehicle.name}: expected a vehicle without effects")
-    NOISE.check("noise_mps2", noise_mps2)
+    learns = noise_mps2 == "auto"
+    given_mps2 = NOISE_MPS2 if noise_mps2 == "auto" else noise_mps2
+    NOISE.check("noise_mps2", given_mps2)
     ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
-    found = assessed(drive, model.vehicle, Sensor(noise_mps2, step_mps2), window_m)
+    found = assessed(drive, model.vehicle, Sensor(given_mps2, step_mps2), window_m, learns)
     summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
@@ -316,8 +319,9 @@ def estimate(
                     tuple(doubt.words for doubt in checked.doubts))
 
 
-def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Assessment:
-    """The road of a run, in windows. BadInput ("file:line: expected ...") for a drive that cannot be used."""
+def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float, learns_noise: bool = False) -> Assessment:
+    """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
+    expected ...") for a drive that cannot be used."""
     from logger.estimation.assessment import Unusable, assess, estimable
 
     try:
@@ -326,6 +330,6 @@ def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float) -> Ass
         file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
         raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     try:
-        return assess(ready, vehicle, sensor, window_m, run.track)
+        return assess(ready, vehicle, sensor, window_m, run.track, learns_noise)
     except ValueError as error:
         raise BadInput(f"{vehicle.name}: {error}") from None

@@ -5,7 +5,7 @@ the folder, the estimates are compared with its exact IRI. Beside them stands th
 that knew the road's spectrum, the sensor's noise and the car exactly.
 
   ridelog estimate run --vehicle rav4-2009
-  ridelog estimate drive.csv --vehicle mycar.yaml --noise 0.1 --step 0.613 --profile-out road.csv
+  ridelog estimate drive.csv --vehicle mycar.yaml --noise auto --step 0.613 --profile-out road.csv
 
 A distance may go back by up to 1 m, as one corrected by GPS does; it is then laid anew, as the integral of speed_mps
 plus the moving mean over 2 s of what it differs from that. Samples at another rate than 100 Hz are brought to 100 Hz.
@@ -25,7 +25,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.ranges import ADDED, NOISE, WINDOW
+from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, WINDOW
 from logger.commands.numbers import add_number
 from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
@@ -34,7 +34,7 @@ from logger.files import write_text
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
 
-NOISE_MPS2, STEP_MPS2 = 0.05, 0.0
+AUTO, STEP_MPS2 = "auto", 0.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which "
                              "also says where the sensor sits")
-    add_number(parser, "--noise", *NOISE, default=NOISE_MPS2, metavar="MPS2",
-               help=f"r.m.s. noise of one reading before rounding [m/s2] (default: {NOISE_MPS2:g}); where it blurs the "
-                    "steps, what is found on the way corrects it")
+    parser.add_argument("--noise", type=_noise, default=NOISE_MPS2, metavar="auto|MPS2",
+                        help="r.m.s. noise of one reading before rounding [m/s2] "
+                             f"(default: {NOISE_MPS2:g}); auto: learnt from the drive, with a standard error")
     add_number(parser, "--step", *ADDED, default=STEP_MPS2, metavar="MPS2",
                help="step that readings are rounded to [m/s2] (default: 0, none)")
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
@@ -53,6 +53,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     add_record_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def _noise(text: str) -> float | None:
+    """A noise, or None for one to be learnt. BadInput for a number out of range."""
+    if text == AUTO:
+        return None
+    value = float(text)
+    NOISE.check("--noise", value)
+    return value
+
+
+_noise.__name__ = "auto or float"  # argparse names it when a text is neither
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +83,9 @@ def run(args: argparse.Namespace) -> int:
     vehicle = read_vehicle(vehicle_yaml)
     _check_files(args, vehicle_yaml)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
-    found = assessed(drive, vehicle, Sensor(args.noise, args.step), window_m)
+    learns = args.noise is None
+    sensor = Sensor(NOISE_MPS2 if learns else args.noise, args.step)
+    found = assessed(drive, vehicle, sensor, window_m, learns)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")

@@ -19,15 +19,18 @@ from logger.estimation.batch import (
     estimated,
     exact_iri,
     laid_anew,
+    learnt_noise,
     least_errors,
     local_level,
     on_grid,
     score,
 )
 from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.road_profile import RoadProfile
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
@@ -114,6 +117,7 @@ class Assessment:
     exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
     compared                whether there is a profile to compare with
     least_error_m_per_km    (w,) r.m.s. error of the best possible values
+    noise                   of a reading before rounding, where it was learnt from the drive; ``sensor`` has it
     """
 
     vehicle: Vehicle
@@ -126,16 +130,27 @@ class Assessment:
     least_error_m_per_km: Array
     limits: Limits
     road: RoadProfile | None
+    noise: NoiseBelief | None
 
 
-def assess(drive: Estimable, vehicle: Vehicle, sensor: Sensor, window_m: float, track: Track | None) -> Assessment:
+def assess(
+    drive: Estimable, vehicle: Vehicle, sensor: Sensor, window_m: float, track: Track | None, learns_noise: bool = False
+) -> Assessment:
     """Estimate a drive's road in windows [m] and compare it with the track it was driven on, if that is known.
 
-    ValueError if the vehicle lacks what its model needs.
+    Where the noise is to be learnt, the sensor's is a guess. ValueError if the vehicle lacks what its model needs.
     """
     structure = structure_of(vehicle)
     output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
     gridded, readings, distance_m = on_grid(sensor, drive.rate_hz, drive.accel_z_mps2, drive.distance_m)
+    noise = None
+    if learns_noise:
+        noise = learnt_noise(structure, output, gridded, window_m, readings, distance_m)
+        gridded = Sensor(noise.noise_rms_mps2, gridded.step_mps2)
+        noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)
+        if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
+            noise = noise.without_rounding(sensor.step_mps2)
+        sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)
     windows, road = estimated(structure, output, gridded, window_m, readings, distance_m)
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     if track is not None:
@@ -143,7 +158,7 @@ def assess(drive: Estimable, vehicle: Vehicle, sensor: Sensor, window_m: float, 
     limits = Limits(structure, output, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
-                      least_errors(limits, windows.speed_mps, level), limits, road)
+                      least_errors(limits, windows.speed_mps, level), limits, road, noise)
 
 
 def _driven(track: Track, vehicle: Vehicle) -> Array:

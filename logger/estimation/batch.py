@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.error_bound import Limits
+from logger.estimation.noise_belief import UNKNOWN_LOG_STD, NoiseBelief
 from logger.estimation.road_profile import RoadProfile, road_profile
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -25,6 +26,7 @@ Array = npt.NDArray[np.float64]
 LEVEL_REACH_M = 50.0
 """A window's road is as rough as the mean of the windows so far to both sides."""
 _SMOOTHEST_M_PER_KM = 0.1
+_NOISE_ROUNDS, _NEAR_ENOUGH = 3, 0.3
 _COARSEST_M = 0.25
 _SMOOTHED_S = 2.0
 _FINEST_RATIO = 2000
@@ -103,6 +105,28 @@ def estimated(
         np.array([one.told for one in found]),
         tuple(one.flags for one in found),
     ), road_profile(pieces, _mean_speed(starts_m, starts_m + lengths_m, distance_m))
+
+
+def learnt_noise(
+    structure: Structure, output: Output, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
+) -> NoiseBelief:
+    """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it.
+
+    What was found on the way may come from far off, so the drive is gone through again from there.
+    """
+    count = len(reading_mps2)
+    belief = NoiseBelief.guessed(sensor.noise_rms_mps2, sensor.step_mps2)
+    for _ in range(_NOISE_ROUNDS):
+        before = NoiseBelief(belief.log_mean, UNKNOWN_LOG_STD)
+        tried = Sensor(before.noise_rms_mps2, sensor.step_mps2)
+        estimator = RoadEstimator(structure, output, tried, window_m, noise=before)
+        estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
+        found = estimator.noise
+        assert found is not None
+        belief = found
+        if abs(belief.log_mean - before.log_mean) < _NEAR_ENOUGH * belief.log_std:
+            break
+    return belief
 
 
 def _mean_speed(begin_m: Array, end_m: Array, distance_m: Array) -> Array:

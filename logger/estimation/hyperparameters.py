@@ -78,10 +78,23 @@ def _priors(before: RoadSpectrum | None) -> list[tuple[RoadSpectrum, tuple[float
 
 
 def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: float) -> Belief:
-    """One scoring step for the noise, from the typical second: a pothole that is not explained yet is no noise.
+    """One scoring step for the noise, by ``noise_slope``."""
+    slope, free = noise_slope(residual_mps2, weight, told_waves)
+    if not free:
+        return belief
+    gradient = slope - belief.log_noise / _NOISE_DEVIATION**2
+    step = gradient / (0.5 * free + _NOISE_DEVIATION**-2.0)
+    log_noise = belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
+    return replace(belief, log_noise=max(log_noise, _LEAST_LOG_NOISE))
+
+
+def noise_slope(residual_mps2: Array, weight: Array, told_waves: float) -> tuple[float, float]:
+    """Slope of the log evidence in the log noise variance, and the readings that were free to tell of it (half of them
+    are its curvature), 0 where there were too few; from the typical second: a pothole that is not explained yet is no
+    noise.
 
     residual_mps2    (t,) readings less what the solution explains, 100 a second
-    weight           (t,) that they had, with ``belief``
+    weight           (t,) that they had, with the noise of which the slope is asked
     told_waves       how many readings' worth the road took: twice the sum of told shares over seen waves
 
     Only what recorders pass is looked at: noise that was thinned out to 100 Hz has nothing above.
@@ -93,15 +106,12 @@ def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: 
     sums = in_band[-seconds * _SECOND:].reshape(seconds, _SECOND).sum(axis=1)
     counts = (weight[-seconds * _SECOND:] > 0).reshape(seconds, _SECOND).sum(axis=1)
     if not (counts > _SECOND // 2).any():
-        return belief
+        return 0.0, 0.0
     typical = float(np.median((sums / np.maximum(counts, 1))[counts > _SECOND // 2]))
     in_band_count = _BAND_SHARE * float(np.count_nonzero(weight))
     free = max(in_band_count - told_waves, 1.0)
     excess = typical * in_band_count / (_BAND_SHARE * free) - 1
-    gradient = 0.5 * free * excess - belief.log_noise / _NOISE_DEVIATION**2
-    step = gradient / (0.5 * free + _NOISE_DEVIATION**-2.0)
-    log_noise = belief.log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
-    return replace(belief, log_noise=max(log_noise, _LEAST_LOG_NOISE))
+    return 0.5 * free * excess, free
 
 
 def noise_factor(belief: Belief) -> float:

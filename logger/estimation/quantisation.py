@@ -14,6 +14,7 @@ on one side only.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,9 @@ from logger.estimation.sensor_noise import Sensor
 Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
+_NEIGHBOURS = 4.0  # samples: an acceleration and those about it go together
+_TRIALS, _EVENING_ROUNDS = 10, 4
+_LEAST_OTHERS = 1e-3  # of an even reading's information
 _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
 
 
@@ -56,21 +60,55 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
+def left_by_others(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
+    """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
+    variance (t,) of even readings that tell as much [(m/s2)2].
+
+    left        variance that even readings of a variance leave of each acceleration, their own included
+    variance    (t,) of the readings as they are
+
+    The mean of their precisions would make too much of the precise ones: two of them side by side tell little more than
+    one. Even readings that stand for those about a place have the variance e for which a reading put among the others
+    weighs the same on the mean, 1 / (others + e) = mean of 1 / (others + variance).
+    Source: the coherent potential approximation (Soven, Physical Review 156, 1967), with ``variance`` as disorder.
+    """
+    lag = np.minimum(np.arange(len(variance)), len(variance) - np.arange(len(variance)))
+    kernel = np.exp(-0.5 * (lag / _NEIGHBOURS) ** 2)
+    about = np.fft.rfft(kernel / kernel.sum())
+
+    def mean(row: Array) -> Array:
+        return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
+
+    trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
+    log_left = np.log([left(trial) for trial in trials.tolist()])
+    even = 1 / mean(1 / variance)
+    for _ in range(_EVENING_ROUNDS):
+        whole = np.exp(-np.interp(np.log(even), np.log(trials), log_left))
+        others = 1 / np.maximum(whole - 1 / even, _LEAST_OTHERS / even)
+        even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
+    return others, even
+
+
+def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
+    """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
+    taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)
+    others = 1 / fitted_variance - taken_out
+    return (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others, 1 / others
+
+
 def improved(
-    readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: float, sensor: Sensor
+    readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float, sensor: Sensor
 ) -> Readings:
     """One round.
 
     low, high          (t,) bounds of each reading [m/s2]
     fitted_mps2        (t,) what the solution with ``readings`` says of each acceleration
-    fitted_variance    of that [(m/s2)2]
+    fitted_variance    of that, (t,) or one for all [(m/s2)2]
     """
     noise = sensor.noise_rms_mps2**2
     own = 1 / readings.variance
-    taken_out = np.minimum(own, _MOST_OWN / fitted_variance)
-    others = 1 / fitted_variance - taken_out
-    expected = (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others
-    spread = 1 / others + noise
+    expected, others = without_own(readings, fitted_mps2, fitted_variance)
+    spread = others + noise
     mean, variance = within(expected, spread, low, high)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)
     value = (mean / variance - expected / spread) / precision

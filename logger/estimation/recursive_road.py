@@ -9,16 +9,26 @@ rounds.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import log, sqrt
+from math import log, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.car_response import CarResponse
-from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
+from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_told
-from logger.estimation.quantisation import Readings, bounds, first_guess, improved, unexplained
+from logger.estimation.noise_belief import NoiseBelief, NoiseLearner, NoiseScore
+from logger.estimation.noise_evidence import interval_score
+from logger.estimation.quantisation import (
+    Readings,
+    bounds,
+    first_guess,
+    improved,
+    left_by_others,
+    unexplained,
+    without_own,
+)
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -33,6 +43,8 @@ _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 _MOST_DEVIATIONS = 3.0
+_SETTLED_SAMPLES = 1000  # behind those that tell of the noise: their bounds have gone through ten rounds by then
+_MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
 
 @dataclass(frozen=True)
@@ -49,14 +61,23 @@ class FollowedRoad:
     """One road after another, as one car and one sensor find them, on a distance grid of ``spacing_m``.
 
     vehicle_error    share that each axle's gain may be off, because no file fits a car
+    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's, for granted
     """
 
-    def __init__(self, car: CarResponse, sensor: Sensor, spacing_m: float, vehicle_error: float) -> None:
+    def __init__(
+        self, car: CarResponse, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
+    ) -> None:
         self._car = car
         self._vehicle_error = vehicle_error
+        self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
         self._spacing_m = spacing_m
         self._belief = Belief(COMMON_ROAD)
+        self._learner: NoiseLearner | None = None
+        if noise is not None:
+            self._learner = (NoiseLearner(noise, self._step_mps2) if self._is_coarse else
+                             NoiseLearner(noise.with_rounding(self._step_mps2), 0.0))
+            self._take_over()
         self.start_anew()
 
     def start_anew(self) -> None:
@@ -65,6 +86,24 @@ class FollowedRoad:
         self._gaussian: Readings | None = None
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
+        self._unscored = 0
+
+    @property
+    def noise(self) -> NoiseBelief | None:
+        """What is believed of the sensor's noise now; None where it is not learnt."""
+        if self._learner is None:
+            return None
+        belief = self._learner.belief
+        return belief if self._is_coarse else belief.without_rounding(self._step_mps2)
+
+    def _take_over(self) -> None:
+        """Go on with the noise that was learnt. Where it blurs the steps, rounding is in it."""
+        assert self._learner is not None
+        noise_mps2, before = self._learner.belief.noise_rms_mps2, self._sensor.variance_mps2_2
+        self._sensor = Sensor(noise_mps2, self._step_mps2 if self._is_coarse else 0.0)
+        if not self._is_coarse:
+            log_noise = self._belief.log_noise + log(before / self._sensor.variance_mps2_2)
+            self._belief = replace(self._belief, log_noise=log_noise)
 
     @property
     def begun(self) -> bool:
@@ -73,6 +112,7 @@ class FollowedRoad:
 
     def move_on(self, fresh: Samples) -> None:
         """The next block is without its oldest samples, and has these behind."""
+        self._unscored += len(fresh)
         if self._gaussian is None:
             return
         guess = first_guess(fresh.reading_mps2, self._sensor)
@@ -83,19 +123,19 @@ class FollowedRoad:
 
     def solved(self, block: Block, samples: Samples, read: Bools) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._sensor.is_coarse else (1, _STEPS)
+        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         self._begun = True
-        for _ in range(rounds):
-            result = self._round(block, samples, read, steps, before)
+        for left in reversed(range(rounds)):
+            result = self._round(block, samples, read, steps, before, left == 0)
         return result
 
     def _round(
-        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None
+        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool
     ) -> SolvedBlock:
-        """Solve with what is believed, then believe what the solution says."""
+        """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``."""
         readings = self._as_gaussian(samples)
         there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
         variance = readings.variance + vehicle_error_variance(
@@ -108,39 +148,86 @@ class FollowedRoad:
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
         solution = block.solve(readings.value_mps2, weight, spectrum, local, steps, start)
 
+        moving = block.moving & read
+        typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
+        gain = solution.gain
+        if self._is_coarse:
+            others, even = self._left_by_others(block, variance)
+            if moving.any():
+                uneven, typical = typical, 1 / float((1 / even[moving]).mean())
+                gain = gain * (uneven / typical)
+
         innovations = np.fft.irfft(solution.waves, block.count)
-        told = mean_told(solution.gain, local[seen > 0])
+        told = mean_told(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
         expected = sqrt(2 * float(told.sum()) / block.count)
         white = np.clip(innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
         self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
-        self._local.learn(first, innovations, local, solution.gain, seen)
+        self._local.learn(first, innovations, local, gain, seen)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
-        moving = weight[block.moving & read]
-        typical = 1 / float(moving.mean()) if len(moving) else float(variance.mean())
-        if self._sensor.is_coarse:
-            self._gaussian = self._improved(readings, samples, read, block, solution, typical)
+        if self._is_coarse:
+            usable = moving if learns and self._learner is not None else None
+            self._gaussian = self._improved(readings, samples, read, solution, others, usable)
         else:
-            residual = readings.value_mps2 - solution.fitted_mps2
-            self._belief = with_noise(self._belief, residual, weight, 2 * seen_share * float(told.sum()))
+            residual, told_waves = readings.value_mps2 - solution.fitted_mps2, 2 * seen_share * float(told.sum())
+            self._belief = with_noise(self._belief, residual, weight, told_waves)
+            if learns and self._learner is not None:
+                self._learn_from_residual(noise_slope(residual, weight, told_waves), weight)
         return SolvedBlock(solution.road, typical)
 
     def _as_gaussian(self, samples: Samples) -> Readings:
-        if not self._sensor.is_coarse:
+        if not self._is_coarse:
             noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
             return Readings(samples.reading_mps2, np.full(len(samples), noise))
         return first_guess(samples.reading_mps2, self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
-        self, readings: Readings, samples: Samples, read: Bools, block: Block, solution: Solution, variance: float
+        self, readings: Readings, samples: Samples, read: Bools, solution: Solution, others: Array, usable: Bools | None
     ) -> Readings:
-        speed_mps = block.mean_speed_mps
-        noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        left = acceleration_variance_left(self._car, speed_mps, self._belief.spectrum, noise_psd)
+        """Another round for the bounds, with the variance (t,) that all other readings leave of each acceleration. The
+        noise is learnt of the readings that are ``usable`` (t,), if any."""
         low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)
-        left += unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
-        return improved(readings, low, high, solution.fitted_mps2, left, self._sensor)
+        others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._sensor)
+        fitted_variance = 1 / (1 / others + 1 / readings.variance)
+        if usable is not None:
+            expected = without_own(readings, solution.fitted_mps2, fitted_variance)
+            self._learn_from_bounds(*expected, low, high, usable)
+        return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
+
+    def _left_by_others(self, block: Block, variance: Array) -> tuple[Array, Array]:
+        """``left_by_others`` in a block whose readings have variances (t,)."""
+        speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
+
+        def left(even: float) -> float:
+            noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
+            return acceleration_variance_left(self._car, speed_mps, spectrum, noise_psd)
+
+        return left_by_others(left, variance)
+
+    def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
+        """What readings in the middle of the block, which have settled, say of the noise: each of them once."""
+        last = len(usable) - _SETTLED_SAMPLES
+        part = slice(max(last - self._unscored, 0), last)
+        inner = usable[part] & np.isfinite(high[part] - low[part])
+        expected, others, low, high = (row[part][inner] for row in (expected, others, low, high))
+        self._believe(interval_score(expected, others, low, high, self._sensor.noise_rms_mps2))
+
+    def _learn_from_residual(self, told: tuple[float, float], weight: Array) -> None:
+        """What a block says of the noise, as far as its readings are new; ``told`` as ``noise_slope`` gives it for a
+        weight (t,). The car's own error, if it has one, counts as noise."""
+        slope, free = told
+        if not free:
+            return
+        share = min(self._unscored / len(weight), 1.0) / _MEDIAN_COST
+        self._believe(NoiseScore(-0.5 * log(float(weight.max())), 2 * slope * share, 2 * free * share))
+
+    def _believe(self, score: NoiseScore) -> None:
+        assert self._learner is not None
+        self._unscored = 0
+        if score.information > 0:
+            self._learner.take(score)
+            self._take_over()
 
     def level_at(self, first: int, count: int) -> tuple[RoadSpectrum, float]:
         """The spectrum at points ``first`` ... ``first + count - 1`` of the distance grid, and the standard error of

@@ -25,6 +25,7 @@ from logger.estimation.iri_posterior import (
     unseen_share,
     window_iri,
 )
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -101,6 +102,7 @@ class RoadEstimator:
                  lift one axle while the other sinks from being made too much of
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
+    noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's, for granted
     """
 
     def __init__(
@@ -113,9 +115,10 @@ class RoadEstimator:
         vehicle_error: float = VEHICLE_ERROR,
         on_road: Callable[[RoadPiece], None] | None = None,
         late_std_s: float = 0.0,
+        noise: NoiseBelief | None = None,
     ) -> None:
         self._car = CarResponse(structure, output)
-        self._sensor = sensor
+        self._takes_bounds = sensor.is_coarse
         self._place_std_m = place_std_m
         self._late_std_s = late_std_s
         self._pieces_per_window = ceil(window_m / _LONGEST_PIECE_M)
@@ -125,8 +128,13 @@ class RoadEstimator:
         self._on_road = on_road
         self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
         self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
-        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error)
+        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error, noise)
         self._start_anew()
+
+    @property
+    def noise(self) -> NoiseBelief | None:
+        """What is believed of the sensor's noise now; None where it is not learnt."""
+        return self._road.noise
 
     def _start_anew(self) -> None:
         self._waiting = Samples.unread(0, 0.0, 0.0)
@@ -157,7 +165,7 @@ class RoadEstimator:
     def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> Samples:
         """What is not usable may be any number, NaN too; it has no weight. Nor has what stands at an end of the range,
         unless readings are taken as bounds."""
-        if not self._sensor.is_coarse:
+        if not self._takes_bounds:
             usable = usable & (at_end == 0)
         return Samples(np.where(usable, reading_mps2, 0.0), usable, at_end, distance_m)
 

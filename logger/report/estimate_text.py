@@ -14,6 +14,7 @@ from logger.estimation.road_profile import TOLD_OVER
 
 _FAR_ABOVE = 1.5
 _MOVING_MPS = 1.0
+_UNCERTAIN = 0.5
 _G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 
 
@@ -29,7 +30,9 @@ def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str,
     drive, windows, road = found.drive, found.windows, found.road
     return {
         "run": run, "vehicle": found.vehicle.name, "rate_hz": drive.rate_hz,
-        "noise_mps2": found.sensor.noise_rms_mps2, "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
+        "noise_mps2": found.sensor.noise_rms_mps2,
+        "noise_std_mps2": None if found.noise is None else found.noise.std_mps2,
+        "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
         "distance_relaid_m": drive.relaid_m, "compared": found.compared,
         **figures(found, windows.speed_mps > 0),
@@ -75,8 +78,7 @@ def lines(found: Assessment, told: dict[str, Any]) -> list[str]:
         f"{told['run']}: {way_m:.0f} m in a {told['vehicle']}, "
         f"{len(found.drive.distance_m) / told['rate_hz']:.0f} s at {told['rate_hz']:.5g} Hz; windows of "
         f"{told['window_m']:.4g} m",
-        f"Taken for granted: noise of {told['noise_mps2']:g} m/s2 in a reading (--noise), "
-        + (f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"),
+        *_sensor_lines(told),
     ]
     if told["distance_relaid_m"]:
         shown.append("The distance went back here and there: laid anew by the speed, "
@@ -100,6 +102,17 @@ def lines(found: Assessment, told: dict[str, Any]) -> list[str]:
                      "percent, and there may be more in the readings than vehicle and noise explain.")
     shown += ["", *_table(told)]
     return shown + [f"Profile: {file}" for file in told["profile_files"]]
+
+
+def _sensor_lines(told: dict[str, Any]) -> list[str]:
+    """What a reading is, and whether that was learnt or given."""
+    noise, std = told["noise_mps2"], told["noise_std_mps2"]
+    rounded = f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"
+    if std is None:
+        return [f"Taken for granted: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
+    shown = (f"noise of {noise:.3g} +- {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
+             f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot tell it")
+    return [f"Learnt from the drive: {shown}", f"Taken for granted: {rounded}"]
 
 
 def _unit_hint(found: Assessment) -> str:

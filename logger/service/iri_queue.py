@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.windows import GridSamples, Window
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 
 
@@ -51,6 +52,11 @@ class RoughnessQueue:
         """What the estimator still holds comes out; what it never saw to its end has no estimate."""
         self._take(self._estimator.finish())
         self._leg = None  # what waits from here on has no estimate to wait for
+
+    @property
+    def noise(self) -> NoiseBelief | None:
+        """What is believed of the sensor's noise now; None where it is not learnt."""
+        return self._estimator.noise
 
     @property
     def is_empty(self) -> bool:

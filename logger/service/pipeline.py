@@ -17,6 +17,7 @@ from drivers.readings import AccelerationBlock, Fix
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
@@ -98,6 +99,11 @@ class Pipeline:
     def waiting_samples(self) -> int:
         """Samples on the grid that wait for their distance or their window."""
         return sum(map(len, self._pending))
+
+    @property
+    def noise(self) -> NoiseBelief | None:
+        """What is believed of the accelerometer's noise now; None where it is not learnt."""
+        return self._roughness.noise
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""

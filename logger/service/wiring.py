@@ -18,6 +18,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import Belief
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
@@ -34,12 +35,17 @@ from logger.vehicle.vehicle import Vehicle
 @dataclass(frozen=True)
 class Instrument:
     """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
-    description for the logs."""
+    description for the logs.
+
+    noise    what is believed of the noise of a reading on the grid, which the pipeline then learns; None: the sensor's,
+             for granted
+    """
 
     decoder: Decoder
     oversample: int
     sensor: Sensor
     description: dict[str, Any]
+    noise: NoiseBelief | None = None
 
 
 def instrument(config: AccelerometerConfig) -> Instrument:
@@ -80,6 +86,7 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Bel
     estimator = RoadEstimator(
         structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
         late_std_s=receiver.std_s,
+        noise=sensor.noise,
     )
     alignment = DriveAlignment(axis.column, axis.sign)
     return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator, alignment)

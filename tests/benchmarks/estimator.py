@@ -42,6 +42,7 @@ import numpy as np
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
 from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -512,10 +513,12 @@ def wrong(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (
 
 @dataclass(frozen=True)
 class Logged:
-    """What the pipeline said of some windows, and what is true at the place it told and where the car really was."""
+    """What the pipeline said of some windows, and what is true at the place it told and where the car really was; and
+    what it learnt of the noise."""
 
     windows: Windows
     where_it_was: Array
+    noise: NoiseBelief | None
 
 
 def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Config:
@@ -531,12 +534,19 @@ def config_for(sensor: Accelerometer, window_m: float, latency_s: float) -> Conf
 
 
 def logged_drive(
-    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, told_latency_s: float, seed: int
+    drive: Drive, sensor: Accelerometer, receiver: Receiver, window_m: float, told_latency_s: float, seed: int,
+    believed: Sensor | None = None, noise: NoiseBelief | None = None,
 ) -> Logged:
-    """A drive through the real pipeline, and the exact IRI at the places its records tell."""
+    """A drive through the real pipeline, and the exact IRI at the places its records tell.
+
+    believed    what the pipeline takes the sensor for; None: what the driver says
+    noise       what it believes of the noise before, where it learns it
+    """
     rng = np.random.default_rng([FIRST_SEED, seed])
     config = config_for(sensor, window_m, told_latency_s)
-    pipeline = wiring.pipeline(config, wiring.instrument(config.accelerometer), read_vehicle(config.vehicle))
+    instrument = wiring.instrument(config.accelerometer)
+    instrument = replace(instrument, sensor=believed or instrument.sensor, noise=noise)
+    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle))
     start_us = 50_000_000
     readings, clipped = sensor.read(drive.accel_mps2, rng)
     t_us = start_us + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US // sensor.oversample
@@ -563,7 +573,7 @@ def logged_drive(
                       nothing, np.full(len(whole), drive.road.level_m_per_km))
     moved = end_m - begin_m > 0.5 * window_m
     was = drive.road.iri(begin_m, np.maximum(end_m, begin_m + 0.1))
-    return Logged(windows.chosen(moved), was[moved])
+    return Logged(windows.chosen(moved), was[moved], pipeline.noise)
 
 
 def print_logged(name: str, parts: Sequence[Logged]) -> Score:

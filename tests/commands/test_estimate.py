@@ -131,6 +131,26 @@ def test_another_rate(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixtur
     assert result["limit"]["std_m_per_km"] == pytest.approx(told(capsys, folder)["limit"]["std_m_per_km"], rel=0.05)
 
 
+@pytest.mark.parametrize(("noise", "step", "rate"), [(0.2, 0.613, 100), (0.11, 0.0, 100), (0.15, 0.0, 208)])
+def test_the_noise_is_learnt_from_the_drive(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, step: float, rate: int
+) -> None:
+    assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
+                 f"{noise}", "--step", f"{step}", "--rate", f"{rate}", "--out", str(tmp_path / "drive.csv")]) == 0
+    (tmp_path / "profile.csv").write_bytes((folder / "profile.csv").read_bytes())
+    result = told(capsys, tmp_path, "--noise", "auto", "--step", step)
+    assert abs(result["noise_mps2"] - noise) < 2.5 * result["noise_std_mps2"]
+    assert 0.02 * noise < result["noise_std_mps2"] < 0.2 * noise
+    taken = told(capsys, tmp_path, "--step", step)
+    assert taken["noise_mps2"] == 0.05 and taken["noise_std_mps2"] is None
+    assert result["comparison"]["r2"] > taken["comparison"]["r2"] - 0.01
+    assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} +- "
+                        f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
+    assert lines[2].startswith("Taken for granted: ")
+
+
 def test_a_distance_that_goes_back_a_little_is_laid_anew(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,216 @@
+"""Learning of the noise: against exact log evidence by summing over grids, dense algebra, and drives of known noise."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from logger.estimation.noise_belief import LEAST_SHARE_OF_STEP, NoiseBelief, NoiseLearner, NoiseScore
+from logger.estimation.noise_evidence import interval_score
+from logger.estimation.quantisation import bounds, first_guess, improved, left_by_others, without_own
+from logger.estimation.sensor_noise import Sensor
+from logger.estimation.streaming import RoadEstimator
+from logger.profiles.track import Track
+from logger.roads import iso8608
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.models import structure_of
+from logger.vehicle.simulate import drive
+from logger.vehicle.structure import body_point
+
+STEP = 0.6
+GRID = np.linspace(-6.0, 6.0, 48_001)
+H = 1e-3
+
+
+def log_share(mean: np.ndarray, variance: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """log Z, from the tail in which it keeps its digits."""
+    ends = [(end - mean) / np.sqrt(variance) for end in (low, high)]
+    mirrored = [np.where(ends[0] > 0, -end, end) for end in ends]
+    return np.log(np.abs(norm.cdf(mirrored[1]) - norm.cdf(mirrored[0])))
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.2, 0.7])
+def test_the_score_is_the_slope_of_the_log_probability(noise: float) -> None:
+    rng = np.random.default_rng(1)
+    expected, others = rng.uniform(-1, 1, 40), rng.uniform(0.001, 0.3, 40)
+    low = STEP * (np.round((expected + rng.normal(0, 0.5 * np.sqrt(others + noise**2))) / STEP) - 0.5)
+
+    def evidence(log_noise: float) -> float:
+        return float(log_share(expected, others + np.exp(2 * log_noise), low, low + STEP).sum())
+
+    at = np.log(noise)
+    found = interval_score(expected, others, low, low + STEP, noise)
+    assert found.log_noise == pytest.approx(at)
+    assert found.slope == pytest.approx((evidence(at + H) - evidence(at - H)) / (2 * H), rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("noise", [0.08, 0.3])
+def test_the_information_is_the_scatter_of_the_score(noise: float) -> None:
+    """Readings drawn and rounded over and over: the mean score is zero, its variance the information."""
+    rng = np.random.default_rng(2)
+    expected, others = rng.uniform(-1, 1, 50), rng.uniform(0.01, 0.1, 50)
+    scores = []
+    for _ in range(1500):
+        drawn = expected + rng.normal(0, np.sqrt(others + noise**2))
+        low = STEP * (np.round(drawn / STEP) - 0.5)
+        scores.append(interval_score(expected, others, low, low + STEP, noise))
+    slopes, information = np.array([one.slope for one in scores]), scores[0].information
+    assert [one.information for one in scores] == pytest.approx([information] * len(scores), rel=1e-6)
+    assert np.var(slopes) == pytest.approx(information, rel=0.15)
+    assert abs(slopes.mean()) < 0.1 * np.sqrt(information)  # holes are cut at three deviations
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.2, 0.4])
+@pytest.mark.parametrize("deviation", [0.3, 1.0])
+def test_settled_rounds_give_the_slope_of_the_exact_evidence(noise: float, deviation: float) -> None:
+    """One acceleration read 30 times, its evidence by summing over a grid of accelerations."""
+    rng = np.random.default_rng(round(100 * noise))
+    slopes = []
+    for _ in range(8):
+        true = deviation * rng.standard_normal()
+        drawn = np.clip(rng.standard_normal(30), -2, 2)  # what is farther out is taken for a hole
+        reading = STEP * np.round((true + noise * drawn) / STEP)
+        low, high = bounds(reading, np.zeros(30), STEP)
+
+        def evidence(log_noise: float, low: np.ndarray = low, high: np.ndarray = high) -> float:
+            likely = norm.logpdf(GRID, scale=deviation)
+            for value, times in zip(*np.unique(low, return_counts=True), strict=True):
+                share = np.diff(norm.cdf([(value - GRID) / np.exp(log_noise),
+                                          (value + high[0] - low[0] - GRID) / np.exp(log_noise)]), axis=0)[0]
+                likely = likely + times * np.log(np.maximum(share, 1e-300))
+            return float(np.log(np.sum(np.exp(likely - likely.max()))) + likely.max())
+
+        readings, sensor = first_guess(reading, Sensor(noise, STEP)), Sensor(noise, STEP)
+        for _ in range(80):
+            variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
+            fitted = np.full(30, variance * (readings.value_mps2 / readings.variance).sum())
+            expected, others = without_own(readings, fitted, variance)
+            readings = improved(readings, low, high, fitted, variance, sensor)
+        found = interval_score(expected, others, low, high, noise).slope
+        at = np.log(noise)
+        slopes.append((found, (evidence(at + H) - evidence(at - H)) / (2 * H)))
+    found_slopes, exact = np.array(slopes).T
+    assert np.sqrt(np.mean((found_slopes - exact) ** 2)) < 0.1 * np.sqrt(np.mean(exact**2)) + 0.1
+
+
+def test_nothing_read_says_nothing() -> None:
+    none = np.empty(0)
+    assert interval_score(none, none, none, none, 0.1) == NoiseScore(np.log(0.1), 0.0, 0.0)
+
+
+def test_even_readings_leave_what_algebra_says() -> None:
+    others, even = left_by_others(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
+    assert even == pytest.approx(np.full(256, 0.02))
+    assert others == pytest.approx(np.full(256, 0.04), rel=0.01)
+
+
+def test_uneven_readings_leave_what_dense_algebra_says() -> None:
+    """A process that is known to be smooth, read well here and badly there; the mean of what is left of it."""
+    rng = np.random.default_rng(3)
+    count = 400
+    f = np.fft.rfftfreq(count)
+    power = 1 / (1 + (f / 0.1) ** 4)
+    power *= 0.3 * count / (2 * power.sum())
+    lag = np.abs(np.arange(count)[:, None] - np.arange(count))
+    prior = np.fft.irfft(power, count)[np.minimum(lag, count - lag)] + 1e-12 * np.eye(count)
+    variance = np.exp(rng.normal(np.log(0.1), 1.5, count))
+
+    def left(even: float) -> float:
+        ends = np.full(len(f), 2.0)
+        ends[[0, -1]] = 1.0
+        return float(ends @ (power * even / (power + even))) / count
+
+    inverse = np.linalg.inv(prior + np.diag(variance))
+    exact = 1 / np.diag(inverse) - variance
+    found, even = left_by_others(left, variance)
+    assert 1 / np.mean(1 / even) > 1 / np.mean(1 / variance)
+    assert found.mean() == pytest.approx(exact.mean(), rel=0.15)
+    by_mean_precision = 1 / (1 / left(1 / np.mean(1 / variance)) - np.mean(1 / variance))
+    assert by_mean_precision < 0.8 * exact.mean()  # what the mean of the precisions would say
+
+
+# --- what is believed ---
+
+
+def test_a_drive_of_quadratic_stretches() -> None:
+    """Each says where it would have the noise, with the scatter that its information allows."""
+    rng = np.random.default_rng(4)
+    off = []
+    for _ in range(40):
+        learner = NoiseLearner(NoiseBelief.guessed(0.1, 0.0), 0.0)
+        for _ in range(60):
+            at = learner.belief.log_mean
+            learner.take(NoiseScore(at, 30 * (np.log(0.15) - at) + rng.normal(0, np.sqrt(30)), 30.0))
+        off.append((learner.belief.log_mean - np.log(0.15)) / learner.belief.log_std)
+    assert learner.stretches == 60
+    assert abs(np.mean(off)) < 0.5
+    assert 0.3 < np.sqrt(np.mean(np.square(off))) < 1.3
+
+
+def test_stretches_that_disagree_more_than_they_should_make_it_less_certain() -> None:
+    calm, wild = (NoiseLearner(NoiseBelief(np.log(0.1), 1.0), 0.0) for _ in range(2))
+    for number in range(60):
+        for learner, slope in ((calm, 1.0), (wild, 40.0)):
+            learner.take(NoiseScore(learner.belief.log_mean, slope * (-1) ** number, 20.0))
+    assert wild.belief.log_std > 2 * calm.belief.log_std
+
+
+def test_below_a_share_of_the_step_only_a_bound_is_known() -> None:
+    learner = NoiseLearner(NoiseBelief.guessed(0.1, STEP), STEP)
+    for _ in range(100):
+        learner.take(NoiseScore(learner.belief.log_mean, -50.0, 20.0))
+    assert learner.belief.noise_rms_mps2 == pytest.approx(LEAST_SHARE_OF_STEP * STEP)
+    assert learner.belief.log_std > 0.5
+
+
+@settings(deadline=None)
+@given(noise=st.floats(0.01, 1.0), share=st.floats(0.0, 2.0), std=st.floats(0.01, 0.1))
+def test_rounding_is_taken_in_and_out_again(noise: float, share: float, std: float) -> None:
+    belief = NoiseBelief(np.log(noise), std)
+    back = belief.with_rounding(share * noise).without_rounding(share * noise)
+    assert back.log_mean == pytest.approx(belief.log_mean, abs=1e-9)
+    assert back.log_std == pytest.approx(std, rel=1e-9)
+    assert belief.with_rounding(share * noise).noise_rms_mps2 ** 2 == pytest.approx(
+        noise**2 * (1 + share**2 / 12), rel=1e-9)
+
+
+def test_the_next_drive_begins_a_little_less_certain() -> None:
+    belief = NoiseBelief(np.log(0.15), 0.04)
+    assert belief.log_std < belief.next_drive().log_std < 0.08
+    assert belief.next_drive().log_mean == belief.log_mean
+    assert NoiseBelief(0.0, 1.0).next_drive().log_std == 1.0
+    assert belief.std_mps2 == pytest.approx(0.006)
+
+
+# --- drives ---
+
+
+@cache
+def felt() -> tuple[np.ndarray, np.ndarray]:
+    """Acceleration and distance of 70 s at 14 m/s on a road of IRI 2.5."""
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    road = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(2.5), 1050, 0.05, 5), -20.0)
+    time_s = np.arange(7000) / 100
+    return drive(car, [body_point(car)], road, time_s, 14.0 * time_s)[:, 0], 14.0 * time_s
+
+
+@pytest.mark.parametrize(("noise", "guess", "step"), [(0.2, 0.1, 0.613), (0.3, 0.1, 0.613), (0.12, 0.05, 0.0)])
+def test_the_noise_of_a_drive_is_found(noise: float, guess: float, step: float) -> None:
+    accel, way = felt()
+    reading = accel + 9.81 + noise * np.random.default_rng(6).standard_normal(len(accel))
+    if step:
+        reading = step * np.round(reading / step)
+    car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
+    before = NoiseBelief.guessed(guess, step)
+    estimator = RoadEstimator(car, body_point(car), Sensor(guess, step), 7.62, noise=before)
+    estimator.push(reading, np.ones(len(way), dtype=bool), np.zeros(len(way)), way)
+    found = estimator.noise
+    assert found is not None
+    assert found.log_std < 0.15
+    assert abs(found.log_mean - np.log(noise)) < 2.5 * found.log_std
+    taken = RoadEstimator(car, body_point(car), Sensor(guess, step), 7.62)
+    assert taken.noise is None
