@@ -17,8 +17,8 @@ from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
-from logger.estimation.receiver_delay import Belief
 from logger.estimation.noise_belief import NoiseBelief
+from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
