@@ -83,7 +83,8 @@ class Outcome:
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
         lines += drive_words(self.receiver, self.known)
-        lines.append(f"Logs: {self.directory} ({len(self.files)} files, {self.rows} rows)")
+        files = "1 file" if len(self.files) == 1 else f"{len(self.files)} files"
+        lines.append(f"Logs: {self.directory} ({files}, {self.rows} rows)")
         return "\n".join(lines)
 
 
