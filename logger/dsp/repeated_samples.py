@@ -87,6 +87,15 @@ def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | 
     return Repeats(share, chance, fresh, _period(np.flatnonzero(fresh)))
 
 
+def are_fresh(samples: Array, least_stretches: int = 20) -> bool:
+    """Whether samples (n, axes) show that none is held: of so many turning points no more stand still than by chance.
+    In a held record nearly all of them do."""
+    fresh = np.ones(len(samples), dtype=np.bool_)
+    fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
+    still, stretches = _turning_points(samples, fresh)
+    return stretches >= least_stretches and still <= CHANCE_STILL * stretches
+
+
 def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
     """How many stretches of small moves between two large ones stand still, and how many there are."""
     move = moves(samples)

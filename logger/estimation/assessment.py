@@ -118,6 +118,7 @@ class Assessment:
     compared                whether there is a profile to compare with
     least_error_m_per_km    (w,) r.m.s. error of the best possible values
     noise                   of a reading before rounding, where it was learnt from the drive; ``sensor`` has it
+    learns_noise            whether that was to be learnt
     """
 
     vehicle: Vehicle
@@ -131,6 +132,7 @@ class Assessment:
     limits: Limits
     road: RoadProfile | None
     noise: NoiseBelief | None
+    learns_noise: bool = False
 
 
 def assess(
@@ -146,6 +148,7 @@ def assess(
     noise = None
     if learns_noise:
         noise = learnt_noise(structure, output, gridded, window_m, readings, distance_m)
+    if noise is not None:
         gridded = Sensor(noise.noise_rms_mps2, gridded.step_mps2)
         noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)
         if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
@@ -158,7 +161,7 @@ def assess(
     limits = Limits(structure, output, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
-                      least_errors(limits, windows.speed_mps, level), limits, road, noise)
+                      least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise)
 
 
 def _driven(track: Track, vehicle: Vehicle) -> Array:

@@ -109,8 +109,9 @@ def estimated(
 
 def learnt_noise(
     structure: Structure, output: Output, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
-) -> NoiseBelief:
-    """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it.
+) -> NoiseBelief | None:
+    """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it; None where the
+    drive tells nothing of it.
 
     What was found on the way may come from far off, so the drive is gone through again from there.
     """
@@ -122,7 +123,8 @@ def learnt_noise(
         estimator = RoadEstimator(structure, output, tried, window_m, noise=before)
         estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
         found = estimator.noise
-        assert found is not None
+        if found is None or found == before:
+            return None
         belief = found
         if abs(belief.log_mean - before.log_mean) < _NEAR_ENOUGH * belief.log_std:
             break

@@ -55,8 +55,11 @@ class DriveAlignment:
         self.moved = ""
 
     def take_readings(self, time_s: Array, accel: Array) -> None:
-        """The next readings: times (n,) [s] and three axes (n, 3). Those that are not after the last ones are left
-        out."""
+        """The next readings: times (n,) [s] and three axes (n, 3). Those that are not after the last ones, or are no
+        numbers, are left out."""
+        known = np.isfinite(accel).all(axis=1)
+        if not known.all():
+            time_s, accel = time_s[known], accel[known]
         if self._readings and len(time_s):
             later = time_s > self._readings[-1][0][-1]
             time_s, accel = time_s[later], accel[later]

@@ -24,6 +24,9 @@ MOVED_DEG = 6.0
 TURNED_DEG = 15.0
 DEVIATIONS = 5.0
 """Curves and hills are no noise: 4 of these are met now and then."""
+LEAST_GRAVITY_MPS2 = 1.0
+"""A sensor that feels less is dead, and says nothing of how it sits."""
+TINY_MPS2 = 1e-12
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,11 @@ class Sitting:
 def sitting(means: Array, forward: Array | None, forward_std_rad: float | None) -> Sitting:
     """Of blocks with mean readings (n, 3), n at least 2."""
     gravity = means.mean(axis=0)
-    up = gravity / np.linalg.norm(gravity)
+    size = max(float(np.linalg.norm(gravity)), TINY_MPS2)
+    up = gravity / size
     across = means - np.outer(means @ up, up)
     error = float(np.sqrt(np.sum((across - across.mean(axis=0)) ** 2) / (len(means) - 1) / len(means)))
-    return Sitting(gravity, error / float(np.linalg.norm(gravity)), forward, forward_std_rad)
+    return Sitting(gravity, error / size, forward, forward_std_rad)
 
 
 def angle_rad(one: Array, other: Array) -> float:
@@ -66,7 +70,10 @@ def heading_deg(forward: Array, column: int, sign: float) -> float:
 
 
 def tilt_complaint(now: Sitting, column: int, sign: float) -> str:
-    """What is wrong with the axis that is set to point up (its column and sign); empty: nothing."""
+    """What is wrong with the axis that is set to point up (its column and sign); empty: nothing, or it feels no
+    gravity."""
+    if np.linalg.norm(now.gravity) < LEAST_GRAVITY_MPS2:
+        return ""
     word = f"{'-' if sign < 0 else '+'}{'xyz'[column]}"
     tilt_deg = degrees(angle_rad(now.gravity, sign * np.eye(3)[column]))
     std_deg = hypot(degrees(now.gravity_std_rad), ZERO_ERROR_DEG)
@@ -79,7 +86,9 @@ def tilt_complaint(now: Sitting, column: int, sign: float) -> str:
 
 
 def has_moved(before: Sitting, now: Sitting) -> str:
-    """How a sensor sits otherwise than before, in words; empty: it does not."""
+    """How a sensor sits otherwise than before, in words; empty: it does not, or no gravity is felt."""
+    if min(np.linalg.norm(before.gravity), np.linalg.norm(now.gravity)) < LEAST_GRAVITY_MPS2:
+        return ""
     tilted = angle_rad(before.gravity, now.gravity)
     if tilted > max(radians(MOVED_DEG), DEVIATIONS * hypot(before.gravity_std_rad, now.gravity_std_rad)):
         return f"it has tilted by {degrees(tilted):.0f} degrees"

@@ -32,6 +32,7 @@ def as_json(run: str, found: Assessment, files: Sequence[str] = ()) -> dict[str,
         "run": run, "vehicle": found.vehicle.name, "rate_hz": drive.rate_hz,
         "noise_mps2": found.sensor.noise_rms_mps2,
         "noise_std_mps2": None if found.noise is None else found.noise.std_mps2,
+        "noise_learnt": (found.noise is not None) if found.learns_noise else None,
         "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
         "distance_relaid_m": drive.relaid_m, "compared": found.compared,
@@ -108,6 +109,8 @@ def _sensor_lines(told: dict[str, Any]) -> list[str]:
     """What a reading is, and whether that was learnt or given."""
     noise, std = told["noise_mps2"], told["noise_std_mps2"]
     rounded = f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"
+    if told["noise_learnt"] is False:
+        return [f"This drive tells nothing of the noise. Taken for granted: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Taken for granted: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
     shown = (f"noise of {noise:.3g} +- {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else

@@ -12,7 +12,8 @@ import json
 import logging
 from collections.abc import Mapping
 from contextlib import suppress
-from math import degrees, isfinite
+from dataclasses import replace
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +50,13 @@ def header_fields(known: Belief) -> dict[str, Any]:
 
 def from_fields(fields: Mapping[str, Any]) -> Belief | None:
     """What ``header_fields`` said; None where nothing is said. ValueError for what cannot be."""
+    if not isinstance(fields, Mapping):
+        raise ValueError("expected an object")
     if _KEYS[0] not in fields:
         return None
     delay_s, std_s, drives = (fields.get(key, 0) for key in _KEYS)
     numbers = [value for value in (delay_s, std_s) if isinstance(value, (int, float)) and not isinstance(value, bool)]
-    if len(numbers) < 2 or not all(isfinite(value) and 0 <= value <= MOST_DELAY_S for value in numbers) \
+    if len(numbers) < 2 or not all(0 <= value <= MOST_DELAY_S for value in numbers) \
             or isinstance(drives, bool) or not isinstance(drives, int) or not 0 <= drives < 10**9:
         raise ValueError(f"expected {_KEYS[0]} and {_KEYS[1]} from 0 to {MOST_DELAY_S:g}, and a number of drives")
     return Belief(float(delay_s), float(std_s), drives)
@@ -97,7 +100,8 @@ class ReceiverLearning:
     def now(self) -> Belief | None:
         """What is learnt by now, with this session; None: nothing yet."""
         now = combined(self._learnt or UNKNOWN, self._alignment.estimate())
-        return now if now.drives else None
+        # An accelerometer behind a low-pass may be the later of the two, by an error or so.
+        return replace(now, delay_s=max(0.0, now.delay_s)) if now.drives else None
 
     @property
     def shown(self) -> Belief:

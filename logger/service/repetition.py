@@ -4,7 +4,8 @@ Problem: a bridge that writes 200 lines a second of a sensor that takes 51 readi
 rate. Between the held readings stand steps that no car makes: a quiet road reads up to a quarter too rough. Solution:
 samples are judged ``WINDOW`` at a time by the pattern of what repeats (``logger.dsp.repeated_samples``), which a coarse
 sensor that rightly stays on one code does not have. From the window in which repeats were found until one in which
-hardly any are, rows are flagged ``repeated`` and left without figures, as far as they have not been written yet.
+hardly any are, or which shows that none are held, or until no window has shown them for some minutes, rows are flagged
+``repeated`` and left without figures, as far as they have not been written yet.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
-from logger.dsp.repeated_samples import LEAST_SHARE, find_repeats
+from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats
 
 WINDOW = 2048
 FALSE_ALARM = 1e-10
 """For each window: in ten years of driving 8 hours a day at 100 Hz, once in a thousand cars."""
+PROOF_LASTS = 15
+"""Windows, five minutes: a coarse sensor that rightly repeats some samples on a quiet road cannot show that it is well
+again; what it was found to do does not count for longer."""
 _SPANS_KEPT = 8
 
 
@@ -33,6 +37,7 @@ class Repetition:
         self._t_us = np.empty(0, dtype=np.int64)
         self._accel_mps2 = np.empty((0, 3))
         self._spans: deque[tuple[int, int]] = deque(maxlen=_SPANS_KEPT)
+        self._unproven = 0
         self.share = 0.0
 
     def take(self, block: AccelerationBlock) -> None:
@@ -68,11 +73,14 @@ class Repetition:
 
     def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
         share = float((accel_mps2[1:] == accel_mps2[:-1]).all(axis=1).mean())
+        repeats = share >= LEAST_SHARE and find_repeats(accel_mps2, FALSE_ALARM) is not None
+        self._unproven = 0 if repeats else self._unproven + 1
         if self.share:
-            self.share = share if share >= LEAST_SHARE else 0.0
+            over = share < LEAST_SHARE or are_fresh(accel_mps2) or self._unproven > PROOF_LASTS
+            self.share = 0.0 if over else share
             if self.share:
                 self._spans[-1] = (self._spans[-1][0], int(t_us[-1]))
             return
-        if share >= LEAST_SHARE and find_repeats(accel_mps2, FALSE_ALARM) is not None:
+        if repeats:
             self.share = share
             self._spans.append((int(t_us[0]), int(t_us[-1])))

@@ -1,5 +1,7 @@
 """What is said of a sensor that sits as it should not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,13 @@ def test_a_sensor_that_came_loose_is_told(loose_deg: tuple[float, float], words:
     alignment = learnt(seen)
     assert words in alignment.moved
     assert "fasten it" in alignment.moved
+
+
+@pytest.mark.parametrize("reading", [0.0, np.nan])
+def test_nothing_is_said_by_a_sensor_that_is_dead(reading: float) -> None:
+    seen = town()
+    alignment = learnt(replace(seen, accel=np.full_like(seen.accel, reading)))
+    assert alignment.complaints == () and alignment.estimate().delay_s is None
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 30.0, -120.0])

@@ -75,6 +75,13 @@ def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [FILE_NAME]
 
 
+def test_a_delay_of_about_nothing_is_read_back(tmp_path: Path) -> None:
+    before_the_sensor = Told(DelayEstimate(-0.02, 0.015))
+    ReceiverLearning(tmp_path, before_the_sensor, UNKNOWN, None).save()
+    learnt = read_learnt(tmp_path)
+    assert learnt is not None and learnt.delay_s == 0.0 and learnt.drives == 1
+
+
 def test_a_number_in_the_settings_counts_and_has_no_error() -> None:
     assert at_start(SET, Belief(0.1, 0.01, 4)) == Belief(0.25, 0.0)
 
@@ -95,6 +102,8 @@ def test_nothing_learnt_writes_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"latency_s": "x", "latency_std_s": 0.1}', "\xff",
                                   '{"latency_s": NaN, "latency_std_s": 0.1}', '{"latency_s": 0.1}', "[" * 900,
+                                  '"latency_s"', '["latency_s"]',
+                                  f'{{"latency_s": 1{"0" * 400}, "latency_std_s": 0.1}}',
                                   '{"latency_s": 0.1, "latency_std_s": 0.0, "latency_drives": 1}'])
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE_NAME).write_bytes(text.encode("latin-1"))

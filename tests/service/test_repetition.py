@@ -65,6 +65,16 @@ def test_it_ends_when_the_repeats_do() -> None:
     assert found.during(bad.t_us).all()
 
 
+@pytest.mark.parametrize("step", [0.001, 0.613])
+def test_it_ends_on_a_coarse_sensor_that_rightly_repeats_some(step: float) -> None:
+    found = Repetition()
+    bad, good = samples(60, 100, 0.001, 4), samples(600, 100, step)
+    found.take(bad)
+    assert found.doubt
+    found.take(AccelerationBlock(good.t_us + 60_000_000, good.accel_mps2, good.clipped))
+    assert found.doubt == ""
+
+
 def twice(data: bytes, number: int, last: bytes) -> tuple[bytes, int, bytes]:
     """Lines with every second one replaced by the one before it."""
     out = b""

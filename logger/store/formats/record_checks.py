@@ -110,6 +110,10 @@ def even_record(
 
     Raises BadInput ("file: expected ..., found ...") for what would give a wrong result.
     """
+    if len(t_s) < 2:
+        raise BadInput(f"{file}: expected two samples or more, found {len(t_s)}")
+    if not all(np.isfinite(one).all() for one in (t_s, *accel.values())):
+        raise BadInput(f"{file}: expected numbers, found NaN or infinity among times or samples")
     scale = STANDARD_GRAVITY_MPS2 if asked.unit == "g" else 1.0
     samples = np.stack([scale * one for one in accel.values()], axis=1)
     doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)

@@ -108,7 +108,7 @@ def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
     if (early := steps < 1.0 / MAX_RATE_HZ).any():
         sample = int(np.argmax(early)) + 1
         raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found "
-                       f"{t_s[sample]:.10g}{mend}")
+                       f"{t_s[sample]:.10g}{mend if (steps >= 0).all() and steps.any() else ''}")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)
     tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
     off = np.abs(t_s - (t_s[0] + step_s * np.arange(len(t_s))))
