@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.repeated_samples import resolution
+from logger.dsp.repeated_samples import resolution, stretches_of
 
 Array = npt.NDArray[np.float64]
 
@@ -47,10 +47,9 @@ def range_ends(values: Array) -> list[RangeEnd]:
 def _upper_end(values: Array, step: float) -> RangeEnd | None:
     top = float(values.max())
     at_top = values > top - 0.5 * step
-    edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
-    first, end = edges[::2], edges[1::2]
-    inside = (first > 0) & (end < len(values)) & (end - first >= _LEAST_SAMPLES)
-    first, end = first[inside], end[inside]
+    first, end = stretches_of(at_top)
+    stands = end - first >= _LEAST_SAMPLES
+    first, end = first[stands], end[stands]
     jumps = np.minimum(values[first] - values[first - 1], values[end - 1] - values[end]) > JUMP * step
     stays = int((end - first - 1)[jumps].sum())
     chance = float(JUMP ** -min(stays, 100))

@@ -72,11 +72,26 @@ def moves(samples: Array) -> Array:
     return steps
 
 
+def fresh_samples(samples: Array) -> Bools:
+    """Which samples (n, axes) differ from the one before on some axis (n,); the first one is new."""
+    fresh = np.ones(len(samples), dtype=np.bool_)
+    fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
+    return fresh
+
+
+def stretches_of(mask: Bools) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """First places and ends (k,), half open, of the stretches in which a mask (n,) holds, those without the first and
+    the last place alone."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    first, end = edges[::2], edges[1::2]
+    inside = (first > 0) & (end < len(mask))
+    return first[inside], end[inside]
+
+
 def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
     """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance, which
     gives some with a probability of ``false_alarm`` at most."""
-    fresh = np.ones(len(samples), dtype=np.bool_)
-    fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
+    fresh = fresh_samples(samples)
     share = 1.0 - float(fresh.mean())
     if share < LEAST_SHARE:
         return None
@@ -90,20 +105,15 @@ def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | 
 def are_fresh(samples: Array, least_stretches: int = 20) -> bool:
     """Whether samples (n, axes) show that none is held: of so many turning points no more stand still than by chance.
     In a held record nearly all of them do."""
-    fresh = np.ones(len(samples), dtype=np.bool_)
-    fresh[1:] = (np.diff(samples, axis=0) != 0).any(axis=1)
-    still, stretches = _turning_points(samples, fresh)
+    still, stretches = _turning_points(samples, fresh_samples(samples))
     return stretches >= least_stretches and still <= CHANCE_STILL * stretches
 
 
 def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
     """How many stretches of small moves between two large ones stand still, and how many there are."""
     move = moves(samples)
-    small, large = move < SMALL, move > LARGE
-    edges = np.flatnonzero(np.diff(small.astype(np.int8), prepend=0, append=0))
-    first, end = edges[::2], edges[1::2]
-    inside = (first > 0) & (end < len(move))
-    first, end = first[inside], end[inside]
+    large = move > LARGE
+    first, end = stretches_of(move < SMALL)
     at_end = _at_an_end(samples)
     good = large[first - 1] & large[end] & ~at_end[first]
     first, end = first[good], end[good]

@@ -123,7 +123,7 @@ def learnt_noise(
         estimator = RoadEstimator(structure, output, tried, window_m, noise=before)
         estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
         found = estimator.noise
-        if found is None or found == before:
+        if found is None or not estimator.noise_stretches:
             return None
         belief = found
         if abs(belief.log_mean - before.log_mean) < _NEAR_ENOUGH * belief.log_std:

@@ -16,9 +16,9 @@ from logger.estimation.receiver_delay import (
     DelayEstimate,
     Information,
     Stretch,
+    block_information,
     estimate,
     forward_of,
-    told,
     with_block,
 )
 
@@ -109,7 +109,7 @@ class DriveAlignment:
         accel = np.concatenate([part[1] for part in self._readings])
         low, high = np.searchsorted(time_s, [begin_s - _BEFORE_S, end_s + _AFTER_S])
         stretch = Stretch(time_s[low:high], accel[low:high], fixes[:, 0], fixes[:, 1])
-        block = told(self._known, stretch)
+        block = block_information(self._known, stretch)
         if block is not None:
             self._found = None
             self._known = with_block(self._known, block)

@@ -101,7 +101,7 @@ class Information:
     gravity: Array
     blocks: int
     log_likelihood: Array
-    early: tuple[BlockTold, ...] = ()
+    early: tuple[BlockInformation, ...] = ()
 
     @classmethod
     def none(cls) -> Information:
@@ -137,7 +137,7 @@ class Belief:
 
 
 @dataclass(frozen=True)
-class BlockTold:
+class BlockInformation:
     """What one block tells: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,); and what
     it was made of: ``rows`` X (d, k, 3), z (k,), t (k,)."""
 
@@ -149,14 +149,14 @@ class BlockTold:
     rows: Rows
 
 
-def told(known: Information, stretch: Stretch) -> BlockTold | None:
+def block_information(known: Information, stretch: Stretch) -> BlockInformation | None:
     """What a stretch tells, its fixes weighed by what is known. None: the car hardly moves, or the readings have a
     hole."""
     rows = _rows(stretch)
     return _weighed(known, rows, stretch.accel.mean(axis=0)) if len(rows[1]) >= FEWEST_FIXES else None
 
 
-def _weighed(known: Information, rows: Rows, mean: Array) -> BlockTold:
+def _weighed(known: Information, rows: Rows, mean: Array) -> BlockInformation:
     x, z, t_s = rows
     strength = STRENGTHS[int(np.argmax(known.log_likelihood))] if known.blocks else _USUAL
     weight, residual = np.ones(len(z)), z
@@ -167,10 +167,10 @@ def _weighed(known: Information, rows: Rows, mean: Array) -> BlockTold:
         residual = z - x[index] @ w
         weight = _weights(residual, t_s, strength, weight)
     likelihood = np.array([_log_likelihood(residual, t_s, each, weight) for each in STRENGTHS])
-    return BlockTold(*_sums(x, z, t_s, strength, weight), mean, likelihood, rows)
+    return BlockInformation(*_sums(x, z, t_s, strength, weight), mean, likelihood, rows)
 
 
-def with_block(known: Information, block: BlockTold) -> Information:
+def with_block(known: Information, block: BlockInformation) -> Information:
     """Add what a block tells."""
     known = replace(_added(known, block), early=(*known.early, block) if known.blocks < EARLY_BLOCKS else ())
     if known.blocks != EARLY_BLOCKS:
@@ -181,7 +181,7 @@ def with_block(known: Information, block: BlockTold) -> Information:
     return anew
 
 
-def _added(known: Information, block: BlockTold) -> Information:
+def _added(known: Information, block: BlockInformation) -> Information:
     sums = known.a.copy(), known.b.copy(), known.c.copy()
     for total, part in zip(sums, (block.a, block.b, block.c), strict=True):
         total[known.blocks % GROUPS] += part
@@ -337,9 +337,9 @@ def _profile(a: Array, b: Array, gravity: Array) -> tuple[Array, Array]:
     level = _level(gravity)
     inner = np.einsum("ip,dij,jq->dpq", level, a, level)
     inner += 1e-9 * np.trace(inner, axis1=1, axis2=2)[:, None, None] * np.eye(2) + 1e-12 * np.eye(2)
-    told = b @ level
-    y = np.linalg.solve(inner, told[:, :, None])[:, :, 0]
-    return np.sum(told * y, axis=1), y @ level.T
+    upright = b @ level
+    y = np.linalg.solve(inner, upright[:, :, None])[:, :, 0]
+    return np.sum(upright * y, axis=1), y @ level.T
 
 
 def _best(a: Array, b: Array, gravity: Array, is_learnt: bool) -> tuple[int, Array]:

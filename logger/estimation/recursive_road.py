@@ -89,6 +89,11 @@ class FollowedRoad:
         self._unscored = 0
 
     @property
+    def noise_stretches(self) -> int:
+        """From how many stretches the noise was learnt."""
+        return 0 if self._learner is None else self._learner.stretches
+
+    @property
     def noise(self) -> NoiseBelief | None:
         """What is believed of the sensor's noise now; None where it is not learnt."""
         if self._learner is None:

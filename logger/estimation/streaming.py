@@ -132,6 +132,11 @@ class RoadEstimator:
         self._start_anew()
 
     @property
+    def noise_stretches(self) -> int:
+        """From how many stretches the noise was learnt."""
+        return self._road.noise_stretches
+
+    @property
     def noise(self) -> NoiseBelief | None:
         """What is believed of the sensor's noise now; None where it is not learnt."""
         return self._road.noise

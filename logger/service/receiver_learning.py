@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
@@ -23,6 +22,7 @@ from logger.estimation.mounting import heading_deg
 from logger.estimation.receiver_delay import Belief, combined
 from logger.service.config import AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
+from logger.store.log.atomic_file import replace_file
 from logger.units import US_PER_S
 
 FILE_NAME = "receiver-delay"
@@ -121,18 +121,8 @@ class ReceiverLearning:
         now = self.now
         if now is None or now == self._saved:
             return
-        new = self._path.with_name(FILE_NAME + ".new")
         try:
-            with suppress(FileNotFoundError):
-                self._files.remove(new)
-            descriptor = self._files.create(new, new=True)
-            try:
-                self._files.write(descriptor, (json.dumps(header_fields(now)) + "\n").encode("ascii"))
-                self._files.sync(descriptor)
-            finally:
-                self._files.close(descriptor)
-            self._files.rename(new, self._path)
-            self._files.sync_directory(self._path.parent)
+            replace_file(self._files, self._path, [(json.dumps(header_fields(now)) + "\n").encode("ascii")])
             self._saved, self._failed = now, False
         except OSError as error:
             if not self._failed:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
-from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats
+from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
 
 WINDOW = 2048
 FALSE_ALARM = 1e-10
@@ -72,7 +72,7 @@ class Repetition:
         return repeated
 
     def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
-        share = float((accel_mps2[1:] == accel_mps2[:-1]).all(axis=1).mean())
+        share = float((~fresh_samples(accel_mps2)[1:]).mean())
         repeats = share >= LEAST_SHARE and find_repeats(accel_mps2, FALSE_ALARM) is not None
         self._unproven = 0 if repeats else self._unproven + 1
         if self.share:

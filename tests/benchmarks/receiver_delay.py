@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import angle_rad
 from logger.estimation.receiver_delay import DelayEstimate
 
-from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive
+from ..support.drives.braking_drives import Instrument, Mounting, Receiver, drive, fed
 from .figures import Figures
 
 BMA220 = Instrument()
@@ -48,19 +47,6 @@ CASES = (
 )
 
 
-def learnt(seen: SeenDrive, chunk: int = 500) -> DriveAlignment:
-    """All of a drive, as it comes."""
-    drive_alignment = DriveAlignment(2, 1.0)
-    fix = 0
-    for low in range(0, len(seen.time_s), chunk):
-        time_s = seen.time_s[low : low + chunk]
-        while fix < len(seen.fix_time_s) and seen.fix_time_s[fix] <= time_s[-1]:
-            drive_alignment.take_fix(float(seen.fix_time_s[fix]), float(seen.fix_speed_mps[fix]))
-            fix += 1
-        drive_alignment.take_readings(time_s, seen.accel[low : low + chunk])
-    return drive_alignment
-
-
 def trial(case: Case, seed: int) -> tuple[DelayEstimate, float, float, int]:
     """Estimate, true delay [s], error of forward about the vertical [rad], number of complaints."""
     rng = np.random.default_rng([7, seed])
@@ -68,7 +54,7 @@ def trial(case: Case, seed: int) -> tuple[DelayEstimate, float, float, int]:
     mounting = Mounting(float(rng.uniform(-180, 180)), *map(float, rng.uniform(-8, 8, 2)))
     receiver = replace(case.receiver, delay_s=delay_s)
     seen = drive(case.kind, SECONDS, mounting, receiver, case.instrument, seed, case.slope_rms)
-    found = learnt(seen)
+    found = fed(seen)
     guess = found.estimate()
     off_rad = np.nan
     if guess.forward is not None:

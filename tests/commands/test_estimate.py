@@ -151,6 +151,21 @@ def test_the_noise_is_learnt_from_the_drive(
     assert lines[2].startswith("Taken for granted: ")
 
 
+@pytest.mark.parametrize("step", [0.0, 0.03, 0.613])
+def test_a_drive_that_tells_nothing_of_the_noise_says_so(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], step: float
+) -> None:
+    columns = read(folder)
+    columns["speed_mps"] *= 0.0
+    columns["distance_m"] *= 0.0
+    columns["accel_z_mps2"] = np.random.default_rng(1).normal(0, 0.5, len(columns["t_s"]))
+    write(tmp_path, columns)
+    result = told(capsys, tmp_path, "--noise", "auto", "--step", step)
+    assert (result["noise_learnt"], result["noise_std_mps2"], result["noise_mps2"]) == (False, None, 0.05)
+    assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
+    assert "This drive tells nothing of the noise. Taken for granted: 0.05 m/s2" in capsys.readouterr().out
+
+
 def test_a_distance_that_goes_back_a_little_is_laid_anew(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,41 +5,33 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import heading_deg
 
-from ..support.drives.braking_drives import Instrument, Mounting, Receiver, drive
-from .test_receiver_delay import learnt, town
+from ..support.drives.braking_drives import Instrument, Mounting, Receiver, drive, fed
+from .test_receiver_delay import town
 
 FINE = Instrument(step_mps2=0.0, noise_mps2=0.05)
 
 
 def test_nothing_is_said_of_a_sensor_that_is_well() -> None:
-    assert learnt(town()).complaints == ()
+    assert fed(town()).complaints == ()
 
 
 def test_a_tilt_is_told() -> None:
     seen = drive("town", 600.0, Mounting(30.0, 14.0, 9.0), Receiver(), FINE, seed=2)
-    (words,) = learnt(seen).complaints
+    (words,) = fed(seen).complaints
     assert "tilted by 1" in words
 
 
 def test_an_axis_that_was_named_wrongly_is_told() -> None:
-    seen = town()
-    alignment, fix = DriveAlignment(0, -1.0), 0
-    for low in range(0, len(seen.time_s), 1000):
-        while fix < len(seen.fix_time_s) and seen.fix_time_s[fix] <= seen.time_s[low]:
-            alignment.take_fix(float(seen.fix_time_s[fix]), float(seen.fix_speed_mps[fix]))
-            fix += 1
-        alignment.take_readings(seen.time_s[low : low + 1000], seen.accel[low : low + 1000])
-    (words,) = alignment.complaints
+    (words,) = fed(town(), 0, -1.0).complaints
     assert words.startswith("gravity is felt along +z, not along -x")
 
 
 @pytest.mark.parametrize(("loose_deg", "words"), [((0.0, 12.0), "tilted by 1"), ((50.0, 0.0), "turned by")])
 def test_a_sensor_that_came_loose_is_told(loose_deg: tuple[float, float], words: str) -> None:
     seen = drive("town", 1800.0, Mounting(30.0, loose_at_s=700.0, loose_deg=loose_deg), Receiver(), FINE, seed=3)
-    alignment = learnt(seen)
+    alignment = fed(seen)
     assert words in alignment.moved
     assert "fasten it" in alignment.moved
 
@@ -47,7 +39,7 @@ def test_a_sensor_that_came_loose_is_told(loose_deg: tuple[float, float], words:
 @pytest.mark.parametrize("reading", [0.0, np.nan])
 def test_nothing_is_said_by_a_sensor_that_is_dead(reading: float) -> None:
     seen = town()
-    alignment = learnt(replace(seen, accel=np.full_like(seen.accel, reading)))
+    alignment = fed(replace(seen, accel=np.full_like(seen.accel, reading)))
     assert alignment.complaints == () and alignment.estimate().delay_s is None
 
 

@@ -10,21 +10,9 @@ from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import angle_rad
 from logger.estimation.receiver_delay import Belief, DelayEstimate, combined
 
-from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive
+from ..support.drives.braking_drives import Instrument, Mounting, Receiver, SeenDrive, drive, fed
 
 TOWN_S = 1200.0
-
-
-def learnt(seen: SeenDrive, chunk: int = 1000) -> DriveAlignment:
-    """A drive as it comes, in pieces of so many readings."""
-    alignment, fix = DriveAlignment(2, 1.0), 0
-    for low in range(0, len(seen.time_s), chunk):
-        time_s = seen.time_s[low : low + chunk]
-        while fix < len(seen.fix_time_s) and seen.fix_time_s[fix] <= time_s[-1]:
-            alignment.take_fix(float(seen.fix_time_s[fix]), float(seen.fix_speed_mps[fix]))
-            fix += 1
-        alignment.take_readings(time_s, seen.accel[low : low + chunk])
-    return alignment
 
 
 @cache
@@ -38,7 +26,7 @@ def town() -> SeenDrive:
 def test_the_delay_and_forward_are_found_at_every_angle(yaw_deg: float, delay_s: float, rate_hz: float) -> None:
     receiver = Receiver(delay_s=delay_s, rate_hz=rate_hz, gaps_s=((300, 340),))
     seen = drive("town", TOWN_S, Mounting(yaw_deg, 5.0, -6.0), receiver, Instrument(), seed=int(yaw_deg) + 500)
-    found = learnt(seen).estimate()
+    found = fed(seen).estimate()
     assert found.delay_s is not None
     assert found.std_s is not None
     assert found.forward is not None
@@ -51,7 +39,7 @@ def test_the_delay_and_forward_are_found_at_every_angle(yaw_deg: float, delay_s:
 
 def test_fixes_that_are_later_are_told_to_be_later() -> None:
     seen = town()
-    first, later = (learnt(each).estimate() for each in (seen, replace(seen, fix_time_s=seen.fix_time_s + 0.07)))
+    first, later = (fed(each).estimate() for each in (seen, replace(seen, fix_time_s=seen.fix_time_s + 0.07)))
     assert first.delay_s is not None
     assert later.delay_s is not None
     assert later.delay_s - first.delay_s == pytest.approx(0.07, abs=0.015)
@@ -59,20 +47,20 @@ def test_fixes_that_are_later_are_told_to_be_later() -> None:
 
 def test_the_unit_of_the_readings_does_not_matter() -> None:
     seen = town()
-    one, other = learnt(seen).estimate(), learnt(replace(seen, accel=seen.accel / 9.8)).estimate()
+    one, other = fed(seen).estimate(), fed(replace(seen, accel=seen.accel / 9.8)).estimate()
     assert one.delay_s == pytest.approx(other.delay_s, abs=1e-6)
     assert one.gain == pytest.approx(9.8 * (other.gain or 0.0), rel=1e-6)
 
 
 def test_pieces_do_not_matter() -> None:
-    one, other = learnt(town(), 1000).estimate(), learnt(town(), 37).estimate()
+    one, other = fed(town(), chunk=1000).estimate(), fed(town(), chunk=37).estimate()
     assert one.delay_s == other.delay_s
     assert one.std_s == other.std_s
 
 
 def test_an_even_drive_tells_no_delay_and_says_why() -> None:
     seen = drive("highway", TOWN_S, Mounting(), Receiver(), Instrument(), seed=1)
-    found = learnt(seen).estimate()
+    found = fed(seen).estimate()
     assert found.delay_s is None
     assert found.std_s is None
     assert "too little braking" in found.reason
@@ -80,20 +68,20 @@ def test_an_even_drive_tells_no_delay_and_says_why() -> None:
 
 def test_a_car_that_stands_tells_nothing() -> None:
     seen = town()
-    alignment = learnt(replace(seen, fix_speed_mps=np.zeros(len(seen.fix_speed_mps))))
+    alignment = fed(replace(seen, fix_speed_mps=np.zeros(len(seen.fix_speed_mps))))
     assert alignment.estimate() == DelayEstimate(reason="too little has been driven")
 
 
 def test_a_sensor_that_does_not_feel_the_car_tells_nothing() -> None:
     seen = town()
     noise = np.random.default_rng(0).normal(0, 0.3, seen.accel.shape) + np.array([0, 0, 9.8])
-    assert learnt(replace(seen, accel=noise)).estimate().delay_s is None
+    assert fed(replace(seen, accel=noise)).estimate().delay_s is None
 
 
 def test_readings_with_holes_are_left_out() -> None:
     seen = town()
     there = (seen.time_s % 200) > 30
-    found = learnt(replace(seen, time_s=seen.time_s[there], accel=seen.accel[there])).estimate()
+    found = fed(replace(seen, time_s=seen.time_s[there], accel=seen.accel[there])).estimate()
     assert found.delay_s is not None
     assert found.std_s is not None
     assert abs(found.delay_s - 0.15) < 2.5 * found.std_s

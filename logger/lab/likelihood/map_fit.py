@@ -96,25 +96,28 @@ def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> LinearMod
     """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
     road, from there or from where they lie after that, whichever is likeliest."""
     best = _aligned_from(LinearModel(posterior, state), worth)
-    for start in (state, None, None):
-        followed = _followed(posterior, start or best.state)
-        if followed is None:
+    found = _followed(posterior, state, worth)
+    if found is None:
+        return best
+    best = min(best, found, key=lambda one: one.score)
+    for _ in range(2):
+        found = _followed(posterior, best.state, worth)
+        if found is None or found.score > best.score - CONVERGED:
             break
-        found = _aligned_from(LinearModel(posterior, followed), worth)
-        if start is None and found.score > best.score - CONVERGED:
-            break
-        best = min(best, found, key=lambda one: one.score)
+        best = found
     return best
 
 
-def _followed(posterior: Posterior, state: State) -> State | None:
-    """A state with the runs followed along the road; None where they lie as near as an alignment needs."""
+def _followed(posterior: Posterior, state: State, worth: float) -> LinearModel | None:
+    """A state with the runs followed along the road, and aligned there; None where they lie as near as an alignment
+    needs."""
     farther_m = [followed_m(run, one) for run, one in zip(posterior.runs.runs, state.predictions, strict=True)]
     if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
         return None
     record = [error.through(error.moved_m(k) + more) for error, k, more in zip(
         posterior.record_errors, state.record, farther_m, strict=True)]
-    return posterior.at(state.effects, state.logs, record, state.size)
+    followed = posterior.at(state.effects, state.logs, record, state.size)
+    return _aligned_from(LinearModel(posterior, followed), worth)
 
 
 def _aligned_from(start: LinearModel, worth: float, most: int = 40) -> LinearModel:

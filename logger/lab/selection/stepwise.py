@@ -89,7 +89,7 @@ class Search:
     effort: Effort = Effort()
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    _reduced: tuple[Baseline | None, dict[str, Baseline]] = (None, {})
+    _reduced: tuple[Baseline, dict[str, Baseline]] | None = None
 
     def run(self, before: Baseline) -> Selection:
         """From a model without effects that it lacks."""
@@ -115,7 +115,7 @@ class Search:
                 now, _ = self._reconsidered(now, name)
         now, gains = self._needed(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
-        self._reduced = None, {}
+        self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps))
 
     def left_out(self, found: Selection, name: str) -> Selection:
@@ -180,7 +180,7 @@ class Search:
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted; kept as long as this is the model."""
-        if self._reduced[0] is not now:
+        if self._reduced is None or self._reduced[0] is not now:
             self._reduced = now, {}
         kept = self._reduced[1]
         if name not in kept:

@@ -20,7 +20,7 @@ from logger.dsp.range_ends import range_ends
 from logger.dsp.repeated_samples import Repeats, find_repeats, fresh_times
 from logger.errors import BadInput
 from logger.store.formats.drive_file import SPEED
-from logger.store.formats.record_file import MAX_RATE_HZ, TIME, VERTICAL, even_rate_hz
+from logger.store.formats.record_file import TIME, VERTICAL, check_grows, even_rate_hz
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -192,9 +192,7 @@ def even_times_of(t_s: Array, file: str) -> Array:
             return spread(t_s, ends)
         except ValueError as error:
             raise BadInput(f"{file}: expected samples that were taken at some even rate, {error}") from None
-    if (same := np.diff(t_s) < 1.0 / MAX_RATE_HZ).any():
-        row = int(np.argmax(same)) + 1
-        raise BadInput(f"{file}:{row + 2}: expected a time after {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
+    check_grows(t_s, file)
     return t_s
 
 

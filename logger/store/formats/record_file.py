@@ -101,14 +101,19 @@ def check_times(t_s: Array, file: str) -> None:
         raise BadInput(f"{file}:{sample + 2}: expected times within {MAX_TIME_S:g} s, found {t_s[sample]:g}")
 
 
+def check_grows(t_s: Array, file: str, mend: str = "") -> None:
+    """BadInput, with what would ``mend`` it, for a time that is not after the one before."""
+    if (early := np.diff(t_s) < 1.0 / MAX_RATE_HZ).any():
+        sample = int(np.argmax(early)) + 1
+        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found "
+                       f"{t_s[sample]:.10g}{mend}")
+
+
 def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
     """The rate of the times; BadInput with the line where they leave an even grid, and what would ``mend`` it."""
     check_times(t_s, file)
     steps = np.diff(t_s)
-    if (early := steps < 1.0 / MAX_RATE_HZ).any():
-        sample = int(np.argmax(early)) + 1
-        raise BadInput(f"{file}:{sample + 2}: expected a time after {t_s[sample - 1]:.10g} s, found "
-                       f"{t_s[sample]:.10g}{mend if (steps >= 0).all() and steps.any() else ''}")
+    check_grows(t_s, file, mend if (steps >= 0).all() and steps.any() else "")
     step_s = float(t_s[-1] - t_s[0]) / len(steps)
     tolerance_s = min(_ROUNDING_S, _ROUNDING_STEPS * step_s)
     off = np.abs(t_s - (t_s[0] + step_s * np.arange(len(t_s))))

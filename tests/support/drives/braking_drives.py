@@ -15,6 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import bilinear, lfilter
 
+from logger.estimation.drive_alignment import DriveAlignment
+
 Array = npt.NDArray[np.float64]
 
 STEP_S = 0.01
@@ -197,3 +199,15 @@ def _frame(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Array:
     about_y = np.array([[np.cos(pitch), 0, -np.sin(pitch)], [0, 1, 0], [np.sin(pitch), 0, np.cos(pitch)]])
     about_x = np.array([[1, 0, 0], [0, np.cos(roll), np.sin(roll)], [0, -np.sin(roll), np.cos(roll)]])
     return about_x @ about_y @ about_z
+
+
+def fed(seen: SeenDrive, column: int = 2, sign: float = 1.0, chunk: int = 1000) -> DriveAlignment:
+    """An alignment with this axis upwards that has heard all of a drive, as it comes, in pieces of so many readings."""
+    alignment, fix = DriveAlignment(column, sign), 0
+    for low in range(0, len(seen.time_s), chunk):
+        time_s = seen.time_s[low : low + chunk]
+        while fix < len(seen.fix_time_s) and seen.fix_time_s[fix] <= time_s[-1]:
+            alignment.take_fix(float(seen.fix_time_s[fix]), float(seen.fix_speed_mps[fix]))
+            fix += 1
+        alignment.take_readings(time_s, seen.accel[low : low + chunk])
+    return alignment
