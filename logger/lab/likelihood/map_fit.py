@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -153,6 +154,7 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_ga
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
     realigns = any(state.effects[move.effect].effect.realigns for move in moves)
+    predict = linear.posterior.predictor(state.effects, state.logs, linear.state.record)
 
     def evaluate(x: Array) -> _Point:
         effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs
@@ -162,13 +164,13 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_ga
             there, at, slopes = known
             predictions = [one + (x - there)[p:] @ columns for one, columns in zip(at.predictions, slopes, strict=True)]
             record = linear.eliminated(predictions, at.record).record
-        predictions = linear.posterior.predict(effects, logs, record)
+        predictions = predict(effects, logs, record)
         return _Point(effects, logs, record, predictions, 0.5 * linear.objective(predictions, logs, record))
 
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal own, known
         if moves and fresh:
-            slopes = effect_slopes(linear, at.effects, at.logs, moves, at.predictions, at.record)
+            slopes = effect_slopes(linear, at.effects, at.logs, moves, at.record, at.predictions)
             own, known = linear.whitened(slopes), (x.copy(), at, slopes)
         residuals = linear.eliminated(at.predictions, at.record).residuals
         return linear.gradient(residuals, at.logs, own), linear.information(at.logs, own)
@@ -180,17 +182,21 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_ga
 
 
 def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, moves: Sequence[Move],
-                  predictions: Sequence[Array], record: Sequence[Array] | None = None) -> list[Array]:
-    """What the effects' numbers do to predictions, on the scales of the parameters: (m, n) per run; laid out with the
-    record errors of the model, or with others."""
-    laid = linear.state.record if record is None else record
+                  record: Sequence[Array], fine: Sequence[Array]) -> list[Array]:
+    """What the effects' numbers do to predictions, on the scales of the parameters: (m, n) per run, laid out with these
+    record errors. They are known well enough by a rough simulation.
+
+    fine    predictions (n,) per run that are known already; a car that does not rub needs no others
+    """
+    posterior = linear.posterior
+    predict = partial(posterior.predict, logs=logs, record=record, rough=True)
+    before = predict(effects) if posterior.car(effects, logs).rubs else fine
     here = coordinates_of(effects, moves)
-    found = [np.empty((len(moves), len(one))) for one in predictions]
+    found = [np.empty((len(moves), len(one))) for one in before]
     for index, step in enumerate(steps_of(effects, moves)):
         there = here.copy()
         there[index] += step
-        shifted = linear.posterior.predict(moved(effects, moves, there), logs, laid)
-        for column, high, low in zip(found, shifted, predictions, strict=True):
+        for column, high, low in zip(found, predict(moved(effects, moves, there)), before, strict=True):
             column[index] = (high - low) / step
     return found
 
@@ -199,7 +205,7 @@ def own_slopes(linear: LinearModel) -> list[Array] | None:
     """What the numbers of a model's own effects do to its predictions: (m, n) per run; None where none moves."""
     state = linear.state
     moves = moves_of(state.effects)
-    return effect_slopes(linear, state.effects, state.logs, moves, state.predictions) if moves else None
+    return effect_slopes(linear, state.effects, state.logs, moves, state.record, state.predictions) if moves else None
 
 
 def _fine_steps(linear: LinearModel) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
+Predict = Callable[[Sequence[Chosen], Array, Sequence[Array]], list[Array]]
+"""Predictions (n,) per run by effects, the car's numbers and the record's errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,19 @@ class Posterior:
         predictions = self.runs.predict(self.car(effects, logs), self.moved_m(record), rough)
         return [one.recorded(prediction, k) for one, prediction, k in zip(
             self.record_errors, predictions, record, strict=True)]
+
+    def predictor(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> Predict:
+        """Predictions of models that are not far from one: as rough ones are, and as much off these as a fine one of
+        that model is."""
+        if not self.car(effects, logs).rubs:
+            return self.predict
+        fine = self.predict(effects, logs, record)
+        off = [one - rough for one, rough in zip(fine, self.predict(effects, logs, record, rough=True), strict=True)]
+
+        def predict(effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Array]:
+            return [one + more for one, more in zip(self.predict(effects, logs, record, rough=True), off, strict=True)]
+
+        return predict
 
     def at(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array] | None = None,
            size: ErrorSize = USUAL) -> State:

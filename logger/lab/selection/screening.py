@@ -21,7 +21,7 @@ from logger.lab.likelihood.noise_floor import gain_of_an_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.runs import Run
-from logger.vehicle.effect import Chosen, DriveEffect, Effect, Misalignment, Scale, chosen
+from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved
 from logger.vehicle.named_parameters import read
 
@@ -69,22 +69,24 @@ class Baseline:
     rough          predictions of a rough simulation, for comparing with others
     quadratics     under the prior, and, where its wall holds a number, without the wall: a car that is bent to the wall
                    hides what effects do
+    as_recorded    starts and factors of the distances are those of the record
     """
 
     score: float
     explanation: float
     rough: list[Array]
     quadratics: tuple[_Quadratic, ...]
+    as_recorded: bool = False
 
     @staticmethod
-    def of(linear: LinearModel) -> Baseline:
+    def of(linear: LinearModel, as_recorded: bool = False) -> Baseline:
         """Of a model beside its state."""
         state = linear.state
         quadratics = [_Quadratic.of(linear)]
         if linear.prior.at_the_wall(state.logs):
             quadratics.append(_Quadratic.of(linear.without_wall()))
         return Baseline(linear.score, gain_of_an_explanation(linear.posterior, state),
-                        _roughly(linear, state.effects, state.logs), tuple(quadratics))
+                        _roughly(linear, state.effects, state.logs), tuple(quadratics), as_recorded)
 
     @property
     def posterior(self) -> Posterior:
@@ -119,7 +121,7 @@ def as_recorded(base: Baseline) -> Baseline:
     record = [error.without_trend(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
     there = posterior.at(state.effects, np.zeros_like(state.logs), record)
     numbers = posterior.number_slopes(there, posterior.prior.steps)
-    return Baseline.of(LinearModel(posterior, there, numbers))
+    return Baseline.of(LinearModel(posterior, there, numbers), as_recorded=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +160,8 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Sc
 
     seen    ways in which the runs may be misaligned
     """
+    # Where the distance errors are of a usual size, or none but those of the record, positions are not far wrong.
+    anew = base.state.size.is_unusual and not base.as_recorded and not effect.reshapes
     trials: list[dict[str, float]] = []
     for way in seen:
         trials += [values for values in effect.trials(way) if values not in trials]
@@ -175,7 +179,7 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Sc
         ways = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
         if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does
             ways.append(_as_it_is(base, one, nominal))
-        if not effect.reshapes and values is not trials[0]:
+        if anew and values is not trials[0]:
             ways.append(_aligned_anew(base, one, ways[0]))
         trial = max(ways, key=lambda trial: trial.gain)
         alike = found.setdefault(choice, {})
@@ -261,22 +265,9 @@ def _aligned_anew(base: Baseline, one: Chosen, trial: Trial) -> Trial:
     """A trial with the distance errors fitted anew from the distances as they were recorded: where positions are wrong,
     those that were fitted without it are worth nothing."""
     posterior, state = base.posterior, base.state
-    effects = (*state.effects, one)
-    record = [error.through(error.moved_m(k) - _shift_m(one, error.run)) for error, k in zip(
-        posterior.record_errors, state.record, strict=True)]
-    starts = [posterior.at(effects, state.logs), posterior.at(effects, state.logs, record, state.size)]
-    # They only have to tell which start is likelier: a round that gains a share of 0.4 % is the last.
-    models = [aligned(posterior, start, 0.004) for start in starts]
-    best = min(models, key=lambda model: model.score)
-    return replace(trial, one=one, gain=base.score - best.score, logs=state.logs, start=best.state)
-
-
-def _shift_m(one: Chosen, run: Run) -> Array:
-    """By how much farther than recorded an effect that only misaligns a run lets the car be (n,) [m]."""
-    if isinstance(one.effect, DriveEffect):
-        return one.effect.driven(one.p, run.distance_m) - run.distance_m
-    delay_s = next((value for name, value in one.values.items() if name.endswith("_s")), 0.0)
-    return -delay_s * run.speed_mps
+    # It only has to tell where a fit begins: a round that gains a share of 0.4 % is the last.
+    found = aligned(posterior, posterior.at((*state.effects, one), state.logs), 0.004)
+    return replace(trial, one=one, gain=base.score - found.score, logs=state.logs, start=found.state)
 
 
 def scaled_by(one: Chosen, strength: float) -> Chosen | None:
