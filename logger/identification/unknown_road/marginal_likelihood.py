@@ -192,14 +192,17 @@ class UnknownRoad:
         return np.stack([*columns, by_noise], axis=1)
 
     def _information(self, model: DrivesModel, white: Array, rest: list[Array]) -> Array:
-        """Half of E[(dC u)' inv(C) (dC u)] (m, m), over whitened readings of probes."""
+        """Half of E[(dC u)' inv(C) (dC u)] (m, m), over whitened readings of probes.
+
+        y' inv(C) y is the least of |y - B w|^2 / variance + |w|^2 over roads w: taken so, it is off only by the square
+        of what the equations were not solved to, and never negative."""
         total = np.zeros((0, 0))
         for probe in range(len(white)):
             changed = self._changes(model, white[probe : probe + 1], [one[probe : probe + 1] for one in rest])
-            solved = self._solve(model, changed, self._nearby)[1]
-            part = np.sum([one @ other.T for one, other in zip(changed, solved, strict=True)], axis=0)
+            roads, solved, _ = self._solve(model, changed, self._nearby)
+            part = roads @ roads.T + model.variance * np.sum([one @ one.T for one in solved], axis=0)
             total = part if probe == 0 else total + part
-        return np.asarray((total + total.T) / (4 * len(white)))
+        return np.asarray(total / (2 * len(white)))
 
     def _changes(self, model: DrivesModel, white: Array, rest: list[Array]) -> list[Array]:
         """dC u for every number: readings (m, n) of each drive."""

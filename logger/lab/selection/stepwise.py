@@ -33,7 +33,8 @@ class Effort:
 
     effects                      no more than so many are looked for
     fitted, refined              how many effects are fitted at most, and how many of them with slopes of their own
-    worth_fitting, worth_refining    of the gain of the best one: what an effect has to promise for that
+    worth_fitting, worth_refining    of the gain of the best one, or of one that would count: what an effect has to
+                                 promise for that (a fit gains up to five times of what was promised, as measured)
     as_good                      fits of one effect from different starts that gain so much of what the best of them
                                  gains are all refined
     worth_a_round                of what is left to explain: what a round of a fit has to gain to be worth another one;
@@ -43,7 +44,7 @@ class Effort:
     effects: int = 4
     fitted: int = 6
     refined: int = 3
-    worth_fitting: float = 0.03
+    worth_fitting: float = 0.1
     worth_refining: float = 0.25
     as_good: float = 0.9
     worth_a_round: float = 0.02
@@ -101,7 +102,7 @@ class Search:
             if not left:
                 break
             self.progress(f"round {len(steps) + 1}")
-            tried = self.round(now, left)
+            tried = self.round(now, left, self._enough(now) if steps else 0.0)
             first = first if steps else tried
             best = self._simplest(now, tried)
             if best is None:
@@ -123,24 +124,27 @@ class Search:
         now, gains = self._needed(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
-    def round(self, now: Baseline, effects: Sequence[Effect]) -> Round:
+    def round(self, now: Baseline, effects: Sequence[Effect], enough: float = 0.0) -> Round:
         """Every effect tried on a model; those that realign runs beside these as they were recorded as well, where the
         model lies far from there: what such an effect does may have been taken for a start or a factor of the
-        distance."""
+        distance.
+
+        enough    what an effect has to gain to count
+        """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
             promises = self._screened(pool, now, effects)
-            worth = [(now, one) for one in self._worth_fitting(promises)]
+            worth = [(now, one) for one in self._worth_fitting(promises, enough)]
             self._promising |= {one.effect.name for _, one in worth}
             aligning = [one for one in effects if one.realigns]
             if now.state.size.is_unusual and aligning:
                 there = as_recorded(now)
-                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, aligning))]
+                worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, aligning), enough)]
             self.progress(f"fitting {len(worth)} of them")
             tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
             rough = _best_of_each(tries)
             best = {one.effect.name: one.gain for one in rough[: effort.refined]
-                    if one.gain > effort.worth_refining * rough[0].gain}
+                    if one.gain > effort.worth_refining * max(rough[0].gain, enough)}
             near = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
             self.progress(f"refining {len(near)} of them")
             fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), near))
@@ -159,10 +163,10 @@ class Search:
             found.append(one)
         return sorted(found, key=lambda one: -one.gain)
 
-    def _worth_fitting(self, promises: Sequence[Screened]) -> list[Screened]:
-        """Those that promise enough, of some that are sorted by what they promise."""
-        enough = self.effort.worth_fitting * promises[0].gain
-        return [one for one in promises[: self.effort.fitted] if one.gain > enough]
+    def _worth_fitting(self, promises: Sequence[Screened], enough: float) -> list[Screened]:
+        """Those that promise something, of some that are sorted by what they promise."""
+        least = self.effort.worth_fitting * max(promises[0].gain, enough)
+        return [one for one in promises[: self.effort.fitted] if one.gain > least]
 
     def accepted(self, now: Baseline, one: CandidateFit) -> bool:
         """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
@@ -170,7 +174,11 @@ class Search:
 
     def _is_evident(self, without: Baseline, gain: float) -> bool:
         """Whether so much is gained over a model neither by chance nor by imitation."""
-        return gain > max(least_gain(len(self.effects)), IMITATION * without.explanation)
+        return gain > self._enough(without)
+
+    def _enough(self, without: Baseline) -> float:
+        """More than chance or imitation gains over a model."""
+        return max(least_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
         """Of those that are there and cannot be told from the likeliest, the one with the fewest numbers."""
@@ -207,7 +215,7 @@ class Search:
         without = self.without(now, name)
         gain = without.score - now.score
         tried = self.round(without, [one for one in self.effects if one.name in self._promising and (
-            one.name == name or one.name not in now.state.names)])
+            one.name == name or one.name not in now.state.names)], gain)
         best = self._simplest(without, tried)
         if best is not None and best.gain > gain + CONFUSED:
             now, gain = self._refit(best), best.gain
