@@ -29,8 +29,9 @@ from drivers.hardware import open_serial
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.records import WindowRecord
 from logger.service.config import Config, find_config, load_config
-from logger.service.hil.log_comparison import Agreement, Difference, compare, read_sessions
+from logger.service.hil.log_comparison import Agreement, Difference, compare, read_sessions, receiver_of_newest
 from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
+from logger.service.receiver_learning import read_learnt
 
 LATE_MS = 50.0
 LATE_WHY = "the service itself waits as long between two looks at a port"
@@ -127,7 +128,8 @@ def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
     if args.nmea_port is not None and not list(args.log.glob("*.csv.part")):
         raise BadInput(f"{args.log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
     with open_dump(args.dump) as reader:
-        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1")
+        receiver = receiver_of_newest(args.log) or read_learnt(args.log)
+        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1", receiver)
     if not any(row.utc_us is not None for row in expected):
         raise BadInput(f"{args.dump}: expected GPS fixes with date and time in it, by which its rows are found")
     return expected

@@ -19,17 +19,21 @@ import pytest
 
 from drivers.accelerometers.bma220 import Bma220Decoder
 from drivers.accelerometers.pasco import PascoConfig
+from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, Event, open_dump
 from drivers.wire_profiles import LineLayout, load_profile
 from logger.commands import hil as command
 from logger.commands import main
 from logger.errors import BadInput
+from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
-from logger.service.config import AccelerometerConfig, Config
+from logger.service.config import AccelerometerConfig, Config, load_config
 from logger.service.hil.log_comparison import Session, compare, read_sessions
 from logger.service.hil.playback import Sent, expected_rows, send, wired
 from logger.service.pipeline import longest_wait_us
+from logger.service.receiver_learning import FILE_NAME, header_fields
 from logger.store.log import row_format
+from logger.store.log.sidecar import Tally, store_sidecar
 from logger.units import STANDARD_GRAVITY_MPS2
 
 from ..support.drives.replay import rows_of
@@ -280,6 +284,26 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
         assert not found.ok
         assert found.session is None
         assert "TX on RX" in command.Result(False, None, found).text()
+
+
+def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_since(
+        short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("ridelog.yaml").write_text("accelerometer: {driver: pasco}\n")
+    knew = Belief(0.40, 0.02, 3)
+    with open_dump(short_dump) as reader:
+        rows = expected_rows(wired(reader.header, reader, None, "x"), load_config(Path("ridelog.yaml")), "x", knew)
+    log = tmp_path / "00004-001.csv"
+    log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *map(row_format.format_row, rows)]))
+    learnt = tmp_path / FILE_NAME
+    learnt.write_text(json.dumps(header_fields(Belief(0.05, 0.02, 9))))
+    compared = ["hil", str(short_dump), "--log", ".", "--config", "ridelog.yaml"]
+    store_sidecar(FileSystem(), log, {"receiver": header_fields(knew)}, "finished", Tally(len(rows)), None)
+    assert main.main(compared) == 0
+    log.with_suffix(".json").unlink()  # nothing but what was learnt since is left
+    assert main.main(compared) == 1
+    learnt.write_text(json.dumps(header_fields(knew)))
+    assert main.main(compared) == 0
 
 
 def test_late_bytes_fail_the_run_and_say_so() -> None:

@@ -28,12 +28,13 @@ from drivers.errors import BadReply, SettingsError
 from drivers.ports import BytePort
 from drivers.readings import AccelerationBlock
 from logger.errors import BadInput
+from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.event_merger import EventMerger
-from logger.service.receiver_learning import at_start, read_learnt
+from logger.service.receiver_learning import at_start
 from logger.service.signal_chain import Axis
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.log.log_writer import ClockMap
@@ -124,9 +125,10 @@ def send(
     return Sent(played_us / US_PER_S, size_bytes, (float(half), float(most), float(all_of_them)))
 
 
-def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRecord]:
-    """The rows that a service with these settings, and what it has learnt by now, makes of the recording; all have UTC
-    when any has.
+def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief | None = None) -> list[WindowRecord]:
+    """The rows that a service with these settings makes of the recording; all have UTC when any has.
+
+    receiver    what the service knew of the receiver's delay when it began; None: as before any drive
 
     Raises BadInput for settings under which the service does not listen to what the wires bring.
     """
@@ -143,8 +145,9 @@ def expected_rows(recording: Wired, config: Config, place: str) -> list[WindowRe
     config = wiring.config_for_dump(recording.header, config, None, place)
     instrument = wiring.instrument(config.accelerometer)
     rows = _Rows()
-    receiver = at_start(config.gps, read_learnt(config.log.directory))  # as the service began, not as the recording
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle), receiver)
+    # As the service began, not as the recording: the header's delay is that of another drive.
+    belief = at_start(config.gps, receiver)
+    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle), belief)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:
         core.feed(event)
