@@ -25,6 +25,7 @@ _STOP_DB = 70.0
 _RIDGE = 1e-2
 _CHUNK, _MARGIN = 4096, 48
 _BAND_REACH = 24  # steps of the lower rate
+_MOST_WEIGHTS = 200_000  # at once: some MB, however far the kernel of a fast record reaches
 _HOLE_STEPS = 1.6
 
 
@@ -91,11 +92,12 @@ def _band_limited(even: Array, at: Array, cutoff: float) -> Array:
     around = np.pad(around, ((half + 1 - (len(around) - len(even)) // 2,) * 2, (0, 0)), mode="edge")
     offsets = np.arange(-half, half + 1)
     found = np.empty((len(at), even.shape[1]))
-    for start in range(0, len(at), _CHUNK):
-        here = at[start : start + _CHUNK]
+    rows = ceil(_MOST_WEIGHTS / len(offsets))
+    for start in range(0, len(at), rows):
+        here = at[start : start + rows]
         nearest = np.rint(here).astype(np.int64)
         apart = (nearest - here)[:, None] + offsets
         weights = np.sinc(cutoff * apart) * kaiser.window(apart, half + 1, _STOP_DB)
         weights /= weights.sum(axis=1, keepdims=True)
-        found[start : start + _CHUNK] = np.einsum("mk,mka->ma", weights, around[nearest[:, None] + offsets + half + 1])
+        found[start : start + rows] = np.einsum("mk,mka->ma", weights, around[nearest[:, None] + offsets + half + 1])
     return found

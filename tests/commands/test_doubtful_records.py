@@ -74,6 +74,19 @@ def test_values_in_g_are_refused_and_converted(comfort) -> None:
     assert "is it in g?" in complaints[0]
 
 
+@pytest.mark.parametrize("level", [0.0, 9.81, 0.1])
+def test_a_record_that_never_changes_is_told_of(comfort, level: float) -> None:
+    status, told, complaints = comfort(EVEN_S, np.full_like(EVEN_S, level))
+    assert (status, [doubt["what"] for doubt in told["doubts"]], len(complaints)) == (0, ["constant"], 1)
+    assert f"every sample is {level:.4g} m/s2" in complaints[0]
+
+
+def test_a_file_behind_the_bare_option_is_no_rate(ridelog: Path) -> None:
+    done = subprocess.run([ridelog, "comfort", "--resample", "ride.csv"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "expected a rate in Hz, found 'ride.csv'; a file goes before --resample" in done.stderr
+
+
 def test_the_end_of_a_range_is_told_of(comfort) -> None:
     status, told, complaints = comfort(EVEN_S, np.clip(at(EVEN_S, FINE), -5, 0.9))
     assert (status, len(complaints)) == (0, 1)

@@ -212,10 +212,13 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
         if abs(gravity - _GRAVITY) < _GRAVITY_NEAR and rms < _GRAVITY_CALM:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
                            "has it: --unit g takes them as g, --unit mps2 as they are")
+    if np.ptp(counted[:, 0]) == 0.0:
+        return [Doubt("constant", f"every sample is {counted[0, 0]:.4g} m/s2: a sensor that works shows some noise at "
+                      "least; check that it was read", {"value_mps2": float(counted[0, 0])})]
     if moving is not None and not moving.any():
         return []
     numbers = {"rms_mps2": rms}
-    if 0.0 < rms < _QUIET_MPS2:
+    if rms < _QUIET_MPS2:
         return [Doubt("quiet", f"{rms:.2g} m/s2 r.m.s. is less than a moving car has: is it in g? (--unit g)", numbers)]
     if rms > _LOUD_MPS2:
         return [Doubt("loud", f"{rms:.3g} m/s2 r.m.s. is more than any car has: is it in m/s2?", numbers)]
