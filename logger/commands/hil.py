@@ -27,11 +27,13 @@ from drivers.dump import DumpReader, open_dump
 from drivers.events import GPS
 from drivers.hardware import open_serial
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.estimation.receiver_delay import Belief
 from logger.records import WindowRecord
+from logger.service import noise_learning, receiver_learning
 from logger.service.config import Config, find_config, load_config
-from logger.service.hil.log_comparison import Agreement, Difference, compare, read_sessions, receiver_of_newest
+from logger.service.hil.log_comparison import Agreement, Difference, compare, newest_sidecar, read_sessions
 from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
-from logger.service.receiver_learning import read_learnt
+from logger.service.noise_learning import KnownNoise
 
 LATE_MS = 50.0
 LATE_WHY = "the service itself waits as long between two looks at a port"
@@ -128,11 +130,22 @@ def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
     if args.nmea_port is not None and not list(args.log.glob("*.csv.part")):
         raise BadInput(f"{args.log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
     with open_dump(args.dump) as reader:
-        receiver = receiver_of_newest(args.log) or read_learnt(args.log)
-        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1", receiver)
+        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1", *_known_at_start(args.log))
     if not any(row.utc_us is not None for row in expected):
         raise BadInput(f"{args.dump}: expected GPS fixes with date and time in it, by which its rows are found")
     return expected
+
+
+def _known_at_start(folder: Path) -> tuple[Belief | None, KnownNoise | None]:
+    """What the newest session in a folder knew of the receiver's delay and of the sensor's noise when it began, by its
+    sidecar."""
+    said = newest_sidecar(folder)
+    try:
+        receiver = receiver_learning.from_fields(said.get("receiver", {}))
+        noise = noise_learning.from_fields(said.get("noise", {}))
+    except ValueError:
+        receiver = noise = None
+    return receiver or receiver_learning.read_learnt(folder), noise
 
 
 def _play(args: argparse.Namespace, config: Config) -> Sent:

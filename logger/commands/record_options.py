@@ -28,7 +28,8 @@ def _rate_hz(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a rate in Hz, found {text!r}; a file goes before --resample") from None
+        words = f"expected a rate in Hz, found {text!r}; a file goes before --resample"
+        raise argparse.ArgumentTypeError(words) from None
 
 
 def tell_doubts(file: Path, doubts: Iterable[str]) -> None:

@@ -101,10 +101,11 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
     with open_dump(dump) as reader:
         config = wiring.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         config = replace(config, log=replace(config.log, directory=out))
-        sensor = wiring.instrument(config.accelerometer)
+        noise = wiring.noise_for_dump(reader.header, config, place=f"{dump}:1")
+        sensor = wiring.instrument(config.accelerometer, noise)
         car = read_vehicle(config.vehicle)
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
-        facts = wiring.sidecar(config, sensor, car, known) | {"replayed_from": dump.name}
+        facts = wiring.sidecar(config, sensor, car, known, noise) | {"replayed_from": dump.name}
         out.mkdir(parents=True, exist_ok=True)
         with FolderLock(out):
             repair(out)

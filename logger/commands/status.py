@@ -64,6 +64,8 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
     ]
     if status.receiver_delay:
         lines.append(f"  receiver delay  {printable(status.receiver_delay)}")
+    if status.sensor_noise:
+        lines.append(f"  sensor noise    {printable(status.sensor_noise)}")
     if status.last_window is not None:
         lines.append(f"  last window     {_window_words(status)}")
     lines += ["", "What to do", *(f"  {line}" for line in advice(status))]

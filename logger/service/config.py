@@ -27,18 +27,22 @@ from logger.units import WINDOW_M
 
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
+AUTO = "auto"
+LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @dataclass(frozen=True)
 class AccelerometerConfig:
     """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
-    ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used."""
+    ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used;
+    ``noise_mps2`` the r.m.s. noise of one reading (None: what is usual of it, ``AUTO``: learnt)."""
 
     driver: str = DEFAULT
     vertical_axis: str = "+z"
     sections: Mapping[str, Any] = field(
         default_factory=lambda: {name: kind.settings() for name, kind in accelerometers().items()})
+    noise_mps2: float | str | None = None
 
     @property
     def kind(self) -> Accelerometer[Any]:
@@ -167,6 +171,12 @@ def _or_none(word: str, read: Read) -> Read:
     return read_or_none
 
 
+def _or_word(word: str, read: Read) -> Read:
+    """Let ``word`` stand for itself."""
+    read_rest = _or_none(word, read)
+    return lambda node: word if node.content == word else read_rest(node)
+
+
 def _file_to_write(node: Node) -> Path:
     path = node.path()
     if path.exists() and not path.is_file():
@@ -226,6 +236,7 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     readers: dict[str, Read] = {
         "driver": lambda entry: entry.choice(*kinds),
         "vertical_axis": lambda entry: entry.choice(*AXES),
+        "noise_mps2": _or_none("null", _or_word(AUTO, _number(LEAST_NOISE_MPS2, MOST_NOISE_MPS2))),
         **{name: _section_of(kind) for name, kind in kinds.items()},
     }
     read = {key: readers[key](entry) for key, entry in node.mapping(optional=readers).items()}
@@ -233,6 +244,7 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     config = AccelerometerConfig(
         read.get("driver", usual.driver), read.get("vertical_axis", usual.vertical_axis),
         {name: read.get(name, settings) for name, settings in usual.sections.items()},
+        read.get("noise_mps2", usual.noise_mps2),
     )
     try:
         config.kind.check_chosen(config.settings)

@@ -59,6 +59,11 @@ class RoughnessQueue:
         return self._estimator.noise
 
     @property
+    def noise_stretches(self) -> int:
+        """From how many stretches of road that was learnt."""
+        return self._estimator.noise_stretches
+
+    @property
     def is_empty(self) -> bool:
         """No window waits."""
         return not self._queue

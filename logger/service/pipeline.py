@@ -105,6 +105,11 @@ class Pipeline:
         """What is believed of the accelerometer's noise now; None where it is not learnt."""
         return self._roughness.noise
 
+    @property
+    def noise_stretches(self) -> int:
+        """From how many stretches of road that was learnt."""
+        return self._roughness.noise_stretches
+
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
         if self._start_us is None:

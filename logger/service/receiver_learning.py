@@ -2,14 +2,11 @@
 
 Problem: ``gps.latency_s: auto`` shall mean what was learnt, and a replay shall make the same rows. Solution: what was
 known when the service started counts until it ends, and is in the dump's header and the sidecars; what is learnt
-meanwhile goes into ``FILE_NAME`` in the folder of the logs, for the next start. It is written every few minutes, as a
-car cuts the power; a file that cannot be read is as none, and one that cannot be written is tried again.
+meanwhile goes into ``FILE_NAME`` in the folder of the logs (``learnt_file``), for the next start.
 """
 
 from __future__ import annotations
 
-import json
-import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from math import degrees
@@ -21,19 +18,16 @@ from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import heading_deg
 from logger.estimation.receiver_delay import Belief, combined
 from logger.service.config import AccelerometerConfig, GpsConfig
+from logger.service.learnt_file import LearntFile
 from logger.service.signal_chain import Axis
-from logger.store.log.atomic_file import replace_file
-from logger.units import US_PER_S
 
 FILE_NAME = "receiver-delay"
+_WHAT = "the receiver's delay"
 UNKNOWN = Belief(0.10, 0.10)
 """Before anything was learnt: receivers are late by 0.05 to 0.3 s."""
-SAVE_EVERY_US = 120 * US_PER_S
 MOST_DELAY_S = 2.0
-_LARGEST_BYTES = 1000
 _KEYS = ("latency_s", "latency_std_s", "latency_drives")
 
-log = logging.getLogger(__name__)
 
 
 def at_start(gps: GpsConfig, learnt: Belief | None) -> Belief:
@@ -64,16 +58,7 @@ def from_fields(fields: Mapping[str, Any]) -> Belief | None:
 
 def read_learnt(folder: Path) -> Belief | None:
     """What earlier drives left; None where there is nothing that can be read."""
-    try:
-        with FileSystem().open(folder / FILE_NAME) as file:
-            fields = json.loads(file.read(_LARGEST_BYTES))
-        learnt = from_fields(fields)
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        log.warning("%s: what was learnt of the receiver's delay cannot be read, it is learnt anew (%s)",
-                    folder / FILE_NAME, error)
-        return None
+    learnt = LearntFile(folder / FILE_NAME, _WHAT).read(from_fields)
     return learnt if learnt is not None and learnt.std_s > 0 else None
 
 
@@ -87,13 +72,9 @@ class ReceiverLearning:
 
     def __init__(self, folder: Path, alignment: DriveAlignment, known: Belief, learnt: Belief | None,
                  files: FileSystem | None = None) -> None:
-        self._path = folder / FILE_NAME
         self._alignment = alignment
         self._learnt = learnt
-        self._files = files or FileSystem()
-        self._saved = learnt
-        self._tried_us: int | None = None
-        self._failed = False
+        self._file = LearntFile(folder / FILE_NAME, _WHAT, files, header_fields(learnt) if learnt else None)
         self.known = known
 
     @property
@@ -110,24 +91,12 @@ class ReceiverLearning:
 
     def tend(self, now_us: int) -> None:
         """To be called now and then: saves what is new."""
-        if self._tried_us is None:
-            self._tried_us = now_us
-        if now_us - self._tried_us >= SAVE_EVERY_US:
-            self._tried_us = now_us
-            self.save()
+        self._file.tend(now_us, self.save)
 
     def save(self) -> None:
-        """Put what is learnt into its file, whole."""
-        now = self.now
-        if now is None or now == self._saved:
-            return
-        try:
-            replace_file(self._files, self._path, [(json.dumps(header_fields(now)) + "\n").encode("ascii")])
-            self._saved, self._failed = now, False
-        except OSError as error:
-            if not self._failed:
-                log.warning("%s: what was learnt cannot be written: %s", self._path, error.strerror)
-            self._failed = True
+        """Put what is learnt into its file."""
+        if (now := self.now) is not None:
+            self._file.save(header_fields(now))
 
     def words(self) -> str:
         """One line for ``ridelog status``."""

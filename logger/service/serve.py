@@ -16,11 +16,12 @@ from drivers.events import GPS, Event
 from drivers.machine import Machine
 from drivers.sources import SerialSource
 from logger.errors import BadInput
-from logger.service import wiring
+from logger.service import noise_learning, wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.listener import Listener, monotonic_us
 from logger.service.main_loop import MainLoop
+from logger.service.noise_learning import NoiseLearning
 from logger.service.receiver_learning import ReceiverLearning, at_start, read_learnt
 from logger.service.scheduling import go_first
 from logger.service.shutdown_signals import Stop
@@ -45,18 +46,20 @@ def serve(config: Config, stop: Stop) -> None:
 
 
 def _serve(config: Config, stop: Stop) -> None:
-    sensor = wiring.instrument(config.accelerometer)
+    noise = noise_learning.at_start(config.log.directory, config.accelerometer)
+    sensor = wiring.instrument(config.accelerometer, noise)
     vehicle = read_vehicle(config.vehicle)
     learnt = read_learnt(config.log.directory)
     receiver_delay = at_start(config.gps, learnt)
-    facts = wiring.sidecar(config, sensor, vehicle, receiver_delay)
-    header = wiring.dump_header(config, receiver_delay) if config.log.record_dump else None
+    facts = wiring.sidecar(config, sensor, vehicle, receiver_delay, noise)
+    header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
     limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
                       pairing=config.pairing)
     decoder = wiring.gps_decoder(config)
     pipeline = wiring.pipeline(config, sensor, vehicle, receiver_delay)
-    learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
+    delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
+    noise_progress = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
     machine = Machine(monotonic_us, time.sleep)
@@ -70,12 +73,14 @@ def _serve(config: Config, stop: Stop) -> None:
     notices = wiring.notices(vehicle)
     for notice in notices:
         log.warning("%s", notice)
-    observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, learning)
+    observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, delay_learning,
+                              noise_progress)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
         observer.write(now_us)
-        learning.tend(now_us)
+        delay_learning.tend(now_us)
+        noise_progress.tend(now_us)
         if not any(listener.hangs(now_us) for listener in listeners):
             notifier.watchdog()
         notifier.status(observer.line())
@@ -84,7 +89,8 @@ def _serve(config: Config, stop: Stop) -> None:
     beat_s = min(LONGEST_BEAT_S, watchdog_interval_s() or LONGEST_BEAT_S)
     MainLoop(core, storage, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
     notifier.stopping()
-    learning.save()
+    delay_learning.save()
+    noise_progress.save()
     observer.remove()
     log.info("stopped: %d rows written", core.rows)
 

@@ -103,6 +103,8 @@ class ServiceStatus:
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
     receiver_delay  how late fixes come, and how that is known; empty: not told; receiver_delay_s and
                     receiver_delay_std_s: as numbers, with the standard error [s]
+    sensor_noise    of the accelerometer, and how that is known, likewise; sensor_noise_mps2 and
+                    sensor_noise_std_mps2: as numbers where it was learnt [m/s2]
     """
 
     state: ServiceState
@@ -127,6 +129,9 @@ class ServiceStatus:
     receiver_delay: str = ""
     receiver_delay_s: float | None = None
     receiver_delay_std_s: float | None = None
+    sensor_noise: str = ""
+    sensor_noise_mps2: float | None = None
+    sensor_noise_std_mps2: float | None = None
 
 
 def write_status(path: Path, status: ServiceStatus) -> None:
@@ -152,7 +157,8 @@ def read_status(path: Path) -> ServiceStatus | None:
         storage = fields["storage"]
         fields["storage"] = StorageStatus(**{**storage, "notices": tuple(map(str, storage["notices"]))})
         fields["notices"] = tuple(map(str, fields["notices"]))
-        fields["receiver_delay"] = str(fields.get("receiver_delay", ""))
+        for words in ("receiver_delay", "sensor_noise"):
+            fields[words] = str(fields.get(words, ""))
         status = ServiceStatus(**fields)
     except FileNotFoundError:
         return None

@@ -11,6 +11,7 @@ from contextlib import suppress
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.listener import monotonic_us
+from logger.service.noise_learning import NoiseLearning
 from logger.service.pipeline import Pipeline
 from logger.service.receiver_learning import ReceiverLearning
 from logger.service.signal_chain import Axis
@@ -42,6 +43,7 @@ class StatusReporter:
         counters: Mapping[str, Callable[[], dict[str, int]]],
         notices: tuple[str, ...] = (),
         learning: ReceiverLearning | None = None,
+        noise: NoiseLearning | None = None,
     ) -> None:
         self._config = config
         self._core = core
@@ -50,7 +52,7 @@ class StatusReporter:
         self._sensors = {"accelerometer": accelerometer, "gps": gps}
         self._counters = counters
         self._notices = notices
-        self._learning = learning
+        self._learning, self._noise = learning, noise
         self._began_us = monotonic_us()
         self._told_us = self._began_us
         self._state_since: dict[str, tuple[str, int]] = {}
@@ -97,6 +99,7 @@ class StatusReporter:
         fix = self._core.last_fix
         storage = self._storage.status()
         delay = self._learning.shown if self._learning is not None else None
+        noise = self._noise.now if self._noise is not None else None
         place = self._config.accelerometer.kind.place(self._config.accelerometer.settings)
         return ServiceStatus(
             state=self._state(now_us),
@@ -120,6 +123,9 @@ class StatusReporter:
             receiver_delay=self._learning.words() if self._learning is not None else "",
             receiver_delay_s=delay.delay_s if delay is not None else None,
             receiver_delay_std_s=delay.std_s if delay is not None else None,
+            sensor_noise=self._noise.words() if self._noise is not None else "",
+            sensor_noise_mps2=noise.belief.noise_rms_mps2 if noise is not None else None,
+            sensor_noise_std_mps2=noise.belief.std_mps2 if noise is not None else None,
             counters={
                 "missed_samples": self._sensors["accelerometer"].missed,
                 "late_samples": self._pipeline.late_samples,

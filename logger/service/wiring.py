@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from pathlib import Path
@@ -22,7 +23,9 @@ from logger.estimation.receiver_delay import Belief
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.service.config import AXES, AccelerometerConfig, Config
+from logger.service import noise_learning
+from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
+from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.service.receiver_learning import at_start, from_fields, header_fields
 from logger.service.signal_chain import Axis, SignalChain, recorder_gain
@@ -37,8 +40,8 @@ class Instrument:
     """What the settings say about the accelerometer: its decoder, what its readings on the 100 Hz grid are, and a
     description for the logs.
 
-    noise    what is believed of the noise of a reading on the grid, which the pipeline then learns; None: the sensor's,
-             for granted
+    noise    what is believed of the noise of a reading on the grid, which the pipeline then learns; None: it is that of
+             the sensor
     """
 
     decoder: Decoder
@@ -48,15 +51,22 @@ class Instrument:
     noise: NoiseBelief | None = None
 
 
-def instrument(config: AccelerometerConfig) -> Instrument:
-    """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be."""
+def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> Instrument:
+    """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be.
+
+    known    what earlier drives told of its noise, where it is to be learnt; None: nothing
+    """
     kind, settings = config.kind, config.settings
     readings = kind.readings(settings)
-    sensor = Sensor(readings.noise_mps2, readings.step_mps2)
+    given = config.noise_mps2
+    sensor = Sensor(given if isinstance(given, float) else readings.noise_mps2, readings.step_mps2)
     if readings.oversample > 1:  # the mean of several readings is on no step any more
         sensor = Sensor(sqrt(sensor.variance_mps2_2 / readings.oversample), 0.0)
     decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
-    return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)})
+    noise = None
+    if given == AUTO:
+        noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2, sensor.step_mps2)
+    return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)}, noise)
 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
@@ -101,7 +111,8 @@ def notices(vehicle: Vehicle) -> tuple[str, ...]:
             "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
 
 
-def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> dict[str, Any]:
+def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None,
+            noise: KnownNoise | None = None) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {
         "ridelog_version": version(),
@@ -109,17 +120,25 @@ def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Beli
         "vehicle": asdict(vehicle),
         "settings": _plain(_as_written(config)),
         "receiver": header_fields(receiver or at_start(config.gps, None)),
+        **_noise_said(config.accelerometer, noise),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
 
 
-def dump_header(config: Config, receiver: Belief | None = None) -> DumpHeader:
+def _noise_said(config: AccelerometerConfig, known: KnownNoise | None) -> dict[str, Any]:
+    """For a dump's header and a sidecar: the noise that a drive began with; nothing where it is what is usual."""
+    if config.noise_mps2 is None:
+        return {}
+    return {"noise": {"noise_mps2": config.noise_mps2, **(noise_learning.header_fields(known) if known else {})}}
+
+
+def dump_header(config: Config, receiver: Belief | None = None, noise: KnownNoise | None = None) -> DumpHeader:
     """First line of a dump recorded by the live service. Its UTC start is not known: a Pi has no clock at boot."""
     gps = {"baud": config.gps.baud, **header_fields(receiver or at_start(config.gps, None))}
     sensor = config.accelerometer
     accelerometer = {"driver": sensor.driver, "vertical_axis": sensor.vertical_axis,
-                     **sensor.kind.header(sensor.settings)}
+                     **sensor.kind.header(sensor.settings), **_noise_said(sensor, noise)}
     stem = config.vehicle.stem
     is_shipped = stem in vehicle_names() and config.vehicle == vehicle_file(stem)
     return DumpHeader(None, accelerometer, gps, stem if is_shipped else str(config.vehicle))
@@ -134,15 +153,15 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
     says = header.accelerometer
     config = given or Config()
     kind = accelerometers()[says["driver"]]
-    axis = config.accelerometer.vertical_axis
+    axis, noise_mps2 = config.accelerometer.vertical_axis, config.accelerometer.noise_mps2
     if given is None:
-        axis = says.get("vertical_axis", axis)
+        axis, noise_mps2 = says.get("vertical_axis", axis), _noise_setting(says, place)
     if axis not in AXES:
         raise BadInput(f"{place}: expected 'vertical_axis' out of {', '.join(AXES)}, found {shortened(str(axis))}")
     sections = config.accelerometer.sections
     try:
         settings = kind.recorded(says, sections[kind.name], is_given=given is not None)
-        sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings})
+        sensor = AccelerometerConfig(kind.name, axis, {**sections, kind.name: settings}, noise_mps2)
         instrument(sensor)
     except SettingsError as error:
         raise BadInput(f"{place}: {error}") from None
@@ -158,6 +177,34 @@ def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header")
         return at_start(config.gps, from_fields(header.gps))
     except ValueError as error:
         raise BadInput(f"{place}: {error}") from None
+
+
+def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") -> KnownNoise | None:
+    """What was known of the sensor's noise when the recording began, where the settings want it learnt; None: nothing.
+    Raises BadInput, beginning with ``place``, where the recording says what cannot be."""
+    if config.accelerometer.noise_mps2 != AUTO:
+        return None
+    try:
+        return noise_learning.from_fields(header.accelerometer.get("noise", {}))
+    except ValueError as error:
+        raise BadInput(f"{place}: {error}") from None
+
+
+def _noise_setting(says: Mapping[str, Any], place: str) -> float | str | None:
+    """The setting that a recording was made with, by its header."""
+    said = says.get("noise", {})
+    if not isinstance(said, Mapping):
+        raise BadInput(f"{place}: expected 'noise' as an object, found {shortened(str(said))}")
+    value = said.get("noise_mps2")
+    if value is None:
+        return None
+    if "noise_std_mps2" in said or value == AUTO:
+        return AUTO
+    least, most = LEAST_NOISE_MPS2, MOST_NOISE_MPS2
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise BadInput(f"{place}: expected 'noise_mps2' from {least:g} to {most:g}, or {AUTO}, found "
+                       f"{shortened(str(value))}")
+    return float(value)
 
 
 def _vehicle_file(name: str, place: str) -> Path:

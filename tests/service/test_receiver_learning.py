@@ -15,9 +15,9 @@ from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import Belief, DelayEstimate
 from logger.service import wiring
 from logger.service.config import Config, GpsConfig
+from logger.service.learnt_file import SAVE_EVERY_US
 from logger.service.receiver_learning import (
     FILE_NAME,
-    SAVE_EVERY_US,
     UNKNOWN,
     ReceiverLearning,
     at_start,

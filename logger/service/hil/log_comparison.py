@@ -23,16 +23,15 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from math import inf, nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
-from logger.estimation.receiver_delay import Belief
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
 from logger.service.pipeline import longest_wait_us
-from logger.service.receiver_learning import from_fields
 from logger.store.log.log_writer import LogName
 from logger.store.log.row_format import read_log
 from logger.store.log.sidecar import sidecar_or_nothing
@@ -176,16 +175,10 @@ def read_sessions(directory: Path) -> list[Session]:
     return sessions
 
 
-def receiver_of_newest(directory: Path) -> Belief | None:
-    """What was known of the receiver's delay when the newest session in a folder began, by its sidecar; None where that
-    does not say it. Raises ``OSError``."""
+def newest_sidecar(directory: Path) -> dict[str, Any]:
+    """What lies beside the newest log in a folder; nothing where there is none. Raises ``OSError``."""
     logs = [(name.session, name.part, path) for path in directory.iterdir() if (name := LogName.of(path))]
-    if not logs:
-        return None
-    try:
-        return from_fields(sidecar_or_nothing(max(logs)[2]).get("receiver", {}))
-    except ValueError:
-        return None
+    return sidecar_or_nothing(max(logs)[2]) if logs else {}
 
 
 def compare(expected: Sequence[WindowRecord], sessions: Sequence[Session], bridge_s: float) -> Agreement:

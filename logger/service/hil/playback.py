@@ -34,6 +34,7 @@ from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.event_merger import EventMerger
+from logger.service.noise_learning import KnownNoise
 from logger.service.receiver_learning import at_start
 from logger.service.signal_chain import Axis
 from logger.store.formats.vehicle_file import read_vehicle
@@ -125,10 +126,12 @@ def send(
     return Sent(played_us / US_PER_S, size_bytes, (float(half), float(most), float(all_of_them)))
 
 
-def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief | None = None) -> list[WindowRecord]:
+def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief | None = None,
+                  noise: KnownNoise | None = None) -> list[WindowRecord]:
     """The rows that a service with these settings makes of the recording; all have UTC when any has.
 
-    receiver    what the service knew of the receiver's delay when it began; None: as before any drive
+    receiver, noise    what the service knew of the receiver's delay and of the sensor's noise when it began; None: as
+                       before any drive
 
     Raises BadInput for settings under which the service does not listen to what the wires bring.
     """
@@ -143,7 +146,7 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief
             raise BadInput(f"the service's settings: expected the {key} {value}, as which the bytes of the "
                            f"{recording.bridged} are sent, found {found}")
     config = wiring.config_for_dump(recording.header, config, None, place)
-    instrument = wiring.instrument(config.accelerometer)
+    instrument = wiring.instrument(config.accelerometer, noise)
     rows = _Rows()
     # As the service began, not as the recording: the header's delay is that of another drive.
     belief = at_start(config.gps, receiver)

@@ -43,7 +43,7 @@ def core_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCor
 
 def parts_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows, Pipeline]:
     config = wiring.config_for_dump(header, config, None)
-    sensor = wiring.instrument(config.accelerometer)
+    sensor = wiring.instrument(config.accelerometer, wiring.noise_for_dump(header, config))
     vehicle = read_vehicle(config.vehicle)
     rows = Rows()
     pipeline = wiring.pipeline(config, sensor, vehicle, wiring.receiver_for_dump(header, config))

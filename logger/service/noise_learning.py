@@ -1,0 +1,132 @@
+"""The accelerometer's noise from drive to drive: what a drive begins with, what it learns, and the file in between.
+
+Problem: ``accelerometer.noise_mps2: auto`` shall mean what was learnt of this very sensor, and a replay shall make the
+same rows. Solution: where the service begins is in the dump's header and the sidecars; from there on the pipeline
+learns from the readings themselves, in a replay as on board. What it comes to goes into ``FILE_NAME`` in the folder of
+the logs (``learnt_file``), for the next start, with what the sensor was set to: of another range it says nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite, log
+from pathlib import Path
+from typing import Any, Protocol
+
+from drivers.disk import FileSystem
+from logger.estimation.noise_belief import NoiseBelief
+from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig
+from logger.service.learnt_file import LearntFile
+
+FILE_NAME = "sensor-noise"
+_WHAT = "the sensor's noise"
+_KEYS = ("noise_mps2", "noise_std_mps2", "noise_drives")
+_OF = "of"
+
+
+@dataclass(frozen=True)
+class KnownNoise:
+    """What is believed of the noise of a reading on the 100 Hz grid, over how many drives it was learnt."""
+
+    belief: NoiseBelief
+    drives: int = 0
+
+
+class LearnsNoise(Protocol):
+    """That which learns while it drives."""
+
+    @property
+    def noise(self) -> NoiseBelief | None: ...
+    @property
+    def noise_stretches(self) -> int: ...
+
+
+def header_fields(known: KnownNoise) -> dict[str, Any]:
+    """For the dump's header and the sidecar."""
+    belief = known.belief
+    return dict(zip(_KEYS, (belief.noise_rms_mps2, belief.std_mps2, known.drives), strict=True))
+
+
+def from_fields(fields: Mapping[str, Any]) -> KnownNoise | None:
+    """What ``header_fields`` said; None where nothing is said. ValueError for what cannot be."""
+    if not isinstance(fields, Mapping):
+        raise ValueError("expected an object")
+    if _KEYS[1] not in fields:
+        return None
+    noise, std, drives = (fields.get(key, 0) for key in _KEYS)
+    numbers = [one for one in (noise, std) if isinstance(one, (int, float)) and not isinstance(one, bool)]
+    if len(numbers) < 2 or not all(isfinite(one) and 0 < one <= MOST_NOISE_MPS2 for one in numbers) \
+            or noise < LEAST_NOISE_MPS2 or isinstance(drives, bool) or not isinstance(drives, int) \
+            or not 0 <= drives < 10**9:
+        raise ValueError(f"expected {_KEYS[0]} and {_KEYS[1]} from {LEAST_NOISE_MPS2:g} to {MOST_NOISE_MPS2:g}, and a "
+                         "number of drives")
+    return KnownNoise(NoiseBelief(log(noise), std / noise), drives)
+
+
+def read_learnt(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
+    """What earlier drives left of this sensor as it is set; None where there is nothing that can be read."""
+    def meaning(fields: Any) -> KnownNoise | None:
+        known = from_fields(fields)
+        return known if known is not None and fields.get(_OF) == _identity(config) else None
+
+    return LearntFile(folder / FILE_NAME, _WHAT).read(meaning)
+
+
+def at_start(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
+    """What a session begins with, where the noise is to be learnt: what earlier drives left in the folder, a little
+    less certain than it was then. None: nothing is known, or it is not to be learnt."""
+    learnt = read_learnt(folder, config) if config.noise_mps2 == AUTO else None
+    return learnt and KnownNoise(learnt.belief.next_drive(), learnt.drives)
+
+
+def _identity(config: AccelerometerConfig) -> dict[str, Any]:
+    """What the sensor is and how it is read, as far as its noise depends on that."""
+    return {"driver": config.driver, **config.kind.header(config.settings)}
+
+
+class NoiseLearning:
+    """Carries a session's learning on.
+
+    folder     of the logs
+    pipeline   that which learns
+    config     of the accelerometer
+    known      what the session began with; None: nothing was known
+    """
+
+    def __init__(self, folder: Path, pipeline: LearnsNoise, config: AccelerometerConfig, known: KnownNoise | None,
+                 files: FileSystem | None = None) -> None:
+        self._pipeline, self._config, self._known = pipeline, config, known
+        self._file = LearntFile(folder / FILE_NAME, _WHAT, files)
+
+    @property
+    def now(self) -> KnownNoise | None:
+        """What is known by now, with this session; None: nothing yet, or it is not to be learnt."""
+        belief = self._pipeline.noise
+        if belief is None or not self._pipeline.noise_stretches:
+            return self._known
+        return KnownNoise(belief, 1 + (self._known.drives if self._known else 0))
+
+    def tend(self, now_us: int) -> None:
+        """To be called now and then: saves what is new."""
+        self._file.tend(now_us, self.save)
+
+    def save(self) -> None:
+        """Put what is learnt into its file."""
+        now = self.now
+        if now is not None and now is not self._known:
+            self._file.save({**header_fields(now), _OF: _identity(self._config)})
+
+    def words(self) -> str:
+        """One line for ``ridelog status``."""
+        noise = self._config.noise_mps2
+        if noise is None:
+            usual = self._config.kind.readings(self._config.settings).noise_mps2
+            return f"{usual:.3g} m/s2, usual of this sensor (noise_mps2: auto learns it)"
+        if noise != AUTO:
+            return f"{noise:.3g} m/s2 by the settings"
+        now = self.now
+        if now is None:
+            return "not known yet, it is learnt while driving"
+        drives = "1 drive" if now.drives == 1 else f"{now.drives} drives"
+        return f"{now.belief.noise_rms_mps2:.2g} +- {now.belief.std_mps2:.1g} m/s2, learnt over {drives}"

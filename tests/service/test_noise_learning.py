@@ -1,0 +1,173 @@
+"""The accelerometer's noise from drive to drive: settings, file, header, sidecar, words, and rows that replay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import log
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.accelerometers.bma220 import Bma220Config
+from drivers.dump import DumpHeader, Event, open_dump
+from logger.errors import BadInput
+from logger.estimation.noise_belief import NoiseBelief
+from logger.service import wiring
+from logger.service.config import AUTO, AccelerometerConfig, Config, load_config
+from logger.service.noise_learning import (
+    FILE_NAME,
+    KnownNoise,
+    NoiseLearning,
+    at_start,
+    from_fields,
+    header_fields,
+    read_learnt,
+)
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+
+from ..support.drives.replay import parts_for, rows_of
+
+LEARNS = AccelerometerConfig(noise_mps2=AUTO)
+KNOWN = KnownNoise(NoiseBelief(log(0.15), 0.06), 3)
+DRIVEN_MPS2 = 0.1  # that of the demo's drives
+
+
+class Drive:
+    """A pipeline that has learnt so much."""
+
+    def __init__(self, belief: NoiseBelief | None, stretches: int) -> None:
+        self.noise, self.noise_stretches = belief, stretches
+
+
+LEARNT = Drive(NoiseBelief(log(0.2), 0.04), 12)
+NOTHING = Drive(NoiseBelief(log(0.3), 1.0), 0)
+
+
+def config_of(text: str, folder: Path) -> Config:
+    path = folder / "ridelog.yaml"
+    path.write_text(text)
+    return load_config(path)
+
+
+@pytest.fixture(scope="module")
+def recorded(short_dump: Path) -> tuple[DumpHeader, list[Event]]:
+    with open_dump(short_dump) as reader:
+        return reader.header, list(reader)
+
+
+@pytest.mark.parametrize(("text", "noise"), [("", None), ("noise_mps2: null", None), ("noise_mps2: auto", AUTO),
+                                             ("noise_mps2: 0.15", 0.15)])
+def test_the_setting(tmp_path: Path, text: str, noise: float | str | None) -> None:
+    config = config_of(f"accelerometer:\n  driver: bma220\n  {text}\n", tmp_path).accelerometer
+    assert config.noise_mps2 == noise
+    sensor = wiring.instrument(config)
+    assert sensor.sensor.noise_rms_mps2 == (0.15 if noise == 0.15 else 0.1)
+    assert (sensor.noise is not None) == (noise == AUTO)
+
+
+@pytest.mark.parametrize("value", ["Auto", "0", "-0.1", "1000", "0.1 m/s2", "[]", "nan"])
+def test_a_setting_that_cannot_be_is_refused(tmp_path: Path, value: str) -> None:
+    with pytest.raises(BadInput, match=r"ridelog\.yaml:2: expected (null or auto or )?a number"):
+        config_of(f"accelerometer:\n  noise_mps2: {value}\n", tmp_path)
+
+
+def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
+    assert at_start(tmp_path, LEARNS) is None
+    NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
+    first = read_learnt(tmp_path, LEARNS)
+    assert first is not None
+    assert (first.belief.noise_rms_mps2, first.drives) == (pytest.approx(0.2), 1)
+    begun = at_start(tmp_path, LEARNS)
+    assert begun is not None and begun.belief.log_std > first.belief.log_std
+    NoiseLearning(tmp_path, LEARNT, LEARNS, begun).save()
+    again = read_learnt(tmp_path, LEARNS)
+    assert again is not None and again.drives == 2
+    assert at_start(tmp_path, AccelerometerConfig()) is None  # it is not to be learnt
+
+
+def test_of_a_sensor_that_is_set_otherwise_nothing_is_known(tmp_path: Path) -> None:
+    NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
+    ranged = replace(LEARNS, sections={**LEARNS.sections, "bma220": Bma220Config(range_g=8)})
+    assert read_learnt(tmp_path, ranged) is None
+    assert read_learnt(tmp_path, replace(LEARNS, driver="pasco")) is None
+
+
+@pytest.mark.parametrize("drive", [NOTHING, Drive(None, 0)])
+def test_nothing_learnt_writes_nothing(tmp_path: Path, drive: Drive) -> None:
+    NoiseLearning(tmp_path, drive, LEARNS, KNOWN).save()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("text", [
+    "", "{", "[]", "null", "\xff", '{"noise_mps2": 0.1}', '{"noise_mps2": "x", "noise_std_mps2": 0.1}',
+    '{"noise_mps2": 0.1, "noise_std_mps2": 0, "noise_drives": 1}', '{"noise_mps2": NaN, "noise_std_mps2": 0.1}',
+    '{"noise_mps2": 0.1, "noise_std_mps2": 0.1, "noise_drives": 1.5}', '{"noise_mps2": 0, "noise_std_mps2": 0.1}'])
+def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
+    (tmp_path / FILE_NAME).write_bytes(text.encode("latin-1"))
+    assert read_learnt(tmp_path, LEARNS) is None
+
+
+def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
+    config = Config(accelerometer=LEARNS)
+    header = wiring.dump_header(config, noise=KNOWN)
+    assert wiring.config_for_dump(header, None, None).accelerometer.noise_mps2 == AUTO
+    found = wiring.noise_for_dump(header, config)
+    assert found is not None and found.drives == 3
+    assert found.belief.noise_rms_mps2 == pytest.approx(0.15) and found.belief.log_std == pytest.approx(0.06)
+    assert wiring.noise_for_dump(header, Config()) is None  # settings that do not want it learnt
+    car = read_vehicle(vehicle_file("rav4-2009"))
+    facts = wiring.sidecar(config, wiring.instrument(LEARNS, KNOWN), car, noise=KNOWN)
+    assert from_fields(facts["noise"]) == from_fields(header_fields(KNOWN))
+    assert "noise" not in wiring.sidecar(Config(), wiring.instrument(AccelerometerConfig()), car)
+    first = wiring.dump_header(config)
+    assert wiring.config_for_dump(first, None, None).accelerometer.noise_mps2 == AUTO
+    assert wiring.noise_for_dump(first, config) is None
+    fixed = wiring.dump_header(Config(accelerometer=AccelerometerConfig(noise_mps2=0.2)))
+    assert wiring.config_for_dump(fixed, None, None).accelerometer.noise_mps2 == 0.2
+
+
+@pytest.mark.parametrize("noise", ["loud", 3, {"noise_mps2": -1}, {"noise_mps2": True}, {"noise_mps2": [1]},
+                                   {"noise_mps2": 0.1, "noise_std_mps2": -1}])
+def test_a_header_that_cannot_be_is_refused(noise: Any) -> None:
+    header = DumpHeader(None, {"driver": "bma220", "noise": noise}, {"baud": 9600}, "rav4-2009")
+    with pytest.raises(BadInput, match=r"drive\.dump:1: expected"):
+        config = wiring.config_for_dump(header, None, None, "drive.dump:1")
+        wiring.noise_for_dump(header, config, "drive.dump:1")
+
+
+def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader, list[Event]], tmp_path: Path) -> None:
+    header, events = recorded
+    auto = replace(header, accelerometer={**header.accelerometer, "noise": {"noise_mps2": AUTO}})
+    core, _, pipeline = parts_for(auto)
+    for event in events:
+        core.feed(event)
+    core.finish()
+    config = wiring.config_for_dump(auto, None, None).accelerometer
+    NoiseLearning(tmp_path, pipeline, config, None).save()
+    learnt = read_learnt(tmp_path, config)
+    assert learnt is not None
+    assert abs(learnt.belief.noise_rms_mps2 - DRIVEN_MPS2) < 2 * learnt.belief.std_mps2
+
+
+def test_a_recording_replays_with_what_its_drive_began_with(recorded: tuple[DumpHeader, list[Event]]) -> None:
+    header, events = recorded[0], recorded[1][:20000]
+    loud = KnownNoise(NoiseBelief(log(0.4), 0.02), 5)
+    said = replace(header, accelerometer={**header.accelerometer, "noise": header_fields(loud)})
+    rows = rows_of(said, events).rows
+    assert rows == rows_of(said, events).rows
+    assert rows != rows_of(header, events).rows
+    usual = {**header.accelerometer, "noise": {"noise_mps2": 0.1}}
+    assert rows_of(replace(header, accelerometer=usual), events).rows == rows_of(header, events).rows
+
+
+def test_status_says_it_in_words(tmp_path: Path) -> None:
+    def words(config: AccelerometerConfig, drive: Drive = NOTHING, known: KnownNoise | None = None) -> str:
+        return NoiseLearning(tmp_path, drive, config, known).words()
+
+    assert words(AccelerometerConfig()) == "0.1 m/s2, usual of this sensor (noise_mps2: auto learns it)"
+    assert words(AccelerometerConfig(noise_mps2=0.15)) == "0.15 m/s2 by the settings"
+    assert words(LEARNS) == "not known yet, it is learnt while driving"
+    assert words(LEARNS, known=KNOWN) == "0.15 +- 0.009 m/s2, learnt over 3 drives"
+    assert words(LEARNS, LEARNT) == "0.2 +- 0.008 m/s2, learnt over 1 drive"
