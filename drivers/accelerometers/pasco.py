@@ -45,10 +45,10 @@ class _FrameReader:
     """Bytes to samples by a frame layout."""
 
     def __init__(self, layout: FrameLayout) -> None:
-        told_by_gravity = layout.upright_axis is not None and not layout.sync
+        set_by_gravity = layout.upright_axis is not None and not layout.sync
         self._layout = layout
         self.framer = FixedFramer(
-            layout.length_bytes, layout.plausible, layout.oriented if told_by_gravity else None, layout.sync
+            layout.length_bytes, layout.plausible, layout.oriented if set_by_gravity else None, layout.sync
         )
 
     def read(self, data: bytes) -> list[_Found]:

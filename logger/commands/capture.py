@@ -109,8 +109,8 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
     look = bytearray()
     total = 0
     source = line_reader().name
-    start_us = told_us = now_us()
-    told_bytes = 0
+    start_us = shown_us = now_us()
+    shown_bytes = 0
     fault = None
     while not stopped() and (seconds is None or now_us() - start_us < seconds * US_PER_S):
         try:
@@ -123,10 +123,10 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
             writer.write(Event(at_us, source, data))
             look += data[:_LOOK_BYTES - len(look)]
             total += len(data)
-        if at_us - told_us >= US_PER_S:
-            rate = (total - told_bytes) * US_PER_S / (at_us - told_us)
+        if at_us - shown_us >= US_PER_S:
+            rate = (total - shown_bytes) * US_PER_S / (at_us - shown_us)
             print(f"\r{total} bytes, {rate:.0f} bytes/s   ", end="", file=sys.stderr, flush=True)
-            told_us, told_bytes = at_us, total
+            shown_us, shown_bytes = at_us, total
             writer.flush(sync=True)
     return bytes(look), total, (now_us() - start_us) / US_PER_S, fault
 

@@ -89,9 +89,9 @@ def run(args: argparse.Namespace) -> int:
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")
-    told = as_json(str(args.run), found, list(map(str, files))) | checks_json(checked)
-    print(json.dumps(told, allow_nan=False) if args.json else
-          "\n".join([*checks_lines(checked), *lines(found, told)]))
+    summary = as_json(str(args.run), found, list(map(str, files))) | checks_json(checked)
+    print(json.dumps(summary, allow_nan=False) if args.json else
+          "\n".join([*checks_lines(checked), *lines(found, summary)]))
     tell_doubts(args.run, (doubt.words for doubt in checked.doubts))
     if args.profile_out is not None and not files:
         print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "

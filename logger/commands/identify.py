@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     except NotIdentifiable as refusal:
         if not args.json:
             raise
-        print(json.dumps(_nothing_told(refusal), allow_nan=False))
+        print(json.dumps(_refusal_json(refusal), allow_nan=False))
         print(f"ridelog: {refusal}", file=sys.stderr)
         return EXIT_CHECK_FAILED
     if args.out is not None:
@@ -181,7 +181,7 @@ def _drive(path: Path, flat_will_do: bool) -> tuple[Drive, Track | None]:
 # --- what is told ---
 
 
-def _nothing_told(refusal: NotIdentifiable) -> dict[str, Any]:
+def _refusal_json(refusal: NotIdentifiable) -> dict[str, Any]:
     return {"parameters": {}, "standard_errors": {}, "error_before": refusal.error_before, "error_after": None,
             "converged": False, "cannot_tell": [finding.words for finding in refusal.findings]}
 

@@ -246,17 +246,17 @@ def _list_effects(as_json: bool) -> None:
     from logger.store.formats.effect_file import shipped_effects
 
     if as_json:
-        print(json.dumps({"effects": [_told(effect) for effect in shipped_effects().values()]}))
+        print(json.dumps({"effects": [_effect_json(effect) for effect in shipped_effects().values()]}))
     else:
         print("\n\n".join(map(_effect_in_words, shipped_effects().values())))
 
 
-def _told(effect: Effect) -> dict[str, Any]:
-    return {"name": effect.name, "title": effect.title, "parameters": list(map(_parameter_told, effect.parameters)),
+def _effect_json(effect: Effect) -> dict[str, Any]:
+    return {"name": effect.name, "title": effect.title, "parameters": list(map(_parameter_json, effect.parameters)),
             "source": effect.source, "signature": effect.signature, "shown_by": effect.shown_by}
 
 
-def _parameter_told(one: Parameter) -> dict[str, Any]:
+def _parameter_json(one: Parameter) -> dict[str, Any]:
     from math import isinf
 
     vanishes = "infinity" if one.null is not None and isinf(one.null) else one.null

@@ -41,7 +41,7 @@ class Windows:
     speed_mps          (n,) mean speed over each [m/s]
     iri_m_per_km       (n,) NaN where it is not known, ``flags`` say why
     iri_std_m_per_km   (n,) its standard error, NaN likewise
-    told               (n,) share of the variance of the IRI's slope that the readings tell
+    resolved           (n,) share of the variance of the IRI's slope that the readings tell
     flags              n sets of words
     """
 
@@ -49,7 +49,7 @@ class Windows:
     speed_mps: Array
     iri_m_per_km: Array
     iri_std_m_per_km: Array
-    told: Array
+    resolved: Array
     flags: tuple[frozenset[str], ...]
 
 
@@ -102,7 +102,7 @@ def estimated(
         _mean_speed(edges_m[:-1], edges_m[1:], distance_m),
         np.array([one.iri_m_per_km for one in found]),
         np.array([one.iri_std_m_per_km for one in found]),
-        np.array([one.told for one in found]),
+        np.array([one.resolved for one in found]),
         tuple(one.flags for one in found),
     ), road_profile(pieces, _mean_speed(starts_m, starts_m + lengths_m, distance_m))
 

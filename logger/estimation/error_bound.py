@@ -7,13 +7,13 @@ Solution. The Golden Car's slope y on a random road is a Gaussian process. The b
 Wiener filter's mean, which leaves an error independent of it; its best value for the window's IRI is the mean of |y|
 over what it knows. The variance of that value from window to window has a closed form. Two draws y and y' from what is
 known are each as likely as the truth, and E[E(|y(x)| | readings) E(|y(x + l)| | readings)] = E |y(x) y'(x + l)|. They
-are jointly Gaussian, with the covariance of what the readings tell: its spectrum is that of y times the share told.
+are jointly Gaussian, with the covariance of what the readings tell: its spectrum is that of y times the share resolved.
 For two Gaussian variables of variance V and correlation r
 
     cov(|a|, |b|) = 2 V / pi (sqrt(1 - r^2) + r asin(r) - 1)
 
 (as in ``logger.roads.gd_iri``), so its integral over a window gives the variance of the windows' exact IRI with the
-correlation of y, and that of the best values with the correlation told. The mean squared error is their difference.
+correlation of y, and that of the best values with the correlation resolved. The mean squared error is their difference.
 
 Rounding counts as white noise of step / sqrt(12). Where the noise does not blur the steps of a coarse sensor that is
 not what rounding does, and an estimator that takes it as bounds can do a little better than this says.
@@ -82,12 +82,12 @@ class Limits:
         """For a steady speed, above 0, on road of this spectrum."""
         psd = spectrum.psd(self._wave_number_cpm)
         signal = self._gain_power(speed_mps) * psd
-        told = signal / (signal + reading_noise_psd(self._variance, RATE_HZ, speed_mps))
+        resolved = signal / (signal + reading_noise_psd(self._variance, RATE_HZ, speed_mps))
         covariance = np.fft.irfft(self._slope_power * psd, self._count)
-        covariance_told = np.fft.irfft(self._slope_power * psd * told, self._count)
+        covariance_resolved = np.fft.irfft(self._slope_power * psd * resolved, self._count)
         variance = float(covariance[0])
         exact = self._window_variance(covariance / variance)
-        best = self._window_variance(covariance_told / variance)
+        best = self._window_variance(covariance_resolved / variance)
         mean = sqrt(2 / pi * variance)
         return Limit(
             PER_KM * mean, PER_KM * mean * sqrt(exact), PER_KM * mean * sqrt(max(exact - best, 0.0))

@@ -43,21 +43,22 @@ class Belief:
 
 
 def learnt(
-    belief: Belief, power: Array, told: Array, wave_number_cpm: Array, seen_share: float, before: RoadSpectrum | None
+    belief: Belief, power: Array, resolved: Array, wave_number_cpm: Array, seen_share: float,
+    before: RoadSpectrum | None,
 ) -> Belief:
     """One scoring step for level and waviness.
 
-    power         (k,) of each wave of the white innovations, where 1 is expected of a wave that is fully told
-    told          (k,) share of each wave that the readings tell where the road was read
+    power         (k,) of each wave of the white innovations, where 1 is expected of a wave that is fully resolved
+    resolved      (k,) share of each wave that the readings tell where the road was read
     seen_share    of the distance grid, where the car was read
     before        the spectrum of the stretch before; None: there was none
     """
-    used = told > 0
-    power, told = power[used], told[used]
+    used = resolved > 0
+    power, resolved = power[used], resolved[used]
     tilt = -np.log(np.maximum(wave_number_cpm[used], FLATTENED_BELOW_CPM) / PIVOT_CPM)
     slopes = np.stack([np.ones(len(tilt)), tilt])
-    gradient = slopes @ (power - seen_share * told)
-    curvature = (slopes * (seen_share * told**2)) @ slopes.T
+    gradient = slopes @ (power - seen_share * resolved)
+    curvature = (slopes * (seen_share * resolved**2)) @ slopes.T
     now = np.array([belief.spectrum.log_level, belief.spectrum.waviness])
     for centre, deviations in _priors(before):
         precision = np.array(deviations) ** -2.0
@@ -77,9 +78,9 @@ def _priors(before: RoadSpectrum | None) -> list[tuple[RoadSpectrum, tuple[float
     return [common] if before is None else [common, (before, (_LEVEL_STEP, _WAVINESS_STEP))]
 
 
-def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: float) -> Belief:
+def with_noise(belief: Belief, residual_mps2: Array, weight: Array, resolved_waves: float) -> Belief:
     """One scoring step for the noise, by ``noise_slope``."""
-    slope, free = noise_slope(residual_mps2, weight, told_waves)
+    slope, free = noise_slope(residual_mps2, weight, resolved_waves)
     if not free:
         return belief
     gradient = slope - belief.log_noise / _NOISE_DEVIATION**2
@@ -88,14 +89,14 @@ def with_noise(belief: Belief, residual_mps2: Array, weight: Array, told_waves: 
     return replace(belief, log_noise=max(log_noise, _LEAST_LOG_NOISE))
 
 
-def noise_slope(residual_mps2: Array, weight: Array, told_waves: float) -> tuple[float, float]:
+def noise_slope(residual_mps2: Array, weight: Array, resolved_waves: float) -> tuple[float, float]:
     """Slope of the log evidence in the log noise variance, and the readings that were free to tell of it (half of them
     are its curvature), 0 where there were too few; from the typical second: a pothole that is not explained yet is no
     noise.
 
     residual_mps2    (t,) readings less what the solution explains, 100 a second
     weight           (t,) that they had, with the noise of which the slope is asked
-    told_waves       how many readings' worth the road took: twice the sum of told shares over seen waves
+    resolved_waves   degrees of freedom that the road took: twice the sum of resolved shares over seen waves
 
     Only what recorders pass is looked at: noise that was thinned out to 100 Hz has nothing above.
     """
@@ -109,7 +110,7 @@ def noise_slope(residual_mps2: Array, weight: Array, told_waves: float) -> tuple
         return 0.0, 0.0
     typical = float(np.median((sums / np.maximum(counts, 1))[counts > _SECOND // 2]))
     in_band_count = _BAND_SHARE * float(np.count_nonzero(weight))
-    free = max(in_band_count - told_waves, 1.0)
+    free = max(in_band_count - resolved_waves, 1.0)
     excess = typical * in_band_count / (_BAND_SHARE * free) - 1
     return 0.5 * free * excess, free
 

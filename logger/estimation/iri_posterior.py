@@ -37,7 +37,7 @@ def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> floa
     return 2 * variance / rate_hz * speed_mps
 
 
-def told_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
+def resolved_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
     """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings tell."""
     signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
     return signal / (signal + noise_psd)
@@ -74,7 +74,7 @@ class SlopeKnowledge:
     correlation: Array
 
     @property
-    def told(self) -> float:
+    def resolved(self) -> float:
         """Share of the variance that the readings tell."""
         return 1 - self.left / self.variance
 
@@ -90,8 +90,8 @@ class SlopeErrors:
     def at(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> SlopeKnowledge:
         """For readings of this variance [(m/s2)2] at this speed [m/s]."""
         prior = _SLOPE_POWER * spectrum.psd(WAVE_NUMBERS_CPM)
-        told = told_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
-        left = (prior * (1 - told)) @ self._waves
+        resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
+        left = (prior * (1 - resolved)) @ self._waves
         return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0])
 
 
@@ -132,7 +132,7 @@ def window_iri(
     mean = float(weight @ absolute)
     own = sqrt(variance_of_mean_absolute(slope, deviation, knowledge.correlation, weight))
     # Were the level higher, more of the readings would be taken for road, and more be left open.
-    stretched = slope * (louder.told / max(knowledge.told, 1e-3))
+    stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
     shared = (more - mean) / _LEVEL_TRIAL * log_level_std
     change = float(absolute[-1] - absolute[0]) / length_m

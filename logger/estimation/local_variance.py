@@ -60,16 +60,16 @@ class LocalRoughness:
         gain           (n // 2 + 1,) information over prior of each wave where d is 1
         seen           (n,) 1 where the road was read, else 0
         """
-        told = np.interp(np.log(before), _LOG_TABLE, self._told_by_point(gain, len(before))) * seen
+        resolved = np.interp(np.log(before), _LOG_TABLE, self._resolved_by_point(gain, len(before))) * seen
         power = self._smoothed(innovations**2 * seen)
-        weight = self._smoothed(told)
+        weight = self._smoothed(resolved)
         fresh = (_COMMON + power) / (_COMMON + weight)
         log_new = _TAKEN_OVER * np.log(fresh) + (1 - _TAKEN_OVER) * np.log(before)
         log_new = np.where(self._smoothed(seen) > 0, np.clip(log_new, _SMALLEST_LOG, _LARGEST_LOG), 0.0)
         self._first = first
         self._known = RelativeVariance(np.exp(log_new), self._log_error(log_new, weight, seen > 0))
 
-    def _told_by_point(self, gain: Array, count: int) -> Array:
+    def _resolved_by_point(self, gain: Array, count: int) -> Array:
         """Share of a point's innovation that the readings tell, for each d of the table: the mean over all waves."""
         strength = np.exp(_LOG_TABLE)[:, None] * gain
         share: Array = (strength / (1 + strength)).sum(axis=1) * 2 / count
@@ -91,7 +91,7 @@ class LocalRoughness:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * kernel, len(row)), 0.0)
 
 
-def mean_told(gain: Array, variance: Array) -> Array:
+def mean_resolved(gain: Array, variance: Array) -> Array:
     """Share of each wave that the readings tell, mean over points of relative variance d (n,)."""
     if not len(variance):
         return gain / (1 + gain)

@@ -94,7 +94,7 @@ class NoiseLearner:
         self._least = log(LEAST_SHARE_OF_STEP * step_mps2) if step_mps2 else -inf
         self._mean = max(before.log_mean, self._least)
         self._information = before.log_std**-2
-        self._told = 0.0
+        self._evidence = 0.0
         self._scatter = 0.0
         self._stretches = 0
 
@@ -110,7 +110,7 @@ class NoiseLearner:
         step = max(min(max(step, -_LARGEST_STEP), _LARGEST_STEP), self._least - self._mean)
         kept = (1 - _FORGOTTEN_PER_STRETCH) * exp(-_FORGOTTEN_PER_STEP * abs(step))
         self._information = max(kept * self._information, UNKNOWN_LOG_STD**-2) + score.information
-        self._told = kept * self._told + score.information
+        self._evidence = kept * self._evidence + score.information
         self._scatter = kept * self._scatter + slope**2
         self._mean += step
         self._stretches += 1
@@ -122,8 +122,8 @@ class NoiseLearner:
         own = self._information**-0.5
         if not self._stretches:
             return NoiseBelief(self._mean, own)
-        expected = _EXPECTED_STRETCHES / self._stretches * self._told
-        excess = (self._scatter + expected) / (self._told + expected)
+        expected = _EXPECTED_STRETCHES / self._stretches * self._evidence
+        excess = (self._scatter + expected) / (self._evidence + expected)
         noise_mps2 = exp(self._mean)
         std = hypot(own * sqrt(max(excess, 1.0)), _MODEL_LOG_STD, _ROUGH_LOG_STD * (self._step_mps2 / noise_mps2)**2)
         if noise_mps2 < _BOUND_BELOW_SHARE_OF_STEP * self._step_mps2:

@@ -60,7 +60,7 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
-def left_by_others(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
+def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
     """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
     variance (t,) of even readings that tell as much [(m/s2)2].
 

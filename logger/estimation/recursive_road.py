@@ -17,15 +17,15 @@ import numpy.typing as npt
 from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
-from logger.estimation.local_variance import LocalRoughness, mean_told
+from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner, NoiseScore
 from logger.estimation.noise_evidence import interval_score
 from logger.estimation.quantisation import (
     Readings,
     bounds,
+    cavity,
     first_guess,
     improved,
-    left_by_others,
     unexplained,
     without_own,
 )
@@ -61,7 +61,7 @@ class FollowedRoad:
     """One road after another, as one car and one sensor find them, on a distance grid of ``spacing_m``.
 
     vehicle_error    share that each axle's gain may be off, because no file fits a car
-    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's, for granted
+    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's is right
     """
 
     def __init__(
@@ -157,28 +157,29 @@ class FollowedRoad:
         typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain = solution.gain
         if self._is_coarse:
-            others, even = self._left_by_others(block, variance)
+            others, even = self._cavity(block, variance)
             if moving.any():
                 uneven, typical = typical, 1 / float((1 / even[moving]).mean())
                 gain = gain * (uneven / typical)
 
         innovations = np.fft.irfft(solution.waves, block.count)
-        told = mean_told(gain, local[seen > 0])
+        resolved = mean_resolved(gain, local[seen > 0])
         # A lone obstacle is no level: an innovation counts for the level with at most some expected deviations.
-        expected = sqrt(2 * float(told.sum()) / block.count)
+        expected = sqrt(2 * float(resolved.sum()) / block.count)
         white = np.clip(innovations / np.sqrt(local), -_MOST_DEVIATIONS * expected, _MOST_DEVIATIONS * expected)
         power = np.abs(np.fft.rfft(white)) ** 2 / block.count
-        self._belief = learnt(self._belief, power, told, block.wave_number_cpm, seen_share, before)
+        self._belief = learnt(self._belief, power, resolved, block.wave_number_cpm, seen_share, before)
         self._local.learn(first, innovations, local, gain, seen)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._belief.spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
             self._gaussian = self._improved(readings, samples, read, solution, others, usable)
         else:
-            residual, told_waves = readings.value_mps2 - solution.fitted_mps2, 2 * seen_share * float(told.sum())
-            self._belief = with_noise(self._belief, residual, weight, told_waves)
+            residual = readings.value_mps2 - solution.fitted_mps2
+            resolved_waves = 2 * seen_share * float(resolved.sum())
+            self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
-                self._learn_from_residual(noise_slope(residual, weight, told_waves), weight)
+                self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
         return SolvedBlock(solution.road, typical)
 
     def _as_gaussian(self, samples: Samples) -> Readings:
@@ -200,15 +201,15 @@ class FollowedRoad:
             self._learn_from_bounds(*expected, low, high, usable)
         return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
 
-    def _left_by_others(self, block: Block, variance: Array) -> tuple[Array, Array]:
-        """``left_by_others`` in a block whose readings have variances (t,)."""
+    def _cavity(self, block: Block, variance: Array) -> tuple[Array, Array]:
+        """``cavity`` of a block whose readings have variances (t,)."""
         speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
 
         def left(even: float) -> float:
             noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
             return acceleration_variance_left(self._car, speed_mps, spectrum, noise_psd)
 
-        return left_by_others(left, variance)
+        return cavity(left, variance)
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""
@@ -218,10 +219,10 @@ class FollowedRoad:
         expected, others, low, high = (row[part][inner] for row in (expected, others, low, high))
         self._believe(interval_score(expected, others, low, high, self._sensor.noise_rms_mps2))
 
-    def _learn_from_residual(self, told: tuple[float, float], weight: Array) -> None:
-        """What a block says of the noise, as far as its readings are new; ``told`` as ``noise_slope`` gives it for a
+    def _learn_from_residual(self, slope_and_freedom: tuple[float, float], weight: Array) -> None:
+        """What a block says of the noise, as far as its readings are new: slope and freedom of ``noise_slope`` for a
         weight (t,). The car's own error, if it has one, counts as noise."""
-        slope, free = told
+        slope, free = slope_and_freedom
         if not free:
             return
         share = min(self._unscored / len(weight), 1.0) / _MEDIAN_COST

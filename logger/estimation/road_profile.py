@@ -68,12 +68,12 @@ def road_profile(pieces: Sequence[RoadPiece], speed_mps: Array) -> RoadProfile |
 
     speed_mps    (p,) mean speed over each piece [m/s]
     """
-    told = np.array([isfinite(piece.shortest_m) for piece in pieces], dtype=np.bool_)
-    if not told.any() or np.mean(told) < TOLD_OVER:
+    resolved = np.array([isfinite(piece.shortest_m) for piece in pieces], dtype=np.bool_)
+    if not resolved.any() or np.mean(resolved) < TOLD_OVER:
         return None
-    shortest = np.array([piece.shortest_m for piece in pieces])[told]
-    longest = np.array([piece.longest_m for piece in pieces])[told]
-    longest = np.minimum(longest, np.minimum(speed_mps[told] / SLOWEST_HZ, LONGEST_M))
+    shortest = np.array([piece.shortest_m for piece in pieces])[resolved]
+    longest = np.array([piece.longest_m for piece in pieces])[resolved]
+    longest = np.minimum(longest, np.minimum(speed_mps[resolved] / SLOWEST_HZ, LONGEST_M))
     shortest_m, longest_m = float(np.quantile(shortest, TOLD_OVER)), float(np.quantile(longest, 1 - TOLD_OVER))
     if shortest_m >= longest_m:
         return None

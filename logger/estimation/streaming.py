@@ -21,7 +21,7 @@ from logger.estimation.iri_posterior import (
     WindowIri,
     raised,
     reading_noise_psd,
-    told_share,
+    resolved_share,
     unseen_share,
     window_iri,
 )
@@ -55,13 +55,13 @@ class WindowEstimate:
     iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
                         this speed, ``unsettled`` next to the start of the readings or a hole in them
     iri_std_m_per_km    its standard error [m/km], NaN likewise
-    told                share of the variance of the IRI's slope that the readings tell, 0 to 1
+    resolved            share of the variance of the IRI's slope that the readings tell, 0 to 1
     """
 
     number: int
     iri_m_per_km: float
     iri_std_m_per_km: float
-    told: float
+    resolved: float
     flags: frozenset[str]
 
 
@@ -85,7 +85,7 @@ class _Piece:
     """What a stretch of road that is at most 10 m long gave; ``missing`` says why nothing."""
 
     iri: WindowIri
-    told: float
+    resolved: float
     missing: str = ""
     speed_mps: float = 0.0
 
@@ -102,7 +102,7 @@ class RoadEstimator:
                  lift one axle while the other sinks from being made too much of
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
-    noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's, for granted
+    noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
     """
 
     def __init__(
@@ -252,10 +252,10 @@ class RoadEstimator:
     ) -> _Piece:
         knowledge = self._errors.at(speed_mps, spectrum, variance)
         louder = self._errors.at(speed_mps, raised(spectrum), variance)
-        told = knowledge.told * (1 - float(unseen.mean()))
-        missing = "" if told >= FAINT_BELOW else "faint" if knowledge.told < FAINT_BELOW else "unsettled"
+        resolved = knowledge.resolved * (1 - float(unseen.mean()))
+        missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
-        return _Piece(iri, told, missing, speed_mps)
+        return _Piece(iri, resolved, missing, speed_mps)
 
     def _window(self, number: int, piece: _Piece) -> list[WindowEstimate]:
         """The window that this piece completes. Errors of neighbouring pieces count as independent, but for what the
@@ -264,10 +264,10 @@ class RoadEstimator:
         if len(self._gathered) < self._pieces_per_window:
             return []
         pieces, self._gathered = self._gathered, []
-        told = sum(one.told for one in pieces) / len(pieces)
+        resolved = sum(one.resolved for one in pieces) / len(pieces)
         flags = frozenset(one.missing for one in pieces if one.missing)
         if flags:
-            return [WindowEstimate(number // self._pieces_per_window, nan, nan, told, flags)]
+            return [WindowEstimate(number // self._pieces_per_window, nan, nan, resolved, flags)]
         iri = [one.iri for one in pieces]
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
@@ -275,7 +275,7 @@ class RoadEstimator:
         late_m = self._late_std_s * sum(one.speed_mps for one in pieces) / len(pieces)
         misplaced = hypot(self._place_std_m, late_m) * sum(one.change_per_m for one in iri) / len(iri)
         std = hypot(own, shared, misplaced)
-        return [WindowEstimate(number // self._pieces_per_window, mean, std, told, flags)]
+        return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags)]
 
     def _give_road(
         self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum
@@ -283,9 +283,9 @@ class RoadEstimator:
         if self._on_road is None:
             return
         noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        seen = told_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
-        told = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
-        shortest_m, longest_m = (1 / told[-1], 1 / told[0]) if len(told) else (nan, nan)
+        seen = resolved_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
+        resolved = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
+        shortest_m, longest_m = (1 / resolved[-1], 1 / resolved[0]) if len(resolved) else (nan, nan)
         self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
 
 

@@ -4,7 +4,7 @@ Problem: something differs, and a name alone is no answer. Whoever reads it want
 certain that is, what else it could be, and what these runs could not have shown anyway. Solution: a search by evidence
 (``selection.stepwise``) names the effects; the model with them is fitted finely, and its residual is compared with the
 noise that the sensor has where no car moves it: what stays above that is unexplained, and so is what takes numbers of
-the car to explain that nobody granted.
+the car to explain that no prior allows.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
     columns = {
         "distance_start_m": windows.edges_m[:-1], "distance_end_m": windows.edges_m[1:],
         "speed_mps": windows.speed_mps, "iri_m_per_km": windows.iri_m_per_km,
-        "iri_std_m_per_km": windows.iri_std_m_per_km, "told": windows.told,
+        "iri_std_m_per_km": windows.iri_std_m_per_km, "told": windows.resolved,
         "limit_std_m_per_km": found.least_error_m_per_km,
     } | ({"iri_exact_m_per_km": found.exact_m_per_km} if found.compared else {})
     for *values, flags in zip(*(column.tolist() for column in columns.values()), windows.flags, strict=True):
@@ -72,44 +72,44 @@ def window_lines(found: Assessment) -> Iterator[str]:
 # --- for a person ---
 
 
-def lines(found: Assessment, told: dict[str, Any]) -> list[str]:
-    """The lines a person sees; ``told``: the same as JSON."""
-    way_m = told["distance_end_m"] - told["distance_start_m"]
+def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
+    """The lines a person sees; ``summary``: the same as JSON."""
+    way_m = summary["distance_end_m"] - summary["distance_start_m"]
     shown = [
-        f"{told['run']}: {way_m:.0f} m in a {told['vehicle']}, "
-        f"{len(found.drive.distance_m) / told['rate_hz']:.0f} s at {told['rate_hz']:.5g} Hz; windows of "
-        f"{told['window_m']:.4g} m",
-        *_sensor_lines(told),
+        f"{summary['run']}: {way_m:.0f} m in a {summary['vehicle']}, "
+        f"{len(found.drive.distance_m) / summary['rate_hz']:.0f} s at {summary['rate_hz']:.5g} Hz; windows of "
+        f"{summary['window_m']:.4g} m",
+        *_sensor_lines(summary),
     ]
-    if told["distance_relaid_m"]:
+    if summary["distance_relaid_m"]:
         shown.append("The distance went back here and there: laid anew by the speed, "
-                     f"{told['distance_relaid_m']:.2f} m off at most.")
+                     f"{summary['distance_relaid_m']:.2f} m off at most.")
     if hint := _unit_hint(found):
         shown.append(hint)
-    if not told["answered_count"]:
-        return [*shown, f"No IRI: {_unanswered(told) or 'not one whole window was driven'}"]
-    limit = told["limit"]
+    if not summary["answered_count"]:
+        return [*shown, f"No IRI: {_unanswered(summary) or 'not one whole window was driven'}"]
+    limit = summary["limit"]
     shown += [
-        "", f"IRI {told['iri_m_per_km']:.2f} m/km on the mean, {told['iri_min_m_per_km']:.2f} to "
-        f"{told['iri_max_m_per_km']:.2f}; {told['answered_count']} of {told['window_count']} windows"
-        + (f" ({_unanswered(told)})" if told["unanswered"] else "") + ".",
+        "", f"IRI {summary['iri_m_per_km']:.2f} m/km on the mean, {summary['iri_min_m_per_km']:.2f} to "
+        f"{summary['iri_max_m_per_km']:.2f}; {summary['answered_count']} of {summary['window_count']} windows"
+        + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".",
         f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
         f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
-        f"{limit['std_m_per_km']:.2f} m/km at {told['speed_mps']:.0f} m/s.",
+        f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s.",
         "Wavelengths told: " + _range_words(found),
     ]
-    if (factor := told["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
+    if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
         shown.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
                      "percent, and there may be more in the readings than vehicle and noise explain.")
-    shown += ["", *_table(told)]
-    return shown + [f"Profile: {file}" for file in told["profile_files"]]
+    shown += ["", *_table(summary)]
+    return shown + [f"Profile: {file}" for file in summary["profile_files"]]
 
 
-def _sensor_lines(told: dict[str, Any]) -> list[str]:
+def _sensor_lines(summary: dict[str, Any]) -> list[str]:
     """What a reading is, and whether that was learnt or given."""
-    noise, std = told["noise_mps2"], told["noise_std_mps2"]
-    rounded = f"rounded to {told['step_mps2']:g} m/s2 (--step)" if told["step_mps2"] else "not rounded (--step)"
-    if told["noise_learnt"] is False:
+    noise, std = summary["noise_mps2"], summary["noise_std_mps2"]
+    rounded = f"rounded to {summary['step_mps2']:g} m/s2 (--step)" if summary["step_mps2"] else "not rounded (--step)"
+    if summary["noise_learnt"] is False:
         return [f"This drive tells nothing of the noise. Taken for granted: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Taken for granted: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
@@ -134,8 +134,8 @@ def _unit_hint(found: Assessment) -> str:
     return ""
 
 
-def _unanswered(told: dict[str, Any]) -> str:
-    return ", ".join(f"{count} {flags.replace('|', ' and ')}" for flags, count in told["unanswered"].items())
+def _unanswered(summary: dict[str, Any]) -> str:
+    return ", ".join(f"{count} {flags.replace('|', ' and ')}" for flags, count in summary["unanswered"].items())
 
 
 def _range_words(found: Assessment) -> str:
@@ -147,13 +147,13 @@ def _range_words(found: Assessment) -> str:
             f"a profile holds{left_out}.")
 
 
-def _table(told: dict[str, Any]) -> Iterator[str]:
+def _table(summary: dict[str, Any]) -> Iterator[str]:
     """Per class of speed: the estimates, then the comparison where there is one."""
-    compared = "comparison" in told
+    compared = "comparison" in summary
     yield (f"{'m/s':>10}{'windows':>9}{'answered':>10}{'IRI':>8}{'std. error':>12}{'limit':>8}"
            + (f"   {'R2':>7}{'limit':>7}{'bias':>8}{'in 1':>7}{'in 2':>6}" if compared else ""))
-    total = [{"from_mps": None, **told}] if len(told["speeds"]) > 1 else []
-    for row in [*told["speeds"], *total]:
+    total = [{"from_mps": None, **summary}] if len(summary["speeds"]) > 1 else []
+    for row in [*summary["speeds"], *total]:
         name = "all" if row["from_mps"] is None else f"{row['from_mps']:.0f} to {row['to_mps']:.0f}"
         line = f"{name:>10}{row['window_count']:9d}{row['answered_count']:10d}"
         if row["answered_count"]:

@@ -34,7 +34,7 @@ def summary(found: Found) -> list[str]:
 
 def _steps(found: Found) -> list[tuple[str, float]]:
     """Models on the way, each with its error."""
-    words = ["the vehicle as its file says", "its numbers refitted within what is granted",
+    words = ["the vehicle as its file says", "its numbers refitted within their tolerance",
              *(f"with {one.effect.name}" for one in found.missing)]
     return list(zip(words, found.errors, strict=True))
 

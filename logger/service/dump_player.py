@@ -59,18 +59,18 @@ class Player:
         """All events, then the end of the drive."""
         count = 0
         first_us: int | None = None
-        told_us = 0
+        shown_us = 0
         started_s = time.monotonic()
         for event in events:
             t_us = event.t_us
             if first_us is None:
-                first_us = told_us = t_us
+                first_us = shown_us = t_us
             if self._rate:
                 _sleep_until(started_s + (t_us - first_us) / US_PER_S / self._rate)
             self._one(event)
             count += 1
-            if t_us - told_us >= PROGRESS_EVERY_US:
-                told_us = t_us
+            if t_us - shown_us >= PROGRESS_EVERY_US:
+                shown_us = t_us
                 self._progress((t_us - first_us) / US_PER_S)
         for supervisor in self._supervisors.values():
             self._merger.add(supervisor.close())

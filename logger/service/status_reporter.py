@@ -54,7 +54,7 @@ class StatusReporter:
         self._notices = notices
         self._learning, self._noise = learning, noise
         self._began_us = monotonic_us()
-        self._told_us = self._began_us
+        self._logged_us = self._began_us
         self._state_since: dict[str, tuple[str, int]] = {}
         self._version = version()
         self._rows = 0
@@ -78,8 +78,8 @@ class StatusReporter:
             self._failed = True
         self._look_at_gravity()
         self._look_at_stillness(now_us)
-        if now_us - self._told_us >= HEALTH_LINE_US:
-            self._told_us = now_us
+        if now_us - self._logged_us >= HEALTH_LINE_US:
+            self._logged_us = now_us
             log.info("%s", self.line())
 
     def remove(self) -> None:

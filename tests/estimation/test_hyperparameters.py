@@ -8,7 +8,7 @@ import pytest
 
 from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, with_noise
-from logger.estimation.local_variance import mean_told
+from logger.estimation.local_variance import mean_resolved
 from logger.estimation.road_solver import Block, Solution, TimeGrid
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum
 from logger.roads import iso8608
@@ -119,7 +119,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     weight = np.full(1024, NOISE_MPS2**-2)
     solution = block.solve(reading, weight, now, variance, 400)
     share = block.seen_points(weight > 0) / block.count
-    told = mean_told(solution.gain, variance[block.seen(weight > 0) > 0])
+    told = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
     found = learnt(Belief(now), whitened(block, solution, variance), told, block.wave_number_cpm, share, None)
     step = np.array([found.spectrum.log_level - now.log_level, found.spectrum.waviness - now.waviness])
     h = 0.02
@@ -166,10 +166,10 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
     assert abs(np.mean(wavinesses)) < 0.08 and np.std(wavinesses) < 0.2
 
 
-def noise_found(residual: np.ndarray, weight: np.ndarray, told_waves: float = 0.0) -> float:
+def noise_found(residual: np.ndarray, weight: np.ndarray, resolved_waves: float = 0.0) -> float:
     belief = Belief(COMMON_ROAD)
     for _ in range(12):
-        belief = with_noise(belief, residual, weight / noise_factor(belief), told_waves)
+        belief = with_noise(belief, residual, weight / noise_factor(belief), resolved_waves)
     return noise_factor(belief)
 
 

@@ -10,7 +10,7 @@ from logger.estimation.iri_posterior import (
     acceleration_variance_left,
     raised,
     reading_noise_psd,
-    told_share,
+    resolved_share,
     unseen_share,
     window_iri,
 )
@@ -112,10 +112,10 @@ def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
 def test_told_share_goes_from_nothing_to_all_with_the_noise() -> None:
     spectrum = RoadSpectrum.of_iri(2.0)
     seen = CAR.power(15.0) > 0
-    shares = [told_share(CAR, 15.0, spectrum, noise_psd)[seen] for noise_psd in (1e12, 1e-3, 1e-30)]
+    shares = [resolved_share(CAR, 15.0, spectrum, noise_psd)[seen] for noise_psd in (1e12, 1e-3, 1e-30)]
     assert shares[0].max() < 1e-9 and shares[2].min() > 1 - 1e-9
     assert ((shares[0] <= shares[1]) & (shares[1] <= shares[2])).all()
-    assert not told_share(CAR, 15.0, spectrum, 1e-3)[WAVE_NUMBERS_CPM * 15 > 45].any()
+    assert not resolved_share(CAR, 15.0, spectrum, 1e-3)[WAVE_NUMBERS_CPM * 15 > 45].any()
 
 
 def remembered_power(spacing_m: float) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from logger.estimation.car_response import CarResponse
-from logger.estimation.local_variance import LocalRoughness, RelativeVariance, mean_told
+from logger.estimation.local_variance import LocalRoughness, RelativeVariance, mean_resolved
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
@@ -185,5 +185,5 @@ def test_mean_told_is_the_mean_over_points(variance: np.ndarray) -> None:
     gain = np.geomspace(1e-4, 1e4, 41)
     direct = (variance[:, None] * gain / (1 + variance[:, None] * gain)).mean(axis=0)
     tolerance = 1e-12 if np.ptp(variance) == 0 else 2e-3
-    assert mean_told(gain, variance) == pytest.approx(direct, abs=tolerance)
-    assert mean_told(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
+    assert mean_resolved(gain, variance) == pytest.approx(direct, abs=tolerance)
+    assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))

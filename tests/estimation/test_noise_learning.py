@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from logger.estimation.noise_belief import LEAST_SHARE_OF_STEP, NoiseBelief, NoiseLearner, NoiseScore
 from logger.estimation.noise_evidence import interval_score
-from logger.estimation.quantisation import bounds, first_guess, improved, left_by_others, without_own
+from logger.estimation.quantisation import bounds, cavity, first_guess, improved, without_own
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.profiles.track import Track
@@ -103,7 +103,7 @@ def test_nothing_read_says_nothing() -> None:
 
 
 def test_even_readings_leave_what_algebra_says() -> None:
-    others, even = left_by_others(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
+    others, even = cavity(lambda even: 1 / (1 / 0.04 + 1 / even), np.full(256, 0.02))
     assert even == pytest.approx(np.full(256, 0.02))
     assert others == pytest.approx(np.full(256, 0.04), rel=0.01)
 
@@ -126,7 +126,7 @@ def test_uneven_readings_leave_what_dense_algebra_says() -> None:
 
     inverse = np.linalg.inv(prior + np.diag(variance))
     exact = 1 / np.diag(inverse) - variance
-    found, even = left_by_others(left, variance)
+    found, even = cavity(left, variance)
     assert 1 / np.mean(1 / even) > 1 / np.mean(1 / variance)
     assert found.mean() == pytest.approx(exact.mean(), rel=0.15)
     by_mean_precision = 1 / (1 / left(1 / np.mean(1 / variance)) - np.mean(1 / variance))

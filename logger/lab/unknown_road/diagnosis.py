@@ -239,7 +239,7 @@ def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
 
 
 def _together(model: Fitted) -> tuple[Finding, ...]:
-    """What these drives cannot tell of masses, springs and dampers beside the road, whatever is granted."""
+    """What these drives cannot tell of masses, springs and dampers beside the road, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.moves), len(model.data))

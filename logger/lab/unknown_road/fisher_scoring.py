@@ -26,7 +26,7 @@ class Fitted:
 
     moves          numbers of its effects
     data           (m, m) information of the drives on the logs, the moves (on their scales) and the roads' numbers
-    information    the same with what is granted
+    information    the same with the priors
     problem        quick for states like this one
     """
 

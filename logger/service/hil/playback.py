@@ -107,7 +107,7 @@ def send(
     """
     late_us = array("q")
     size_bytes = dict.fromkeys(ports, 0)
-    first_us = played_us = told_us = 0
+    first_us = played_us = shown_us = 0
     begun_us: int | None = None
     for event in events:
         if begun_us is None:
@@ -119,8 +119,8 @@ def send(
         late_us.append(-wait_us)
         ports[event.source].write(event.data)
         size_bytes[event.source] += len(event.data)
-        if played_us - told_us >= PROGRESS_EVERY_US:
-            told_us = played_us
+        if played_us - shown_us >= PROGRESS_EVERY_US:
+            shown_us = played_us
             progress(played_us / US_PER_S)
     half, most, all_of_them = np.percentile(late_us, (50, 99, 100)) / 1000 if late_us else (0.0, 0.0, 0.0)
     return Sent(played_us / US_PER_S, size_bytes, (float(half), float(most), float(all_of_them)))

@@ -64,15 +64,15 @@ def _drive(step_m: float, iri: float, seed: int) -> _Found:
     place = {"step.height_m": step_m * _TAKEN_FACTOR, "step.start_m": _STEP_AT_M}
     theirs = fitted(record, {MASS: TRUTH[MASS]}, False, taken)
     known = fitted(record, place, True, taken)
-    both = _told(record, {MASS: TRUTH[MASS], **place}, taken)
+    both = _identified(record, {MASS: TRUTH[MASS], **place}, taken)
     return _Found(
-        "cannot tell" if _told(record, {MASS: TRUTH[MASS]}, RoadInput()) is None else "answers",
+        "cannot tell" if _identified(record, {MASS: TRUTH[MASS]}, RoadInput()) is None else "answers",
         error_percent(theirs, MASS),
         None if both is None else (error_percent(both, MASS), standard_error_percent(both, MASS)),
         (1000 * (known.parameters["step.height_m"] - step_m), 1000 * known.standard_errors["step.height_m"]))
 
 
-def _told(record: Run, start: dict[str, float], road: RoadInput) -> Fit | None:
+def _identified(record: Run, start: dict[str, float], road: RoadInput) -> Fit | None:
     try:
         return fitted(record, start, True, road)
     except NotIdentifiable:
