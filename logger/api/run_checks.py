@@ -71,9 +71,11 @@ def thinned_runs(runs: Sequence[Run]) -> list[Run]:
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     """Raise BadInput for a drive of fewer than 50 samples a second, that is shorter than 5 s, has another rate than the
-    others, recorded nothing, or whose distances are none: they fall, leap, or have nothing to do with the speed."""
+    others, recorded nothing, repeats samples, or whose distances are none: they fall, leap, or have nothing to do with
+    the speed."""
     import numpy as np
 
+    from logger.dsp.repeated_samples import find_repeats
     from logger.runs import SKIP_S
     from logger.store.formats.drive_file import MAX_SPEED_MPS
 
@@ -94,6 +96,9 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     if abs(counted.mean()) > _MOST_MEAN_MPS2:
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
+    if repeats := find_repeats(drive.accel_z_mps2[:, None]):
+        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
+                       "before: write a record only as often as the sensor is read")
     distance_m = drive.distance_m
     for wrong, words in (
         (np.diff(distance_m) > MAX_SPEED_MPS / drive.rate_hz + _BACK_M, "that grow steadily"),

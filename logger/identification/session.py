@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from logger.dsp.decimating_low_pass import LowPass
+from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel
 from logger.identification.frequency_domain_model import VehicleModel
 from logger.identification.identifiability import NotIdentifiable, upside_down
@@ -44,7 +45,7 @@ class UnusableRun(ValueError):
 
 
 def check_records(records: Sequence[Run]) -> None:
-    """``UnusableRun`` for an acceleration that never changes, or that gravity is in, and for rates that differ."""
+    """``UnusableRun`` for an acceleration that never changes, that gravity is in, or whose samples repeat."""
     for run, record in enumerate(records):
         if not np.ptp(record.kept_mps2) > 0:
             raise UnusableRun(run, "expected an acceleration that moves, "
@@ -52,6 +53,9 @@ def check_records(records: Sequence[Run]) -> None:
         if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
             raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
                                    "average (subtract the mean while the car stood)")
+        if repeats := find_repeats(record.kept_mps2[:, None]):
+            raise UnusableRun(run, f"expected every sample to be taken anew, found {repeats.share:.0%} that repeat the "
+                                   "one before: write a record only as often as the sensor is read")
 
 
 def off_rate(rates_hz: Sequence[float]) -> int | None:

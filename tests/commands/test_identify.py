@@ -108,6 +108,7 @@ def other_run(run: str, folder: Path, change: Callable[[Array], Array]) -> str:
 @pytest.mark.parametrize(("change", "message"), [
     (lambda z: 0 * z, "expected an acceleration that moves, found 0 m/s2 all along"),
     (lambda z: 0 * z - 0.4, "expected an acceleration that moves, found -0.4 m/s2 all along"),
+    (lambda z: np.repeat(np.round(z[::3], 3), 3)[: len(z)], "expected every sample to be taken anew, found 6[0-9]%"),
     (lambda z: z + 9.81, "expected gravity removed from the acceleration, found 9.8[0-9] m/s2 on average"),
     (lambda z: -z - 9.81, "expected gravity removed from the acceleration, found -9.8[0-9] m/s2 on average"),
 ])

@@ -158,6 +158,8 @@ def changed(run: str, folder: Path, **columns: Callable[[npt.NDArray[np.float64]
 
 CHANGES = {
     "zeros": ({"accel": lambda a: 0.0}, "drive.csv: expected accelerations after the first 2 s, found zeros only"),
+    "held": ({"accel": lambda a: np.repeat(np.round(a[::3], 3), 3)[: len(a)]},
+             "drive.csv: expected every sample to be taken anew, found 6[0-9]% that repeat"),
     "constant": ({"accel": lambda a: 1.5}, "drive.csv: .* found 1.5 m/s2 all along"),
     "tiny": ({"accel": lambda a: 1e-9 * a}, "drive.csv: expected accelerations in m/s2, found none above"),
     "NaN": ({"accel": lambda a: np.where(a == a[500], np.nan, a)}, "drive.csv:502: expected a number for accel_z_mps2"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.repeated_samples import find_repeats
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.store.formats.csv_table import parse_columns
@@ -57,6 +58,9 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
             raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
                            "leave its column out")
+    if repeats := find_repeats(samples):
+        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
+                       "before: write a record only as often as the sensor is read")
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 
