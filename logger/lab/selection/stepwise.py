@@ -44,7 +44,7 @@ class Effort:
     effects: int = 4
     fitted: int = 6
     refined: int = 3
-    worth_fitting: float = 0.1
+    worth_fitting: float = 0.03
     worth_refining: float = 0.25
     as_good: float = 0.9
     worth_a_round: float = 0.02
