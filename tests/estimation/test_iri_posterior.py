@@ -63,7 +63,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     knowledge = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1).at(speed_mps, spectrum, deviation**2)
     assert knowledge.variance == pytest.approx(true.var(), rel=0.03)
     assert knowledge.left == pytest.approx((true - found).var(), rel=0.06)  # the cut at 42 Hz falls between two waves
-    assert knowledge.told == pytest.approx(1 - (true - found).var() / true.var(), abs=0.01)
+    assert knowledge.resolved == pytest.approx(1 - (true - found).var() / true.var(), abs=0.01)
     off = true - found
     by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
     assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)

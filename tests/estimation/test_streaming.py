@@ -89,7 +89,7 @@ def estimated(
     found += estimator.finish()
     assert all(later.number == one.number + 1 for one, later in pairwise(found))
     for one in found:
-        assert 0 <= one.told <= 1
+        assert 0 <= one.resolved <= 1
         assert one.flags <= {"faint", "unsettled"}
         assert bool(one.flags) == np.isnan(one.iri_m_per_km) == np.isnan(one.iri_std_m_per_km)
         assert one.flags or (one.iri_m_per_km > 0 and one.iri_std_m_per_km > 0)
@@ -101,7 +101,7 @@ def flags_of(found: list[WindowEstimate]) -> list[str]:
 
 
 def bits(found: list[WindowEstimate]) -> list[tuple[object, ...]]:
-    return [(one.number, one.iri_m_per_km.hex(), one.iri_std_m_per_km.hex(), one.told, one.flags) for one in found]
+    return [(one.number, one.iri_m_per_km.hex(), one.iri_std_m_per_km.hex(), one.resolved, one.flags) for one in found]
 
 
 # --- truth -----------------------------------------------------------------------------------------------------------

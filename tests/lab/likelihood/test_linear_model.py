@@ -44,7 +44,7 @@ def case() -> Case:
     effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
     state = posterior.at(effects, logs, record)
     linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
-    own = effect_slopes(linear, effects, logs, moves_of(effects), state.predictions)
+    own = effect_slopes(linear, effects, logs, moves_of(effects), linear.state.record, state.predictions)
     return Case(posterior, state, linear, linear.whitened(own))
 
 
@@ -109,7 +109,8 @@ def test_the_gradient_is_that_of_the_objective() -> None:
     one = case()
     assert one.linear.numbers is not None
     numbers, logs = one.linear.numbers, one.state.logs
-    own = effect_slopes(one.linear, one.state.effects, logs, moves_of(one.state.effects), one.state.predictions)
+    own = effect_slopes(one.linear, one.state.effects, logs, moves_of(one.state.effects), one.state.record,
+                        one.state.predictions)
 
     def objective(x: Array) -> float:
         there = [each + x[: len(logs)] @ of_car + x[len(logs):] @ of_effects for each, of_car, of_effects in zip(

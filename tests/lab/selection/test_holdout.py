@@ -92,7 +92,8 @@ def test_held_out_is_what_refits_without_the_stretches_leave(model: str) -> None
     posterior = posterior_of(secret_runs(there, lasts_s=12.0))
     linear = fit(aligned(posterior, posterior.start(tried)))
     state = linear.state
-    own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.predictions) if tried else None
+    own = effect_slopes(linear, state.effects, state.logs, moves_of(tried), state.record,
+                        state.predictions) if tried else None
     quick = held_out(linear, own)
     error, lack = unseen_when_refitted(linear)
     seen_error, seen_lack = posterior.error(state), posterior.deviance(state)
