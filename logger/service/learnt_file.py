@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,9 +18,26 @@ from logger.units import US_PER_S
 
 SAVE_EVERY_US = 120 * US_PER_S
 _LARGEST_BYTES = 1000
+_MOST_DRIVES = 10**9
 
 log = logging.getLogger(__name__)
 Learnt = TypeVar("Learnt")
+
+
+def value_of(fields: Any, keys: Sequence[str], least: float, most: float) -> tuple[float, float, int]:
+    """A value, its standard error and the number of drives that it was learnt over, by these keys; one that is missing
+    is 0. ValueError where the value is not from ``least`` to ``most``, or the others cannot be."""
+    value, std, drives = (fields.get(key, 0) for key in keys)
+    numbers = [one for one in (value, std) if isinstance(one, (int, float)) and not isinstance(one, bool)]
+    if len(numbers) < 2 or not (least <= value <= most and 0 <= std <= most) \
+            or isinstance(drives, bool) or not isinstance(drives, int) or not 0 <= drives < _MOST_DRIVES:
+        raise ValueError(f"expected {keys[0]} and {keys[1]} from {least:g} to {most:g}, and a number of drives")
+    return float(value), float(std), drives
+
+
+def drives_words(drives: int) -> str:
+    """How many drives something was learnt over."""
+    return "learnt over 1 drive" if drives == 1 else f"learnt over {drives} drives"
 
 
 class LearntFile:

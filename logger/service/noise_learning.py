@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, log
+from math import log
 from pathlib import Path
 from typing import Any, Protocol
 
 from drivers.disk import FileSystem
 from logger.estimation.noise_belief import NoiseBelief
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig
-from logger.service.learnt_file import LearntFile
+from logger.service.learnt_file import LearntFile, drives_words, value_of
 
 FILE_NAME = "sensor-noise"
 _WHAT = "the sensor's noise"
@@ -54,13 +54,9 @@ def from_fields(fields: Mapping[str, Any]) -> KnownNoise | None:
         raise ValueError("expected an object")
     if _KEYS[1] not in fields:
         return None
-    noise, std, drives = (fields.get(key, 0) for key in _KEYS)
-    numbers = [one for one in (noise, std) if isinstance(one, (int, float)) and not isinstance(one, bool)]
-    if len(numbers) < 2 or not all(isfinite(one) and 0 < one <= MOST_NOISE_MPS2 for one in numbers) \
-            or noise < LEAST_NOISE_MPS2 or isinstance(drives, bool) or not isinstance(drives, int) \
-            or not 0 <= drives < 10**9:
-        raise ValueError(f"expected {_KEYS[0]} and {_KEYS[1]} from {LEAST_NOISE_MPS2:g} to {MOST_NOISE_MPS2:g}, and a "
-                         "number of drives")
+    noise, std, drives = value_of(fields, _KEYS, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
+    if std == 0:
+        raise ValueError(f"expected {_KEYS[1]} above 0")
     return KnownNoise(NoiseBelief(log(noise), std / noise), drives)
 
 
@@ -128,5 +124,4 @@ class NoiseLearning:
         now = self.now
         if now is None:
             return "not known yet, it is learnt while driving"
-        drives = "1 drive" if now.drives == 1 else f"{now.drives} drives"
-        return f"{now.belief.noise_rms_mps2:.2g} +- {now.belief.std_mps2:.1g} m/s2, learnt over {drives}"
+        return f"{now.belief.noise_rms_mps2:.2g} +- {now.belief.std_mps2:.1g} m/s2, {drives_words(now.drives)}"

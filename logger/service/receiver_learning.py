@@ -18,7 +18,7 @@ from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.mounting import heading_deg
 from logger.estimation.receiver_delay import Belief, combined
 from logger.service.config import AccelerometerConfig, GpsConfig
-from logger.service.learnt_file import LearntFile
+from logger.service.learnt_file import LearntFile, drives_words, value_of
 from logger.service.signal_chain import Axis
 
 FILE_NAME = "receiver-delay"
@@ -27,7 +27,6 @@ UNKNOWN = Belief(0.10, 0.10)
 """Before anything was learnt: receivers are late by 0.05 to 0.3 s."""
 MOST_DELAY_S = 2.0
 _KEYS = ("latency_s", "latency_std_s", "latency_drives")
-
 
 
 def at_start(gps: GpsConfig, learnt: Belief | None) -> Belief:
@@ -48,12 +47,7 @@ def from_fields(fields: Mapping[str, Any]) -> Belief | None:
         raise ValueError("expected an object")
     if _KEYS[0] not in fields:
         return None
-    delay_s, std_s, drives = (fields.get(key, 0) for key in _KEYS)
-    numbers = [value for value in (delay_s, std_s) if isinstance(value, (int, float)) and not isinstance(value, bool)]
-    if len(numbers) < 2 or not all(0 <= value <= MOST_DELAY_S for value in numbers) \
-            or isinstance(drives, bool) or not isinstance(drives, int) or not 0 <= drives < 10**9:
-        raise ValueError(f"expected {_KEYS[0]} and {_KEYS[1]} from 0 to {MOST_DELAY_S:g}, and a number of drives")
-    return Belief(float(delay_s), float(std_s), drives)
+    return Belief(*value_of(fields, _KEYS, 0.0, MOST_DELAY_S))
 
 
 def read_learnt(folder: Path) -> Belief | None:
@@ -120,8 +114,7 @@ class ReceiverLearning:
 
 
 def _belief_words(belief: Belief) -> str:
-    drives = "1 drive" if belief.drives == 1 else f"{belief.drives} drives"
-    return f"{belief.delay_s:.2f} +- {belief.std_s:.2f} s, learnt over {drives}"
+    return f"{belief.delay_s:.2f} +- {belief.std_s:.2f} s, {drives_words(belief.drives)}"
 
 
 def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict[str, Any]:

@@ -103,6 +103,7 @@ def test_nothing_learnt_writes_nothing(tmp_path: Path, drive: Drive) -> None:
 @pytest.mark.parametrize("text", [
     "", "{", "[]", "null", "\xff", '{"noise_mps2": 0.1}', '{"noise_mps2": "x", "noise_std_mps2": 0.1}',
     '{"noise_mps2": 0.1, "noise_std_mps2": 0, "noise_drives": 1}', '{"noise_mps2": NaN, "noise_std_mps2": 0.1}',
+    f'{{"noise_mps2": 1{"0" * 400}, "noise_std_mps2": 0.1}}', '["noise_std_mps2"]',
     '{"noise_mps2": 0.1, "noise_std_mps2": 0.1, "noise_drives": 1.5}', '{"noise_mps2": 0, "noise_std_mps2": 0.1}'])
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE_NAME).write_bytes(text.encode("latin-1"))
