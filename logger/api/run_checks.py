@@ -97,8 +97,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:
     if abs(counted.mean()) > _MOST_MEAN_MPS2:
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     if repeats := find_repeats(drive.accel_z_mps2[:, None]):
-        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
-                       "before: write a record only as often as the sensor is read")
+        raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
     distance_m = drive.distance_m
     for wrong, words in (
         (np.diff(distance_m) > MAX_SPEED_MPS / drive.rate_hz + _BACK_M, "that grow steadily"),

@@ -50,6 +50,11 @@ class Repeats:
     fresh: Bools
     period: float
 
+    @property
+    def complaint(self) -> str:
+        """Words for who refuses such a record."""
+        return f"expected every sample to be taken anew, found {self.share:.0%} that repeat the one before"
+
 
 def resolution(values: Array) -> float:
     """The step between neighbouring values of an axis (n,): the median over those that occur, without the outermost,

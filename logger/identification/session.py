@@ -54,8 +54,7 @@ def check_records(records: Sequence[Run]) -> None:
             raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
                                    "average (subtract the mean while the car stood)")
         if repeats := find_repeats(record.kept_mps2[:, None]):
-            raise UnusableRun(run, f"expected every sample to be taken anew, found {repeats.share:.0%} that repeat the "
-                                   "one before: write a record only as often as the sensor is read")
+            raise UnusableRun(run, f"{repeats.complaint}: write a record only as often as the sensor is read")
 
 
 def off_rate(rates_hz: Sequence[float]) -> int | None:

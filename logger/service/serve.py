@@ -59,7 +59,7 @@ def _serve(config: Config, stop: Stop) -> None:
     decoder = wiring.gps_decoder(config)
     pipeline = wiring.pipeline(config, sensor, vehicle, receiver_delay)
     delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
-    noise_progress = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
+    sensor_learning = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()
     machine = Machine(monotonic_us, time.sleep)
@@ -74,13 +74,13 @@ def _serve(config: Config, stop: Stop) -> None:
     for notice in notices:
         log.warning("%s", notice)
     observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, delay_learning,
-                              noise_progress)
+                              sensor_learning)
     notifier = Notifier()
 
     def beat(now_us: int) -> None:
         observer.write(now_us)
         delay_learning.tend(now_us)
-        noise_progress.tend(now_us)
+        sensor_learning.tend(now_us)
         if not any(listener.hangs(now_us) for listener in listeners):
             notifier.watchdog()
         notifier.status(observer.line())
@@ -90,7 +90,7 @@ def _serve(config: Config, stop: Stop) -> None:
     MainLoop(core, storage, listeners, events, config.log.sync_s, beat_s, beat).run(stop)
     notifier.stopping()
     delay_learning.save()
-    noise_progress.save()
+    sensor_learning.save()
     observer.remove()
     log.info("stopped: %d rows written", core.rows)
 

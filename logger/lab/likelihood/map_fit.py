@@ -154,7 +154,7 @@ def minimised(linear: LinearModel, state: State, moves: Sequence[Move], small_ga
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
     realigns = any(state.effects[move.effect].effect.realigns for move in moves)
-    predict = linear.posterior.predictor(state.effects, state.logs, linear.state.record)
+    predict = linear.posterior.predictor(state)
 
     def evaluate(x: Array) -> _Point:
         effects, logs = moved(state.effects, moves, x[p:]), x[:p] if p else state.logs

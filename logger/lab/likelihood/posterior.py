@@ -87,13 +87,14 @@ class Posterior:
         return [one.recorded(prediction, k) for one, prediction, k in zip(
             self.record_errors, predictions, record, strict=True)]
 
-    def predictor(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> Predict:
+    def predictor(self, state: State) -> Predict:
         """Predictions of models that are not far from one: as rough ones are, and as much off these as a fine one of
-        that model is."""
-        if not self.car(effects, logs).rubs:
+        that model is, which is made if the state has none."""
+        given = state.effects, state.logs, state.record
+        if not self.car(state.effects, state.logs).rubs:
             return self.predict
-        fine = self.predict(effects, logs, record)
-        off = [one - rough for one, rough in zip(fine, self.predict(effects, logs, record, rough=True), strict=True)]
+        fine = state.predictions or self.predict(*given)
+        off = [one - rough for one, rough in zip(fine, self.predict(*given, rough=True), strict=True)]
 
         def predict(effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Array]:
             return [one + more for one, more in zip(self.predict(effects, logs, record, rough=True), off, strict=True)]

@@ -34,7 +34,7 @@ class Effort:
     effects                      no more than so many are looked for
     fitted, refined              how many effects are fitted at most, and how many of them with slopes of their own
     worth_fitting, worth_refining    of the gain of the best one, or of one that would count: what an effect has to
-                                 promise for that (a fit gains up to five times of what was promised, as measured)
+                                 promise for that (with a tenth for fitting, a sensor's bandwidth was missed)
     as_good                      fits of one effect from different starts that gain so much of what the best of them
                                  gains are all refined
     worth_a_round                of what is left to explain: what a round of a fit has to gain to be worth another one;

@@ -59,8 +59,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
             raise BadInput(f"{file}:2: expected {name} to move, found {samples[0, column]:g} all along; "
                            "leave its column out")
     if repeats := find_repeats(samples):
-        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
-                       "before: write a record only as often as the sensor is read")
+        raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 

@@ -120,9 +120,8 @@ def even_record(
     repeats = find_repeats(samples)
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
-        raise BadInput(f"{file}: expected every sample to be taken anew, found {repeats.share:.0%} that repeat the one "
-                       f"before ({_true_rate_hz(repeats, t_s):.3g} Hz written at {_rate_hz(t_s):.4g}): --resample "
-                       "drops the repeats")
+        raise BadInput(f"{file}: {repeats.complaint} ({_true_rate_hz(repeats, t_s):.3g} Hz written at "
+                       f"{_rate_hz(t_s):.4g}): --resample drops the repeats")
     kept = slice(None) if repeats is None else repeats.fresh
     doubts += [doubt for name, axis in zip(accel, samples[kept].T, strict=True) for doubt in end_doubts(name, axis)]
     if asked.resample_hz is None:
