@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import cache, cached_property
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,9 @@ import numpy.typing as npt
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.runs import Run
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = npt.NDArray[np.float64]
 
@@ -128,7 +132,14 @@ class RecordError:
 
     def moved_m(self, k: Array) -> Array:
         """By how much the car was farther than its distance signal said (n,)."""
-        return np.asarray(k[: len(self.basis)] @ self.basis)
+        return np.asarray(self._sparse_basis @ k[: len(self.basis)])
+
+    @cached_property
+    def _sparse_basis(self) -> csr_array:
+        """The same (n, k - 2), of which four in a row are of the curve."""
+        from scipy.sparse import csr_array
+
+        return csr_array(self.basis.T)
 
     def without_trend(self, k: Array) -> Array:
         """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
@@ -153,7 +164,10 @@ class RecordError:
         """What each of k does to a prediction (n,): (k, n) [m/s2 per unit]."""
         rise = rate_of_change(prediction, self.run.rate_hz)
         by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
-        return np.vstack([self.basis * by_place, _by_recorder(prediction, rise, self.run)])
+        found = np.empty((self.count, len(prediction)))
+        np.multiply(self.basis, by_place, out=found[: len(self.basis)])
+        found[len(self.basis) :] = _by_recorder(prediction, rise, self.run)
+        return found
 
 
 def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:

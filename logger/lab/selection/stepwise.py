@@ -146,6 +146,8 @@ class Search:
             best = {one.effect.name: one.gain for one in rough[: effort.refined]
                     if one.gain > effort.worth_refining * max(rough[0].gain, enough)}
             near = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
+            if len(near) == 1 and self.accepted(now, near[0]):
+                near = []  # it stands alone, and is fitted in full where it is chosen
             self.progress(f"refining {len(near)} of them")
             fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), near))
         # A fit that is much worse than the model without the effect went astray: its promise says more.
