@@ -27,14 +27,14 @@ TREES = {module: ast.parse(path.read_text("utf-8")) for path, module in FILES.it
 FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
-    "lab",
+    "lab", "extraction",
     "files", "shipped", "plugins", "installation", "store", "studies", "service", "report", "demo", "api",
     "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
 STORE = ("formats", "log", "export", "integrity")
 """The same inside ``logger.store``."""
-NUMERICAL = FLOORS[: FLOORS.index("lab") + 1]
+NUMERICAL = FLOORS[: FLOORS.index("extraction") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {

@@ -17,7 +17,9 @@ from drivers.events import GPS
 from drivers.nmea import NmeaDecoder
 from drivers.readings import AccelerationBlock, Fix
 from logger.records import WindowRecord
-from logger.service.pipeline import Pipeline
+from logger.service.repetition import Repetition
+from logger.service.speed_check import SpeedCheck
+from logger.service.timebase import Timebase
 from logger.store.log.log_writer import ClockMap
 
 STEP_US = 500_000
@@ -38,6 +40,20 @@ class RowSink(Protocol):
     def close(self) -> None: ...
 
 
+class Stepped(Protocol):
+    """What readings and fixes go to: the pipeline, or what stands in its place."""
+
+    drive: int
+    timebase: Timebase
+    repetition: Repetition
+    speed_check: SpeedCheck
+
+    def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]: ...
+    def is_settled(self, stepped_us: int, heard_us: int) -> bool: ...
+    def skip_to(self, t_us: int) -> None: ...
+    def finish(self) -> list[WindowRecord]: ...
+
+
 class EventCore:
     """Decodes events, steps the pipeline, writes its rows.
 
@@ -45,7 +61,7 @@ class EventCore:
     passed over: of another accelerometer, no whole reading, or too much for their moment.
     """
 
-    def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Pipeline, sink: RowSink) -> None:
+    def __init__(self, accelerometer: Decoder, gps: NmeaDecoder, pipeline: Stepped, sink: RowSink) -> None:
         self._accelerometer = accelerometer
         self._gps = gps
         self._pipeline = pipeline

@@ -88,9 +88,6 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Bel
         front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
     )
     axis = Axis.from_word(config.accelerometer.vertical_axis)
-    make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
-    low_pass_hz = config.pipeline.low_pass_hz
-    chain = SignalChain(axis, WEIGHTING, sensor.oversample, low_pass_hz, sensor.sensor.is_coarse, make_filter)
     structure = structure_of(vehicle)
     place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
     estimator = RoadEstimator(
@@ -99,7 +96,16 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Bel
         noise=sensor.noise,
     )
     alignment = DriveAlignment(axis.column, axis.sign)
-    return Pipeline(settings, chain, rms_relation(vehicle, recorder_gain(low_pass_hz)), estimator, alignment)
+    relation = rms_relation(vehicle, recorder_gain(config.pipeline.low_pass_hz))
+    return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment)
+
+
+def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
+    """The filters between the sensor and the windows."""
+    axis = Axis.from_word(config.accelerometer.vertical_axis)
+    make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
+    return SignalChain(axis, WEIGHTING, sensor.oversample, config.pipeline.low_pass_hz, sensor.sensor.is_coarse,
+                       make_filter)
 
 
 def notices(vehicle: Vehicle) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from logger.store.formats.erd_file import HIGHEST_M, ErdFile, is_erd, parse_erd
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("distance_m", "elevation_m", "elevation_right_m")
+PLACE = ("lat_deg", "lon_deg")
 MAX_BYTES = 512 * 1024 * 1024
 FARTHEST_M = 1e9
 WIDEST_BRIDGED_M = 1.0
@@ -33,6 +34,7 @@ WIDEST_BRIDGED_M = 1.0
 # is taken for rounding.
 _ROUNDING_M = 0.0006
 _ROUNDING_STEPS = 0.05
+_SHOWN = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +70,48 @@ def parse_table(data: bytes, file: str) -> Array:
     """The numbers of a CSV profile, (n, 2) or (n, 3): distance, elevation, right elevation [m]."""
 
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
-        return names if names in (COLUMNS[:2], COLUMNS) else None
+        numbers = names[: -len(PLACE)] if names[-len(PLACE) :] == PLACE else names
+        return numbers if numbers in (COLUMNS[:2], COLUMNS) else None
 
     return parse_columns(data, file, choose, f"the header {','.join(COLUMNS[:2])}[,{COLUMNS[2]}]")[1]
+
+
+def read_places(path: Path | str) -> tuple[Array, Array, Array]:
+    """Distances [m], growing, latitudes and longitudes [degrees] (m,) of the rows of a CSV profile that have a place.
+
+    Raises BadInput ("file:line: expected ...") for a profile of which fewer than two rows do, and for a place that
+    cannot be.
+    """
+    file = str(path)
+    lines = read_bounded(path, MAX_BYTES).removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").splitlines()
+    names = [name.strip() for name in lines[0].split(",")] if lines else []
+    if not all(name in names for name in (COLUMNS[0], *PLACE)):
+        raise BadInput(f"{file}:1: expected a header with {COLUMNS[0]},{','.join(PLACE)}: a drive is found on the line "
+                       "by its places")
+    columns = [names.index(name) for name in (COLUMNS[0], *PLACE)]
+    found = []
+    for number, line in enumerate(lines[1:], 2):
+        fields = line.split(",")
+        texts = [fields[column].strip() if column < len(fields) else "" for column in columns]
+        if all(texts[1:]):
+            found.append(_place(texts, f"{file}:{number}"))
+        elif any(texts[1:]):
+            raise BadInput(f"{file}:{number}: expected both of {','.join(PLACE)} or neither")
+    if len(found) < 2:
+        raise BadInput(f"{file}: expected two rows or more with {','.join(PLACE)}, found {len(found)}")
+    distance_m, lat_deg, lon_deg = np.array(found).T
+    return distance_m, lat_deg, lon_deg
+
+
+def _place(texts: Sequence[str], place: str) -> tuple[float, float, float]:
+    try:
+        distance_m, lat_deg, lon_deg = map(float, texts)
+    except ValueError:
+        raise BadInput(f"{place}: expected numbers, found {','.join(texts)[:_SHOWN]}") from None
+    if not (abs(distance_m) <= FARTHEST_M and abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
+        raise BadInput(f"{place}: expected degrees within 90 north and south and 180 east and west, found "
+                       f"{','.join(texts)[:_SHOWN]}")
+    return distance_m, lat_deg, lon_deg
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Profile:

@@ -1,0 +1,246 @@
+"""Speed and distance of a car over a whole drive, by all fixes before and after each instant.
+
+Problem: a receiver tells the speed once or ten times a second, with noise, now and then wildly wrong; a model needs the
+distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its acceleration
+is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch, F. Tung and C.
+Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration wanders, and how large
+the errors of the fixes are, is chosen by evidence; those far off count less (Student's t). Places along a line that are
+known from elsewhere enter as further observations. Errors come from drawing the motion that all could be (G.
+Papandreou and A. Yuille, NIPS 2010).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+NEAREST_FIXES_S = 0.02
+"""Fixes nearer to each other than that are one: no receiver sends 50 a second."""
+_FREEDOM = 4.0  # of Student's t: one fix in twenty lies beyond three deviations
+_ROUNDS = 3
+_LEAST_NOISE_MPS = 0.005  # of a speed that is written in thousandths of a knot
+_RATIOS = np.logspace(-2.0, 5.0, 15)
+"""Of the walk of the acceleration over the square of a speed's noise [1/s3]: from a ship to a braking car."""
+_SLIP_S = 0.05
+"""The way differs from the integral of the speed by a random walk as well, of so much of a speed's noise after a
+second: next to nothing, but without it the equations of ten fixes a second cannot be solved in double precision."""
+_UNKNOWN = (1e4, 100.0, 5.0)  # deviations of the first distance [m], speed [m/s] and acceleration [m/s2]
+_DRAWS = 24
+_ENOUGH_FIXES = 1500  # for what all of a drive has in common
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Speeds or places at instants (k,), each with its standard deviation: [m/s] or [m]."""
+
+    time_s: Array
+    value: Array
+    deviation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The most likely motion at the times of the fixes (k,); between them it is a polynomial of the fifth order.
+
+    state       (k, 3) distance [m], speed [m/s] and acceleration [m/s2]
+    walk        variance by which the acceleration wanders in a second [m2/s5]
+    noise_mps   standard deviation of a speed
+    """
+
+    time_s: Array
+    state: Array
+    walk: float
+    noise_mps: float
+
+    def distance_m(self, time_s: Array) -> Array:
+        """Where the car was (n,), never going back."""
+        return np.asarray(np.maximum.accumulate(self._curve(time_s, 0)))
+
+    def speed_mps(self, time_s: Array) -> Array:
+        """How fast it was (n,), 0 at least."""
+        return np.maximum(self._curve(time_s, 1), 0.0)
+
+    def _curve(self, time_s: Array, order: int) -> Array:
+        from scipy.interpolate import BPoly
+
+        curve = BPoly.from_derivatives(self.time_s, self.state[:, :, None])
+        return np.asarray(curve(time_s, nu=order)[:, 0])
+
+
+def motion_of(speeds: Observations, places: Observations | None = None, like: Motion | None = None) -> Motion:
+    """The motion by two fixes or more, in order of time and ``NEAREST_FIXES_S`` apart.
+
+    speeds    with no deviations of their own (ones) but where these differ: they are scaled by evidence
+    places    along the way [m]; None: the way begins at 0
+    like      another motion of the same fixes, whose walk and noise are taken; None: they are found
+
+    ValueError for fewer than two fixes.
+    """
+    if len(speeds.time_s) < 2:
+        raise ValueError("expected two fixes or more")
+    places = places or Observations(*(np.array([one]) for one in (speeds.time_s[0], 0.0, 0.001)))
+    walk, noise = (like.walk, like.noise_mps) if like else _strengths(speeds)
+    return _fitted(speeds, places, walk, noise)
+
+
+def place_std_m(motion: Motion, speeds: Observations, places: Observations, seed: int = 0) -> Array:
+    """Standard error of the distance at the times of the fixes (k,) [m]."""
+    rng = np.random.default_rng(seed)
+    system = _System(speeds.time_s, motion.walk, motion.noise_mps)
+    speeds = replace(speeds, deviation=speeds.deviation * motion.noise_mps)
+    rows = [(1, speeds), (0, places)]
+    drawn = [system.drawn(rows, rng) for _ in range(_DRAWS)]
+    return np.asarray(np.sqrt(np.mean([one[:, 0] ** 2 for one in drawn], axis=0)))
+
+
+def _strengths(speeds: Observations) -> tuple[float, float]:
+    """The walk of the acceleration and the noise of the speeds with the most evidence, by the middle of a drive."""
+    first = max(0, (len(speeds.time_s) - _ENOUGH_FIXES) // 2)
+    middle = slice(first, first + _ENOUGH_FIXES)
+    speeds = Observations(speeds.time_s[middle], speeds.value[middle], speeds.deviation[middle])
+    start = Observations(speeds.time_s[:1], np.zeros(1), np.full(1, 0.001))
+    best = (-np.inf, 1.0, 0.1)
+    weights = np.ones(len(speeds.time_s))
+    for _ in range(_ROUNDS):
+        weighted = replace(speeds, deviation=speeds.deviation / np.sqrt(weights))
+        best = (-np.inf, 1.0, 0.1)
+        for ratio in _RATIOS:
+            system = _System(speeds.time_s, float(ratio), 1.0)
+            state, evidence, scale = system.solved([(1, weighted)], start)
+            if evidence > best[0]:
+                best, left = (evidence, float(ratio), scale), state[:, 1] - speeds.value
+        weights = _student(left / speeds.deviation / best[2])
+    noise = max(best[2], _LEAST_NOISE_MPS)
+    return best[1] * noise**2, noise
+
+
+def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: float) -> Motion:
+    """The motion of given strengths."""
+    system = _System(speeds.time_s, walk, noise_mps)
+    deviation = speeds.deviation * noise_mps
+    weights, seen = np.ones(len(speeds.time_s)), np.ones(len(places.time_s))
+    state = np.zeros((len(speeds.time_s), 3))
+    for _ in range(_ROUNDS):
+        rows = [(1, replace(speeds, deviation=deviation / np.sqrt(weights))),
+                (0, replace(places, deviation=places.deviation / np.sqrt(seen)))]
+        state = system.solved(rows)[0]
+        weights = _student((state[:, 1] - speeds.value) / deviation)
+        at = Motion(speeds.time_s, state, walk, noise_mps)
+        seen = _student((at._curve(places.time_s, 0) - places.value) / places.deviation)
+    return Motion(speeds.time_s, state, walk, noise_mps)
+
+
+def _student(off: Array) -> Array:
+    """Weights (k,) of what is off by so many deviations."""
+    return np.asarray((_FREEDOM + 1) / (_FREEDOM + off**2))
+
+
+class _System:
+    """The normal equations of a random walk of the acceleration, (3 k, 3 k), as the bands above and on the diagonal."""
+
+    def __init__(self, time_s: Array, walk: float, noise_mps: float) -> None:
+        self._time_s = time_s
+        step = np.diff(time_s)
+        self._forward = _transitions(step)
+        spread = _walked(step) * walk
+        spread[:, 0, 0] += (_SLIP_S * noise_mps) ** 2 * step
+        self._inverse = np.linalg.inv(spread)
+        count = len(time_s)
+        blocks = np.zeros((count, 3, 3))
+        blocks[0] = np.diag(np.array(_UNKNOWN) ** -2.0)
+        turned = self._forward.transpose(0, 2, 1)
+        blocks[:-1] += turned @ self._inverse @ self._forward
+        blocks[1:] += self._inverse
+        self._diagonal, self._beside = blocks, -turned @ self._inverse
+
+    def solved(self, rows: Sequence[tuple[int, Observations]], start: Observations | None = None
+               ) -> tuple[Array, float, float]:
+        """The states (k, 3), the log of the evidence, and the scale of all deviations with the most of it.
+
+        rows    which of distance 0 and speed 1 was observed, and how
+        start   where the way begins, which no scale changes
+        """
+        from scipy.linalg import cho_solve_banded, cholesky_banded
+
+        blocks, pulls, squares, count, logs = self._observed(rows)
+        if start is not None:
+            added, pulled, *_ = self._observed([(0, start)])
+            blocks, pulls = blocks + added - self._diagonal, pulls + pulled
+        root = cholesky_banded(self._bands(blocks))
+        state = cho_solve_banded((root, False), pulls.ravel())
+        left = max(squares - float(pulls.ravel() @ state), 1e-12)
+        variance = left / count
+        determinant = -2 * float(np.log(root[-1]).sum()) + float(np.linalg.slogdet(self._inverse)[1].sum())
+        evidence = 0.5 * (determinant - logs - count * np.log(variance))
+        return state.reshape(-1, 3), evidence, float(np.sqrt(variance))
+
+    def drawn(self, rows: Sequence[tuple[int, Observations]], rng: np.random.Generator) -> Array:
+        """How far off the states (k, 3) may be: the answer to noise in place of all that is known."""
+        from scipy.linalg import cho_solve_banded, cholesky_banded
+
+        noise = [(order, replace(one, value=one.deviation * rng.standard_normal(len(one.value))))
+                 for order, one in rows]
+        blocks, pulls, *_ = self._observed(noise)
+        roots = np.linalg.cholesky(self._inverse)
+        kicks = (roots @ rng.standard_normal((len(roots), 3, 1)))[:, :, 0]
+        pulls[1:] += kicks
+        pulls[:-1] -= (self._forward.transpose(0, 2, 1) @ kicks[:, :, None])[:, :, 0]
+        pulls[0] += rng.standard_normal(3) / np.array(_UNKNOWN)
+        root = cholesky_banded(self._bands(blocks))
+        return np.asarray(cho_solve_banded((root, False), pulls.ravel())).reshape(-1, 3)
+
+    def _observed(self, rows: Sequence[tuple[int, Observations]]) -> tuple[Array, Array, float, int, float]:
+        """Diagonal blocks (k, 3, 3) with what was observed, how it pulls (k, 3), its squares, how much it is, and minus
+        the logs of its weights."""
+        blocks, pulls = self._diagonal.copy(), np.zeros((len(self._time_s), 3))
+        squares, count, logs = 0.0, 0, 0.0
+        for order, one in rows:
+            knot = self._nearest(one.time_s)
+            since = one.time_s - self._time_s[knot]
+            seen = np.stack([np.ones_like(since), since, 0.5 * since**2], axis=1)
+            if order:
+                seen = np.stack([np.zeros_like(since), np.ones_like(since), since], axis=1)
+            weight = one.deviation**-2.0
+            np.add.at(blocks, knot, weight[:, None, None] * seen[:, :, None] * seen[:, None, :])
+            np.add.at(pulls, knot, (weight * one.value)[:, None] * seen)
+            squares += float(weight @ one.value**2)
+            count += len(since)
+            logs -= float(np.log(weight).sum())
+        return blocks, pulls, squares, count, logs
+
+    def _nearest(self, time_s: Array) -> Ints:
+        after = np.clip(np.searchsorted(self._time_s, time_s), 1, len(self._time_s) - 1)
+        earlier = time_s - self._time_s[after - 1] < self._time_s[after] - time_s
+        return np.asarray(after - earlier, dtype=np.intp)
+
+    def _bands(self, blocks: Array) -> Array:
+        """(6, 3 k): row 5 the diagonal, row 5 - d what lies d above it."""
+        count = len(blocks)
+        bands = np.zeros((6, 3 * count))
+        for i in range(3):
+            for j in range(3):
+                if j >= i:
+                    bands[5 - (j - i), j::3] = blocks[:, i, j]
+                bands[5 - (3 + j - i), 3 + j :: 3] = self._beside[:, i, j]
+        return bands
+
+
+def _transitions(step_s: Array) -> Array:
+    """(k, 3, 3) of distance, speed and acceleration over steps (k,)."""
+    found = np.zeros((len(step_s), 3, 3))
+    found[:] = np.eye(3)
+    found[:, 0, 1] = found[:, 1, 2] = step_s
+    found[:, 0, 2] = 0.5 * step_s**2
+    return found
+
+
+def _walked(step_s: Array) -> Array:
+    """Covariances (k, 3, 3) of what a walk of the acceleration of variance 1 a second adds over steps (k,)."""
+    powers = step_s[:, None, None] ** np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
+    return np.asarray(powers / np.array([[20.0, 8.0, 6.0], [8.0, 3.0, 2.0], [6.0, 2.0, 1.0]]))

@@ -1,0 +1,125 @@
+"""A pass over a measured profile, laid on the profile's own distance.
+
+Problem: a receiver's positions are off by metres, a model needs centimetres. Solution: the road itself tells. A model
+of the car is driven over the profile at the distances that the receiver gives. One shift of the whole pass is found
+where what it should have felt and what it felt are most alike; then the two are compared window by window
+(``lab.likelihood.lag``), and where a window was felt is one more observation for the smoother of the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.extraction.along_track import Motion, Observations, motion_of, place_std_m
+from logger.lab.likelihood.lag import SLOWEST_MPS, lags
+from logger.profiles.track import Track
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+GPS_PLACE_M = 3.0
+"""Of a receiver's positions; they are wrong in the same way for a minute or so."""
+_GPS_LASTS_S = 60.0
+_REACH_M, _GRID_M = 30.0, 0.1
+_CLEAR = 6.0
+"""A shift counts if the pass is more alike there than elsewhere by so many deviations of what it is elsewhere."""
+_PEAK_M = 3.0
+_ROUNDS = 4
+_LEAST_STD_M = 0.01  # of a window: no model of a car is exact
+
+
+@dataclass(frozen=True, eq=False)
+class Registered:
+    """A pass on the profile's distance.
+
+    motion         along the profile
+    place_std_m    r.m.s. standard error of a place [m]
+    by_road        whether the road was recognised; False: places are those of the receiver
+    """
+
+    motion: Motion
+    place_std_m: float
+    by_road: bool
+
+
+Predict = Callable[[Array], Array]
+"""What the sensor of a model records (n,) [m/s2] at these distances (n,) of the front tires [m]."""
+
+
+def registered(speeds: Observations, places: Observations, time_s: Array, accel_mps2: Array, rate_hz: float,
+               track: Track, predict: Predict) -> Registered:
+    """Lay a pass on its profile.
+
+    speeds, places    of the receiver: of the front tires, the latter by the profile's distance [m]
+    time_s            (n,) of the readings, at ``rate_hz``, within the times of the fixes
+    accel_mps2        (n,) what was read; 0 where nothing was
+    """
+    spread_m = max(GPS_PLACE_M, float(np.median(places.deviation)))
+    lasting = np.sqrt(max(1.0, _GPS_LASTS_S * len(places.time_s) / max(np.ptp(places.time_s), 1.0)))
+    weak = Observations(places.time_s, places.value, np.full(len(places.value), spread_m * lasting))
+    motion = motion_of(speeds, weak)
+    shift_m = _shift_m(motion.distance_m(time_s), motion.speed_mps(time_s), accel_mps2, track, predict)
+    if shift_m is None:
+        std_m = place_std_m(motion, speeds, weak)
+        return Registered(motion, float(np.sqrt(np.mean(std_m**2))), False)
+    state = motion.state.copy()
+    state[:, 0] += shift_m
+    motion = Motion(motion.time_s, state, motion.walk, motion.noise_mps)
+    felt = weak
+    for _ in range(_ROUNDS):
+        found = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
+        if found is None:
+            break
+        felt = found
+        motion = motion_of(speeds, felt, motion)
+    std_m = place_std_m(motion, speeds, felt)
+    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), True)
+
+
+def _shift_m(distance_m: Array, speed_mps: Array, accel_mps2: Array, track: Track, predict: Predict) -> float | None:
+    """By how much the car was farther than these distances (n,) all the way; None where the road does not tell."""
+    from scipy.signal import correlate
+
+    moving = speed_mps > SLOWEST_MPS
+    if np.count_nonzero(moving) < 2:
+        return None
+    grid_m = np.arange(distance_m[0], distance_m[-1], _GRID_M)
+    if len(grid_m) < 2:
+        return None
+    rising = distance_m + 1e-9 * np.arange(len(distance_m))
+    inside = ((grid_m >= track.start_m) & (grid_m <= track.end_m)).astype(float)
+    measured, predicted = (_evened(np.interp(grid_m, rising, one)) * inside
+                           for one in (accel_mps2, predict(distance_m)))
+    reach = min(round(_REACH_M / _GRID_M), len(grid_m) - 1)
+    alike = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
+    best = int(alike.argmax())
+    far = np.abs(np.arange(len(alike)) - best) > _PEAK_M / _GRID_M
+    if not far.any() or alike[best] < _CLEAR * float(np.sqrt(np.mean(alike[far] ** 2))):
+        return None
+    return (best - reach) * _GRID_M
+
+
+def _evened(samples: Array) -> Array:
+    """Of places (n,), each as loud as the others: one pothole shall not decide."""
+    loud = np.sqrt(np.convolve(samples**2, np.full(201, 1 / 201), "same"))
+    return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
+
+
+def _felt(motion: Motion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict
+          ) -> Observations | None:
+    """Where windows of the road were felt; None where no window is like the profile."""
+    distance_m, speed_mps = motion.distance_m(time_s), motion.speed_mps(time_s)
+    run = Run("", rate_hz, accel_mps2, distance_m, speed_mps, track)
+    found = lags([run], [predict(distance_m)])
+    at_m = distance_m[0] + found.along_m
+    kept = (found.speed_mps > SLOWEST_MPS) & np.isfinite(found.error_s) & (at_m >= track.start_m) & (
+        at_m <= track.end_m)
+    if not kept.any():
+        return None
+    rising = distance_m + 1e-9 * np.arange(len(distance_m))
+    deviation = np.hypot(found.error_s * found.speed_mps, _LEAST_STD_M)
+    return Observations(np.interp(at_m, rising, time_s)[kept], (at_m - found.lag_m)[kept], deviation[kept])
