@@ -31,6 +31,7 @@ from logger.comfort.iso2631 import comfort_word
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
+from logger.service.comfort_columns import LEAST_WORD
 from logger.service.pipeline import longest_wait_us
 from logger.store.log.log_writer import LogName
 from logger.store.log.row_format import read_log
@@ -351,6 +352,8 @@ def _contradicts(said: str, meant: str) -> float:
 
 
 def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    if "hidden" in found.flags:
+        return 0.0 if found.comfort in (LEAST_WORD, "") else inf
     return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
 
 
