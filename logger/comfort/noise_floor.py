@@ -13,6 +13,7 @@ the steps (Widrow and Kollar, Quantization Noise, 4); where they do not, nothing
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,10 @@ from logger.comfort.uncertain_ride import NO_FIGURES, PowerSum, RideFigures, Rid
 
 Array = npt.NDArray[np.float64]
 
-BLURRED_FROM_STEPS = 1 / 3
-"""Standard deviation of what is rounded, in steps, from which on the variance of rounding is step^2 / 12 within a tenth
-on average over where in a step it lies (exp(-2 pi^2 / 9) = 0.11, Widrow and Kollar 4.3)."""
+BLURRED_FROM_STEPS = 0.5
+"""R.m.s. of noise, or of readings less that of rounding, in steps, from which on the variance of rounding is
+step^2 / 12 wherever in a step gravity lies. Readings that toggle between two steps for next to nothing show 0.41:
+sqrt(1/4 - 1/12)."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,14 @@ class NoiseFloor:
         self._rate_hz = rate_hz
         covariance = np.fft.irfft(gain**2)
         self._power = float(covariance[0])
+        self._largest_gain = float(gain.max())
         self._spread = float(((covariance / self._power) ** 2).sum())
 
-    @property
-    def hidden_below_mps2(self) -> float:
-        """The r.m.s. of a ride that can hide in one step: more would have blurred it."""
-        return BLURRED_FROM_STEPS * self._step_mps2
+    def most_hidden_mps2(self, noise_mps2: float) -> float:
+        """The weighted r.m.s. of a ride that can hide between two steps: more would, with the noise, have blurred
+        them."""
+        blurring = (BLURRED_FROM_STEPS * self._step_mps2)**2
+        return self._largest_gain * sqrt(max(blurring - noise_mps2**2, 0.0))
 
     def without(self, raw: RawFigures, noise_mps2: float, log_std: float) -> RideFigures:
         """The figures of the ride alone; none where neither noise nor ride blurs the steps.
@@ -61,15 +65,16 @@ class NoiseFloor:
         noise_mps2    of a reading, before rounding; ``log_std`` is its standard error, a share of it
         """
         rounding = self._step_mps2**2 / 12
-        if self._step_mps2 and raw.accel_rms_mps2**2 - rounding < self.hidden_below_mps2**2:
+        if max(noise_mps2**2, raw.accel_rms_mps2**2 - rounding) < (BLURRED_FROM_STEPS * self._step_mps2)**2:
             return NO_FIGURES
         power = self._power * (noise_mps2**2 + rounding)
         shared = 2 * log_std * self._power * noise_mps2**2
         running = round(self._rate_hz)  # MTVV is over 1 s
         squares = self._squares(raw.count, raw.a_w_mps2, power, shared)
         fourth = raw.vdv_mps175**4 * self._rate_hz - 6 * power * squares.mean - 3 * raw.count * power**2
-        fourths = PowerSum(fourth, self._fourth_variance(raw.count, max(squares.mean, 0.0) / raw.count, power),
-                           6 * abs(squares.mean) * shared)
+        fourth = max(fourth, max(squares.mean, 0.0)**2 / raw.count)  # Jensen's inequality
+        scatter = sqrt(self._fourth_variance(raw.count, max(squares.mean, 0.0) / raw.count, power))
+        fourths = PowerSum(fourth, 0.0, hypot(scatter, 6 * squares.mean * shared))
         return RideSums(raw.count, squares, fourths, self._squares(running, raw.mtvv_mps2, power, shared), running
                         ).figures(1 / self._rate_hz)
 
@@ -81,12 +86,11 @@ class NoiseFloor:
         """Sum of the ride's squares. The ride is taken to be correlated as weighted noise is."""
         mean = count * (rms_mps2**2 - power)
         ride = max(mean / count, 0.0)
-        return PowerSum(mean, self._alike(count) * (4 * ride * power + 2 * power**2), count * shared)
+        return PowerSum(mean, 0.0, hypot(sqrt(self._alike(count) * (4 * ride * power + 2 * power**2)), count * shared))
 
     def _fourth_variance(self, count: int, ride: float, power: float) -> float:
-        """Of the sum of fourth powers, from noise alone: the terms of ``uncertain_ride.power_sums``, the ride taken as
-        Gaussian of the mean square ``ride``."""
-        first = (240 * ride**3 + 288 * ride**2 * power + 144 * ride * power**2) * power
-        second = 72 * (3 * ride**2 + 2 * ride * power + power**2) * power**2
-        return self._alike(count) * (first + second + 96 * ride * power**3 + 24 * power**4)
+        """Of the sum of fourth powers once the expected is taken off: the sum over k of E (4! / (4 - k)! x^(4 - k))^2
+        K^k / k!, as in ``uncertain_ride.power_sums``, the ride x taken as Gaussian of the mean square ``ride``."""
+        return self._alike(count) * (240 * ride**3 * power + 216 * ride**2 * power**2 + 96 * ride * power**3
+                                     + 24 * power**4)
 

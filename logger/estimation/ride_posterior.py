@@ -14,8 +14,7 @@ from math import hypot, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.comfort.noise_floor import BLURRED_FROM_STEPS
-from logger.comfort.uncertain_ride import PowerSum, RideSums, power_means, power_sums
+from logger.comfort.uncertain_ride import PowerSum, RideSums, larger, power_means, power_sums
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.iri_posterior import LEVEL_TRIAL, raised
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -28,9 +27,12 @@ Bools = npt.NDArray[np.bool_]
 _LINES = 1024  # of time that spectra are taken over: ten seconds at 100 Hz, finer than the axles' comb in them
 _LAGS_S = 1.0
 _RUNNING_S = 1.0  # ISO 2631-1 clause 6.3.1
+_RUNNING_PARTS = 2  # of that time: places of its end that are so near together go together
 _LEAST_RESOLVED = 1e-3
-# As found on drives of known ride, with gravity anywhere within a step (tests/benchmarks/comfort_noise.py).
-_ROUGH_LOG_STD, _ROUGH_POWER = 0.04, 3
+# As found on drives of known ride, with gravity anywhere within a step (tests/benchmarks/comfort_noise.py): the share
+# by which a ride is off, times the noise and the third power of what blurs the steps, both in steps.
+_ROUGH_SHARE = 1.8e-4
+_MOST_ROUGH = 0.5  # a value that may be off by so much in one standard error is none
 
 
 @dataclass(frozen=True)
@@ -111,13 +113,17 @@ class RidePosterior:
             accel_variance=float(ride.sum()) * step_hz,
         )
 
-    def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: Place) -> RideSums:
-        """What the figures of the samples ``inside`` (t,) of a block are made of.
+    def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: Place) -> RideSums | None:
+        """What the figures of the samples ``inside`` (t,) of a block are made of; None where the ride hides between two
+        steps.
 
         weighted_mps2    (t,) most probable weighted acceleration
         unread           (t,) there was no reading
         """
         knows = self.knowledge(place.speed_mps, place.spectrum, place.variance)
+        rough = _rough_log_std(knows.accel_variance, place.sensor)
+        if rough > _MOST_ROUGH:
+            return None
         louder = self.knowledge(place.speed_mps, raised(place.spectrum), place.variance)
         numbers = np.flatnonzero(inside)
         span = slice(max(int(numbers[0]) - self._running + 1, 0), int(numbers[-1]) + 1)
@@ -127,7 +133,6 @@ class RidePosterior:
         stretched = mean * (louder.resolved / max(knows.resolved, _LEAST_RESOLVED))
         louder_std = _deviation(louder, unread[span])
         noise_off = 2 * place.noise_log_std * place.sensor.noise_rms_mps2**2 * knows.noise_share
-        rough = _rough_log_std(knows.accel_variance, place.sensor)
 
         def sums_of(chosen: Bools | slice) -> tuple[PowerSum, PowerSum]:
             squares, fourths = power_sums(mean[chosen], std[chosen], knows.correlation)
@@ -143,9 +148,14 @@ class RidePosterior:
         energy = np.concatenate([[0.0], np.cumsum(mean**2 + std**2)])
         ends = numbers - span.start + 1
         sums = energy[ends] - energy[np.maximum(ends - self._running, 0)]
-        end = int(ends[np.argmax(sums)])
-        running, _ = sums_of(slice(max(end - self._running, 0), end))
-        return RideSums(len(numbers), squares, fourths, running, self._running)
+        largest, before = None, 0
+        for part in np.array_split(np.arange(len(ends)), 1 + len(ends) // (self._running // _RUNNING_PARTS)):
+            end = int(ends[part[np.argmax(sums[part])]])
+            running, _ = sums_of(slice(max(end - self._running, 0), end))
+            common = max(1 - (end - before) / self._running, 0.0)
+            largest, before = running if largest is None else larger(largest, running, common), end
+        assert largest is not None
+        return RideSums(len(numbers), squares, fourths, largest, self._running)
 
 
 def _frequencies_hz(count: int, rate_hz: float) -> Array:
@@ -157,7 +167,8 @@ def _deviation(knows: RideKnowledge, unread: Bools) -> Array:
 
 
 def _rough_log_std(accel_variance: float, sensor: Sensor) -> float:
-    """Share by which a ride may be off because it does not blur the steps: the level of the road and where gravity
-    lies within a step are then hard to tell apart."""
-    blurred_steps = sqrt(accel_variance + sensor.noise_rms_mps2**2) / sensor.step_mps2
-    return min(_ROUGH_LOG_STD * (BLURRED_FROM_STEPS / blurred_steps) ** _ROUGH_POWER, 1.0)
+    """Share by which a ride may be off because noise and ride blur the steps little: how rough the road is and where
+    gravity lies within a step are then hard to tell apart, and the propagation of bounds is rough."""
+    noise_steps = sensor.noise_rms_mps2 / sensor.step_mps2
+    blur_steps = sqrt(accel_variance + sensor.noise_rms_mps2**2) / sensor.step_mps2
+    return _ROUGH_SHARE / (noise_steps * blur_steps**3)

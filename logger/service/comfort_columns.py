@@ -47,21 +47,20 @@ class ComfortColumns:
         """What can be said of a window. ``noise`` is what is believed of the sensor's; None: what the settings say."""
         if not isfinite(window.a_w_mps2):
             return NO_COMFORT
+        noise_mps2, log_std = (noise.noise_rms_mps2, noise.log_std) if noise else (self._noise_mps2, 0.0)
         ride = estimate.ride if estimate is not None else NO_FIGURES
         if not isfinite(ride.a_w.value):
             raw = RawFigures(window.samples, window.accel_rms_mps2, window.a_w_mps2, window.mtvv_mps2,
                              window.vdv_mps175)
-            noise_mps2, log_std = (noise.noise_rms_mps2, noise.log_std) if noise else (self._noise_mps2, 0.0)
             ride = self._floor.without(raw, noise_mps2, log_std)
-        word, is_hidden = word_of(ride.a_w, self._floor.hidden_below_mps2)
-        return Comfort(ride, word, is_hidden)
+        return Comfort(ride, *word_of(ride.a_w, self._floor.most_hidden_mps2(noise_mps2)))
 
 
-def word_of(a_w: Uncertain, hidden_below_mps2: float) -> tuple[str, bool]:
+def word_of(a_w: Uncertain, most_hidden_mps2: float) -> tuple[str, bool]:
     """The comfort word of a weighted r.m.s. [m/s2], and whether the ride hides in the noise. A ride that does has the
-    mildest word if its upper bound allows that, else none; ``hidden_below_mps2`` can hide between two steps."""
+    mildest word if its upper bound allows that, else none; ``most_hidden_mps2`` can hide between two steps."""
     is_known = isfinite(a_w.value)
     if is_known and a_w.value >= TOLD_FROM_STDS * a_w.std:
         return comfort_word(a_w.value), False
-    bound_mps2 = max(a_w.value + TOLD_FROM_STDS * a_w.std if is_known else 0.0, hidden_below_mps2)
+    bound_mps2 = max(a_w.value + TOLD_FROM_STDS * a_w.std if is_known else 0.0, most_hidden_mps2)
     return LEAST_WORD if comfort_word(bound_mps2) == LEAST_WORD else "", True

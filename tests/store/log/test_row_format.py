@@ -39,8 +39,8 @@ RECORD = WindowRecord(
 )
 NOTHING_NEW = {"a_w_std_mps2": None, "mtvv_std_mps2": None, "vdv_std_mps175": None, "a_w_raw_mps2": None,
                "mtvv_raw_mps2": None, "vdv_raw_mps175": None}
-OLD_BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,2.345,"
-        "0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
+OLD_BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,"
+            "2.345,0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
 BODY = OLD_BODY + ",0.0200,0.0300,0.0400,0.5000,0.9500,1.3000"
 UNKNOWN = replace(
     RECORD, utc_us=None, distance_start_m=None, distance_end_m=None, lat_deg=None, lon_deg=None, speed_mps=None,
