@@ -7,7 +7,7 @@ weighting the power K = s^2 times the mean of |W|^2 over frequency. It is indepe
 
 (moments of a normal distribution), whatever the ride is: no model of car or road is needed. How far a window's sums
 scatter about that follows from the correlation of the weighted noise. Rounding is such noise where noise and ride blur
-the steps (Widrow and Kollar, Quantization Noise, 4); where they do not, nothing is known but a bound.
+the steps (Widrow and Kollar, Quantization Noise, 2008); where they do not, nothing is known but a bound.
 """
 
 from __future__ import annotations

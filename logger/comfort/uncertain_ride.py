@@ -5,9 +5,8 @@ most probable ride is too low, because what the readings leave open is missing i
 
 Solution. The weighted acceleration is known as a Gaussian process: a mean m and a covariance C of what is left open.
 The sums that the figures are made of, of its square and its fourth power, have means and variances in closed form,
-because m + s z is a short sum of Hermite polynomials of z (for the square of a Gaussian path: Isserlis, Biometrika 12,
-1918; for covariances of functions of it: Mehler's formula, as in Papoulis, Probability, 7-3). A figure is a root of
-such a sum, which is taken to be gamma distributed.
+because a power of m + s z is a short sum of Hermite polynomials of z (Isserlis, Biometrika 12, 1918, for moments;
+Mehler's formula for covariances). A figure is a root of such a sum, which is taken to be gamma distributed.
 """
 
 from __future__ import annotations
@@ -104,7 +103,7 @@ class RideSums:
 
 def larger(one: PowerSum, other: PowerSum, correlation: float) -> PowerSum:
     """The larger of two sums that go together by a correlation, taken as Gaussian: expected to be more than the larger
-    expectation. (Clark, Operations Research 9, 1961, equations 2 to 4.)"""
+    expectation. (Clark, Operations Research 9, 1961.)"""
     high, low = (one, other) if one.mean >= other.mean else (other, one)
     apart = sqrt(max(one.variance + other.variance - 2 * correlation * sqrt(one.variance * other.variance), 0.0))
     if apart == 0.0:
