@@ -10,7 +10,9 @@ class WindowRecord:
     """One window of a drive (25 ft of travelled distance by default). None: cannot be known; ``flags`` say why.
 
     Times are integer microseconds: ``t_us`` of the monotonic clock at the window's start, ``utc_us`` since
-    1970-01-01 UTC of the same instant. Position is that of the window's middle. Intervals are half-open.
+    1970-01-01 UTC of the same instant. Position is that of the window's middle. Intervals are half-open. ``a_w``, MTVV
+    and VDV are of the ride alone, with their standard errors; ``raw`` ones of the readings, noise and rounding in them.
+    Rows of older logs have raw values in the first place, and nothing in the last six.
     """
 
     segment: int
@@ -36,3 +38,9 @@ class WindowRecord:
     samples: int
     clipped_samples: int
     flags: tuple[str, ...]
+    a_w_std_mps2: float | None = None
+    mtvv_std_mps2: float | None = None
+    vdv_std_mps175: float | None = None
+    a_w_raw_mps2: float | None = None
+    mtvv_raw_mps2: float | None = None
+    vdv_raw_mps175: float | None = None

@@ -28,7 +28,7 @@ from logger.roads.iri import PER_KM
 Array = npt.NDArray[np.float64]
 
 _SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
-_LEVEL_TRIAL = 0.3
+LEVEL_TRIAL = 0.3
 _FORGOTTEN_M = 40.0
 
 
@@ -134,14 +134,14 @@ def window_iri(
     # Were the level higher, more of the readings would be taken for road, and more be left open.
     stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
-    shared = (more - mean) / _LEVEL_TRIAL * log_level_std
+    shared = (more - mean) / LEVEL_TRIAL * log_level_std
     change = float(absolute[-1] - absolute[0]) / length_m
     return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * abs(shared), PER_KM * change)
 
 
 def raised(spectrum: RoadSpectrum) -> RoadSpectrum:
     """A somewhat rougher road, to see what the road's level does to an estimate."""
-    return replace(spectrum, log_level=spectrum.log_level + _LEVEL_TRIAL)
+    return replace(spectrum, log_level=spectrum.log_level + LEVEL_TRIAL)
 
 
 def _deviation(knowledge: SlopeKnowledge, unseen: Array) -> Array:

@@ -50,10 +50,12 @@ _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 @dataclass(frozen=True)
 class SolvedBlock:
     """road      (k,) rfft of the elevations on the block's grid [m]
+    accel_mps2   (t,) what the car does on it
     variance     of a reading, noise, rounding and the car's own error, while it moved [(m/s2)2]
     """
 
     road: ComplexArray
+    accel_mps2: Array
     variance: float
 
 
@@ -87,6 +89,11 @@ class FollowedRoad:
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
+
+    @property
+    def sensor(self) -> Sensor:
+        """As it is believed to be now."""
+        return self._sensor
 
     @property
     def noise_stretches(self) -> int:
@@ -180,7 +187,7 @@ class FollowedRoad:
             self._belief = with_noise(self._belief, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
-        return SolvedBlock(solution.road, typical)
+        return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, typical)
 
     def _as_gaussian(self, samples: Samples) -> Readings:
         if not self._is_coarse:

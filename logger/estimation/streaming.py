@@ -9,12 +9,14 @@ Splitting the readings differently changes nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from math import ceil, hypot, nan, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
 from logger.estimation.iri_posterior import (
     SlopeErrors,
@@ -27,6 +29,7 @@ from logger.estimation.iri_posterior import (
 )
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad
+from logger.estimation.ride_posterior import Place, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -34,6 +37,7 @@ from logger.estimation.time_grid import RATE_HZ, Samples
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
 
 BLOCK_SAMPLES = 2048
@@ -56,6 +60,7 @@ class WindowEstimate:
                         this speed, ``unsettled`` next to the start of the readings or a hole in them
     iri_std_m_per_km    its standard error [m/km], NaN likewise
     resolved            share of the variance of the IRI's slope that the readings tell, 0 to 1
+    ride                figures of the weighted acceleration without noise and rounding; nan where they are not known
     """
 
     number: int
@@ -63,6 +68,7 @@ class WindowEstimate:
     iri_std_m_per_km: float
     resolved: float
     flags: frozenset[str]
+    ride: RideFigures = NO_FIGURES
 
 
 @dataclass(frozen=True)
@@ -88,6 +94,7 @@ class _Piece:
     resolved: float
     missing: str = ""
     speed_mps: float = 0.0
+    ride: RideSums | None = None
 
 
 class RoadEstimator:
@@ -103,6 +110,8 @@ class RoadEstimator:
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
     noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
+    ride_response    of the comfort weighting at frequencies (n,) [Hz], and the figures of the ride are told; None: not
+    ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
     """
 
     def __init__(
@@ -116,6 +125,8 @@ class RoadEstimator:
         on_road: Callable[[RoadPiece], None] | None = None,
         late_std_s: float = 0.0,
         noise: NoiseBelief | None = None,
+        ride_response: Callable[[Array], ComplexArray] | None = None,
+        ride_ahead_m: float = 0.0,
     ) -> None:
         self._car = CarResponse(structure, output)
         self._takes_bounds = sensor.is_coarse
@@ -129,6 +140,8 @@ class RoadEstimator:
         self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
         self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
         self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error, noise)
+        self._ride = RidePosterior(self._car, ride_response, BLOCK_SAMPLES, RATE_HZ) if ride_response else None
+        self._ride_ahead_m = ride_ahead_m
         self._start_anew()
 
     @property
@@ -217,6 +230,7 @@ class RoadEstimator:
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(block.seen(read), self._spacing_m)
+        weighted = self._ride.weighted(solved.accel_mps2) if self._ride is not None else None
         estimates: list[WindowEstimate] = []
         for number in due:
             low = round((number * self._piece_m - block.start_m) / self._spacing_m)
@@ -229,9 +243,23 @@ class RoadEstimator:
                 back = round(_REMEMBERED_M / self._spacing_m)
                 level = self._road.level_at(number * self._points - back, back + self._points + 1)
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
+                if weighted is not None:
+                    log_std = self.noise.log_std if self.noise is not None else 0.0
+                    place = Place(speed_mps, solved.variance, *level, self._road.sensor, log_std)
+                    piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
         return estimates
+
+    def _ride_sums(
+        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place
+    ) -> RideSums | None:
+        """What was felt in a piece while the car moved; None where that is not in the block."""
+        assert self._ride is not None
+        begin_m = number * self._piece_m + self._ride_ahead_m
+        inside = (samples.distance_m >= begin_m) & (samples.distance_m < begin_m + self._piece_m) & moving
+        inside[:round(ENTRY_S * RATE_HZ)] = False
+        return self._ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
 
     def _speed_mps(self, samples: Samples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
@@ -266,8 +294,9 @@ class RoadEstimator:
         pieces, self._gathered = self._gathered, []
         resolved = sum(one.resolved for one in pieces) / len(pieces)
         flags = frozenset(one.missing for one in pieces if one.missing)
+        ride = _joined_ride(pieces)
         if flags:
-            return [WindowEstimate(number // self._pieces_per_window, nan, nan, resolved, flags)]
+            return [WindowEstimate(number // self._pieces_per_window, nan, nan, resolved, flags, ride)]
         iri = [one.iri for one in pieces]
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
         shared = sum(one.shared_std_m_per_km for one in iri) / len(iri)
@@ -275,7 +304,7 @@ class RoadEstimator:
         late_m = self._late_std_s * sum(one.speed_mps for one in pieces) / len(pieces)
         misplaced = hypot(self._place_std_m, late_m) * sum(one.change_per_m for one in iri) / len(iri)
         std = hypot(own, shared, misplaced)
-        return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags)]
+        return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride)]
 
     def _give_road(
         self, number: int, elevation: Array, speed_mps: float, variance: float, spectrum: RoadSpectrum
@@ -291,3 +320,8 @@ class RoadEstimator:
 
 def _nothing(missing: str) -> _Piece:
     return _Piece(WindowIri(nan, nan, nan, nan), 0.0, missing)
+
+
+def _joined_ride(pieces: list[_Piece]) -> RideFigures:
+    sums = [one.ride for one in pieces if one.ride is not None]
+    return reduce(RideSums.plus, sums).figures(1 / RATE_HZ) if len(sums) == len(pieces) else NO_FIGURES

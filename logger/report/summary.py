@@ -97,8 +97,7 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
     dated = [record for record in records if record.utc_us is not None]
     mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True)
                      if counts(record))
-    mean_square = _mean((None if record.a_w_mps2 is None else record.a_w_mps2**2, record.duration_s)
-                        for record in records if counts(record))
+    mean_square = _mean((_mean_square(record), record.duration_s) for record in records if counts(record))
     return DriveSummary(
         windows=len(records),
         drives=len(split_drives(records)),
@@ -115,6 +114,11 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
         roughest=_roughest(records),
         flags=dict(Counter(flag for record in records for flag in record.flags).most_common()),
     )
+
+
+def _mean_square(record: WindowRecord) -> float | None:
+    """Of the weighted acceleration of a window, as it is expected: what is open of it counts too [(m/s2)2]."""
+    return None if record.a_w_mps2 is None else record.a_w_mps2**2 + (record.a_w_std_mps2 or 0.0)**2
 
 
 def counts(record: WindowRecord) -> bool:

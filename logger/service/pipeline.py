@@ -14,7 +14,7 @@ from math import hypot, isfinite, nan
 import numpy as np
 
 from drivers.readings import AccelerationBlock, Fix
-from logger.comfort.iso2631 import comfort_word
+from logger.comfort.uncertain_ride import NO_FIGURES
 from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.noise_belief import NoiseBelief
@@ -22,6 +22,7 @@ from logger.estimation.rms_relation import RmsRelation
 from logger.estimation.streaming import RoadEstimator, WindowEstimate
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
+from logger.service.comfort_columns import ComfortColumns
 from logger.service.frozen_sensor import Stillness
 from logger.service.iri_queue import RoughnessQueue, Waiting
 from logger.service.odometer import Odometer
@@ -73,11 +74,12 @@ class Pipeline:
 
     def __init__(
         self, settings: PipelineSettings, chain: SignalChain, relation: RmsRelation, estimator: RoadEstimator,
-        alignment: DriveAlignment,
+        alignment: DriveAlignment, comfort: ComfortColumns,
     ) -> None:
         self._settings = settings
         self._chain = chain
         self._relation = relation
+        self._comfort = comfort
         self._roughness = RoughnessQueue(estimator)
         self._cutter = WindowCutter(settings.window_m, settings.blind_window_s, GRID_STEP_US)
         self._bridge_us = round(settings.bridge_s * US_PER_S)
@@ -251,12 +253,16 @@ class Pipeline:
         if window.start_m is not None and self.speed_check.covers(window.t_us, end_us):
             flags.add("speed_doubtful")
         if flags & {"frozen", "repeated", "speed_doubtful"}:
-            estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan)
+            estimate = estimate and replace(estimate, iri_m_per_km=nan, iri_std_m_per_km=nan, ride=NO_FIGURES)
         if estimate is not None:
             flags |= estimate.flags
         elif window.start_m is not None and "partial" not in flags:
             flags.add("unsettled")
         iri = _known(estimate.iri_m_per_km) if estimate is not None else None
+        comfort = self._comfort.of(window, estimate, self.noise)
+        if comfort.is_hidden:
+            flags.add("hidden")
+        ride = comfort.ride
         crest = window.peak_mps2 / window.a_w_mps2 if window.a_w_mps2 > 0.0 else float("nan")
         self._segment += 1
         return WindowRecord(
@@ -273,16 +279,22 @@ class Pipeline:
             iri_m_per_km=iri,
             iri_std_m_per_km=_iri_std(estimate, "gps_lost" in flags) if estimate is not None else None,
             iri_rms_m_per_km=self._iri_by_rms(window, flags),
-            a_w_mps2=_known(window.a_w_mps2),
-            mtvv_mps2=_known(window.mtvv_mps2),
-            vdv_mps175=_known(window.vdv_mps175),
+            a_w_mps2=_known(ride.a_w.value),
+            mtvv_mps2=_known(ride.mtvv.value),
+            vdv_mps175=_known(ride.vdv.value),
             crest_factor=_known(crest),
-            comfort=comfort_word(window.a_w_mps2) if isfinite(window.a_w_mps2) else "",
+            comfort=comfort.word,
             iri_class=iri_class(iri) if iri is not None else "",
             accel_rms_mps2=_known(window.accel_rms_mps2),
             samples=window.samples,
             clipped_samples=window.clipped,
             flags=tuple(sorted(flags)),
+            a_w_std_mps2=_known(ride.a_w.std),
+            mtvv_std_mps2=_known(ride.mtvv.std),
+            vdv_std_mps175=_known(ride.vdv.std),
+            a_w_raw_mps2=_known(window.a_w_mps2),
+            mtvv_raw_mps2=_known(window.mtvv_mps2),
+            vdv_raw_mps175=_known(window.vdv_mps175),
         )
 
     def _iri_by_rms(self, window: Window, flags: set[str]) -> float | None:

@@ -36,6 +36,7 @@ NEARLY = 1.02
 """So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz."""
 
 Floats = npt.NDArray[np.float64]
+ComplexFloats = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
 Times = npt.NDArray[np.int64]
 
@@ -259,3 +260,15 @@ def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:
         return total
 
     return gain
+
+
+def weighted_response(weighting: Weighting, low_pass_hz: float | None) -> Callable[[Floats], ComplexFloats]:
+    """What the chain makes of a body acceleration on its way to the comfort figures: complex response at frequencies
+    (n,) from 0 to half the grid's rate [Hz], without the sections' delay."""
+    def response(f_hz: Floats) -> ComplexFloats:
+        total = weighting.response(f_hz)
+        if low_pass_hz:
+            total = total * frequency_response(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ), f_hz, GRID_RATE_HZ)
+        return total
+
+    return response

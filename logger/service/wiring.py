@@ -8,11 +8,14 @@ from math import sqrt
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from drivers.accelerometers import accelerometers
 from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import DumpHeader
 from drivers.errors import SettingsError, shortened
 from drivers.nmea import NmeaDecoder
+from logger.comfort.noise_floor import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
 from logger.dsp.weightings.wk import WEIGHTING
@@ -24,15 +27,18 @@ from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import RoadEstimator
 from logger.service import noise_learning
+from logger.service.comfort_columns import ComfortColumns
 from logger.service.config import AUTO, AXES, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, Config
 from logger.service.noise_learning import KnownNoise
 from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.service.receiver_learning import at_start, from_fields, header_fields
-from logger.service.signal_chain import Axis, SignalChain, recorder_gain
+from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
 from logger.shipped import vehicle_file, vehicle_names, version
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import Vehicle
+
+_FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through
 
 
 @dataclass(frozen=True)
@@ -94,10 +100,14 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Bel
         structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
         late_std_s=receiver.std_s,
         noise=sensor.noise,
+        # Where the noise blurs the steps, its power is all there is to take off: no model of the car is needed.
+        ride_response=weighted_response(WEIGHTING, low_pass_hz) if sensor.sensor.is_coarse else None,
+        ride_ahead_m=settings.front_axle_ahead_m,
     )
     alignment = DriveAlignment(axis.column, axis.sign)
-    relation = rms_relation(vehicle, recorder_gain(config.pipeline.low_pass_hz))
-    return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment)
+    columns = ComfortColumns(_noise_floor(sensor.sensor, low_pass_hz), sensor.sensor)
+    relation = rms_relation(vehicle, recorder_gain(low_pass_hz))
+    return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns)
 
 
 def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
@@ -106,6 +116,12 @@ def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
     make_filter = FixedFilter.for_acceleration if config.pipeline.arithmetic == "fixed" else BlockFilter
     return SignalChain(axis, WEIGHTING, sensor.oversample, config.pipeline.low_pass_hz, sensor.sensor.is_coarse,
                        make_filter)
+
+
+def _noise_floor(sensor: Sensor, low_pass_hz: float | None) -> NoiseFloor:
+    f_hz = np.linspace(0.0, GRID_RATE_HZ / 2, _FLOOR_LINES)
+    gain = np.abs(weighted_response(WEIGHTING, low_pass_hz)(f_hz))
+    return NoiseFloor(gain, GRID_RATE_HZ, sensor.step_mps2)
 
 
 def notices(vehicle: Vehicle) -> tuple[str, ...]:

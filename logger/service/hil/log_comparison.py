@@ -31,6 +31,7 @@ from logger.comfort.iso2631 import comfort_word
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
+from logger.service.comfort_columns import LEAST_WORD
 from logger.service.pipeline import longest_wait_us
 from logger.store.log.log_writer import LogName
 from logger.store.log.row_format import read_log
@@ -73,6 +74,8 @@ class Tolerance:
         return max(self.least, self.share * scale) if scale is not None else self.least
 
 
+_COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("VDV", "vdv", "m/s1.75", "mps175"))
+
 TOLERANCES = (
     Tolerance("start", "s", 0.03, "three steps of the sample grid"),
     Tolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by"),
@@ -86,6 +89,10 @@ TOLERANCES = (
     Tolerance("MTVV", "m/s2", 0.03, "as a_w; its greatest second may end in the next window", share=0.15,
               of="mtvv_mps2"),
     Tolerance("VDV", "m/s1.75", 0.03, "as a_w", share=0.15, of="vdv_mps175"),
+    *(Tolerance(f"{name} std", unit, 0.03, f"as {name}", share=0.25, of=f"{column}_std_{suffix}")
+      for name, column, unit, suffix in _COMFORT),
+    *(Tolerance(f"{name} raw", unit, 0.03, f"as {name}", share=0.15, of=f"{column}_raw_{suffix}")
+      for name, column, unit, suffix in _COMFORT),
     Tolerance("crest", "", 0.3, "a peak at the edge belongs to the next window", share=0.2, of="crest_factor"),
     Tolerance("comfort", "", 0, "the words for the row's own a_w"),
     Tolerance("IRI", "m/km", 0.1, "far below what the estimate claims to know", share=0.25, of="iri_std_m_per_km"),
@@ -351,6 +358,8 @@ def _contradicts(said: str, meant: str) -> float:
 
 
 def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
+    if "hidden" in found.flags:
+        return 0.0 if found.comfort in (LEAST_WORD, "") else inf
     return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
 
 
@@ -378,6 +387,8 @@ _MEASURES: dict[str, Measure] = {
     "accel rms": _of("accel_rms_mps2"),
     "MTVV": _of("mtvv_mps2"),
     "VDV": _of("vdv_mps175"),
+    **{f"{name} {kind}": _of(f"{column}_{kind}_{suffix}")
+       for kind in ("std", "raw") for name, column, _unit, suffix in _COMFORT},
     "crest": _of("crest_factor"),
     "comfort": _comfort_contradicts,
     "IRI": _of("iri_m_per_km"),

@@ -24,7 +24,7 @@ from logger.store.log.quarantine import (
     set_aside_if_possible,
     warn_in_journal,
 )
-from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.row_format import HEADER, as_now, format_row
 from logger.store.log.session_counter import COUNTER
 from logger.store.log.sidecar import (
     SETTINGS_LOST,
@@ -300,7 +300,7 @@ def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]
     """The text of a log with these rows, UTC filled in, in blocks."""
     lines = [HEADER]
     for row in rows:
-        lines.append(row.text if clock is None or row.record.utc_us is not None
+        lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
                      else format_row(_with_utc(row.record, clock)))
         if len(lines) >= _BLOCK_ROWS:
             yield _joined(lines)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import isfinite
@@ -167,9 +167,23 @@ COLUMNS = (
     _number("accel_rms_mps2", 4),
     _count("samples"),
     _count("clipped_samples"),
+    _number("a_w_std_mps2", 4),
+    _number("mtvv_std_mps2", 4),
+    _number("vdv_std_mps175", 4),
+    _number("a_w_raw_mps2", 4),
+    _number("mtvv_raw_mps2", 4),
+    _number("vdv_raw_mps175", 4),
 )
-HEADER = ",".join([*(column.name for column in COLUMNS), "crc32"])
-_HEADER_BYTES = HEADER.encode()
+_OLD_COUNT = 23
+"""Columns of logs that did not tell the ride from the noise yet."""
+
+
+def _header(columns: Sequence[Column]) -> str:
+    return ",".join([*(column.name for column in columns), "crc32"])
+
+
+HEADER = _header(COLUMNS)
+OLD_HEADER = _header(COLUMNS[:_OLD_COUNT])
 SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
 """A row of which nothing is known but what always is."""
 
@@ -184,7 +198,8 @@ def format_row(record: WindowRecord) -> str:
 
 
 def parse_row(text: str) -> WindowRecord:
-    """The record of a row. UTC comes back in whole milliseconds, floats with the decimals of their column.
+    """The record of a row, also of an old one without standard errors and raw values. UTC comes back in whole
+    milliseconds, floats with the decimals of their column.
 
     Raises ``BadRow`` when the check value or any field is not as it should be.
     """
@@ -192,13 +207,18 @@ def parse_row(text: str) -> WindowRecord:
     if f"{zlib.crc32(body.encode('utf-8', 'replace')):08x}" != check:
         raise BadRow("expected a row that fits its crc32")
     fields = body.split(",")
-    if len(fields) != len(COLUMNS):
+    if len(fields) not in (_OLD_COUNT, len(COLUMNS)):
         raise BadRow(f"expected {len(COLUMNS) + 1} columns, found {len(fields) + 1}")
     try:
         return WindowRecord(**{column.attribute: column.read(field)
-                               for column, field in zip(COLUMNS, fields, strict=True)})
+                               for column, field in zip(COLUMNS, fields, strict=False)})
     except ValueError as error:  # a number or a date that is none
         raise BadRow(str(error)[:2 * _SHOWN]) from None
+
+
+def as_now(text: str, record: WindowRecord) -> str:
+    """An intact row as rows are written now, so that a file does not hold rows of two kinds."""
+    return text if text.count(",") == len(COLUMNS) else format_row(record)
 
 
 class Row(NamedTuple):
@@ -228,8 +248,9 @@ def scan(file: BinaryIO) -> Iterator[Row]:
         text = line.removesuffix(b"\n")
         torn = len(text) == len(line) < LINE_BYTES
         if number == 1:
-            if text != _HEADER_BYTES:
-                rest = text[len(_HEADER_BYTES) + 1:] if text.startswith(_HEADER_BYTES) else text
+            if text not in (HEADER.encode(), OLD_HEADER.encode()):
+                header = next((one for one in (HEADER, OLD_HEADER) if text.startswith(one.encode())), "")
+                rest = text[len(header) + 1:] if header else text
                 yield from _salvaged(1, rest, torn)
                 yield Row(1, "", None, "expected the header line of a segment log", torn, len(text))
             continue
@@ -266,7 +287,7 @@ def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
     """The intact rows inside a damaged line: those whose newline was lost."""
     start = 0
     for end in _ROW_END.finditer(line):
-        if line.count(b",", start, end.end()) != len(COLUMNS):
+        if line.count(b",", start, end.end()) not in (_OLD_COUNT, len(COLUMNS)):
             continue
         row = line[start:end.end()].decode("ascii", "replace")
         try:

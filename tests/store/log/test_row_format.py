@@ -18,9 +18,11 @@ from logger.store.log.row_format import (
     HEADER,
     LARGEST,
     LINE_BYTES,
+    OLD_HEADER,
     SHORTEST_ROW_BYTES,
     BadRow,
     Column,
+    as_now,
     format_row,
     parse_row,
     read_log,
@@ -32,14 +34,18 @@ RECORD = WindowRecord(
     distance_start_m=1000.125, distance_end_m=1007.745, lat_deg=-50.08765432, lon_deg=14.4212345, speed_mps=16.7,
     iri_m_per_km=2.345, iri_std_m_per_km=0.6, iri_rms_m_per_km=2.3449999, a_w_mps2=0.43212, mtvv_mps2=0.9,
     vdv_mps175=1.234, crest_factor=3.2, comfort="a_little_uncomfortable", iri_class="A", accel_rms_mps2=0.6543,
-    samples=46, clipped_samples=1, flags=("clipped", "gap"),
+    samples=46, clipped_samples=1, flags=("clipped", "gap"), a_w_std_mps2=0.02, mtvv_std_mps2=0.03,
+    vdv_std_mps175=0.04, a_w_raw_mps2=0.5, mtvv_raw_mps2=0.95, vdv_raw_mps175=1.3,
 )
-BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,2.345,"
-        "0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
+NOTHING_NEW = {"a_w_std_mps2": None, "mtvv_std_mps2": None, "vdv_std_mps175": None, "a_w_raw_mps2": None,
+               "mtvv_raw_mps2": None, "vdv_raw_mps175": None}
+OLD_BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,"
+            "2.345,0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
+BODY = OLD_BODY + ",0.0200,0.0300,0.0400,0.5000,0.9500,1.3000"
 UNKNOWN = replace(
     RECORD, utc_us=None, distance_start_m=None, distance_end_m=None, lat_deg=None, lon_deg=None, speed_mps=None,
     iri_m_per_km=None, iri_std_m_per_km=None, iri_rms_m_per_km=None, a_w_mps2=None, mtvv_mps2=None, vdv_mps175=None,
-    crest_factor=None, accel_rms_mps2=None, comfort="", iri_class="", flags=(),
+    crest_factor=None, accel_rms_mps2=None, comfort="", iri_class="", flags=(), **NOTHING_NEW,
 )
 CONTRACT = ("segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,"
             "iri_std_m_per_km,iri_rms_m_per_km,a_w_mps2,mtvv_mps2,vdv_mps175,crest_factor,comfort,iri_class,flags,")
@@ -54,6 +60,8 @@ records = st.builds(
     crest_factor=maybe, comfort=st.sampled_from(["", "uncomfortable"]), iri_class=st.sampled_from(["", "C"]),
     accel_rms_mps2=maybe, samples=st.integers(0, 10**6), clipped_samples=st.integers(0, 10**6),
     flags=st.lists(st.sampled_from(["gap", "slow", "time_unset"]), unique=True).map(tuple),
+    a_w_std_mps2=maybe, mtvv_std_mps2=maybe, vdv_std_mps175=maybe, a_w_raw_mps2=maybe, mtvv_raw_mps2=maybe,
+    vdv_raw_mps175=maybe,
 )
 
 
@@ -85,7 +93,7 @@ def test_row_by_hand() -> None:
 
 
 def test_row_of_what_is_not_known_by_hand() -> None:
-    assert format_row(UNKNOWN) == checked("123,,1234.567890" + "," * 16 + "2,0.456789,,46,1")
+    assert format_row(UNKNOWN) == checked("123,,1234.567890" + "," * 16 + "2,0.456789,,46,1" + "," * 6)
     assert parse_row(format_row(UNKNOWN)) == UNKNOWN
 
 
@@ -229,4 +237,25 @@ def test_no_row_is_shorter_than_one_of_which_nothing_is_known() -> None:
     unknown = {column.attribute: None for column in COLUMNS}
     counts = {"segment": 1, "t_us": 0, "comfort": "", "iri_class": "", "flags": (), "drive": 1, "duration_s": 0.0,
               "samples": 0, "clipped_samples": 0}
-    assert len(format_row(WindowRecord(**(unknown | counts)))) + 1 == SHORTEST_ROW_BYTES
+    shortest = format_row(WindowRecord(**(unknown | counts)))
+    assert len(shortest) + 1 - len(NOTHING_NEW) == SHORTEST_ROW_BYTES  # those of old logs are the shorter ones
+
+
+def test_rows_of_old_logs_are_read_and_end_without_what_they_did_not_hold() -> None:
+    record = parse_row(checked(OLD_BODY))
+    assert record == replace(parse_row(checked(BODY)), **NOTHING_NEW)
+    data = f"{OLD_HEADER}\n{checked(OLD_BODY)}\n".encode()
+    assert intact(data) == [checked(OLD_BODY)]
+    assert damaged(data) == 0
+
+
+def test_an_old_row_beside_a_lost_newline_is_found() -> None:
+    data = f"{OLD_HEADER}\n{checked(OLD_BODY)}x{checked(OLD_BODY)}\n".encode()
+    assert intact(data)
+    assert damaged(data) == 1
+
+
+def test_an_old_row_is_written_again_as_rows_are_now() -> None:
+    old, now = checked(OLD_BODY), checked(OLD_BODY + "," * 6)
+    assert as_now(old, parse_row(old)) == now
+    assert as_now(now, parse_row(now)) is now

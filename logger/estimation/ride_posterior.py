@@ -1,0 +1,174 @@
+"""What readings say of the weighted acceleration of the ride itself, without noise and rounding.
+
+The block's solution is the most probable acceleration of the car; its weighting is that of the ride. For a steady speed
+what the readings leave open of it is, by frequency, |W|^2 S N / (S + N): S the spectrum that the road gives the car, N
+that of the noise, W the weighting. Where nothing was read, all of |W|^2 S is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import hypot, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.comfort.uncertain_ride import PowerSum, RideSums, larger, power_means, power_sums
+from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse
+from logger.estimation.iri_posterior import LEVEL_TRIAL, raised
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.sensor_noise import Sensor
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+Bools = npt.NDArray[np.bool_]
+
+_LINES = 1024  # of time that spectra are taken over: ten seconds at 100 Hz, finer than the axles' comb in them
+_LAGS_S = 1.0
+_RUNNING_S = 1.0  # ISO 2631-1 clause 6.3.1
+_RUNNING_PARTS = 2  # of that time: places of its end that are so near together go together
+_LEAST_RESOLVED = 1e-3
+# As found on drives of known ride, with gravity anywhere within a step (tests/benchmarks/comfort_noise.py): the share
+# by which a ride is off, times the noise and the third power of what blurs the steps, both in steps.
+_ROUGH_SHARE = 1.8e-4
+_MOST_ROUGH = 0.5  # a value that may be off by so much in one standard error is none
+
+
+@dataclass(frozen=True)
+class RideKnowledge:
+    """What the readings leave open of the weighted acceleration at a steady speed.
+
+    variance       before anything is read [(m/s2)2]
+    left           of it, once the readings are known
+    correlation    (l,) of what is left, at lags of whole samples
+    noise_share    of the variance of a reading's noise, what gets into the weighted acceleration
+    accel_variance    of the acceleration before the weighting, before anything is read [(m/s2)2]
+    """
+
+    variance: float
+    left: float
+    correlation: Array
+    noise_share: float
+    accel_variance: float
+
+    @property
+    def resolved(self) -> float:
+        """Share of the variance that the readings tell."""
+        return 1 - self.left / self.variance
+
+
+@dataclass(frozen=True)
+class Place:
+    """What is known where a ride was felt.
+
+    speed_mps        steady; ``variance`` of a reading there, as the solution took it [(m/s2)2]
+    spectrum         of the road there, ``log_level_std`` the standard error of its log level
+    sensor           as it is believed to be, ``noise_log_std`` the standard error of its noise, a share of it
+    """
+
+    speed_mps: float
+    variance: float
+    spectrum: RoadSpectrum
+    log_level_std: float
+    sensor: Sensor
+    noise_log_std: float
+
+
+class RidePosterior:
+    """The weighted ride of one car, in blocks of ``count`` samples at ``rate_hz``.
+
+    response    of the weighting at frequencies (n,) [Hz]
+    """
+
+    def __init__(
+        self, car: CarResponse, response: Callable[[Array], ComplexArray], count: int, rate_hz: float
+    ) -> None:
+        self._car = car
+        self._rate_hz = rate_hz
+        self._count = count
+        self._response = response(_frequencies_hz(count, rate_hz))
+        self._f_hz = _frequencies_hz(_LINES, rate_hz)
+        self._power = np.abs(response(self._f_hz)) ** 2
+        self._lags = round(_LAGS_S * rate_hz)
+        self._running = round(_RUNNING_S * rate_hz)
+
+    def weighted(self, accel_mps2: Array) -> Array:
+        """The acceleration (count,) of a block, weighted; its first seconds are those of a start."""
+        return np.fft.irfft(np.fft.rfft(accel_mps2) * self._response, self._count)
+
+    def knowledge(self, speed_mps: float, spectrum: RoadSpectrum, variance: float) -> RideKnowledge:
+        """For readings of this variance [(m/s2)2] at this speed [m/s]."""
+        per_cpm = self._car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
+        ride = np.interp(self._f_hz / speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / speed_mps
+        noise = 2 * variance / self._rate_hz
+        told = ride / (ride + noise)
+        step_hz = self._rate_hz / _LINES
+        left = np.fft.irfft(self._power * told * noise)[:self._lags] * self._rate_hz / 2
+        return RideKnowledge(
+            variance=float(self._power @ ride) * step_hz,
+            left=float(left[0]),
+            correlation=left / left[0],
+            noise_share=float((self._power * told**2).mean()),
+            accel_variance=float(ride.sum()) * step_hz,
+        )
+
+    def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: Place) -> RideSums | None:
+        """What the figures of the samples ``inside`` (t,) of a block are made of; None where the ride hides between two
+        steps.
+
+        weighted_mps2    (t,) most probable weighted acceleration
+        unread           (t,) there was no reading
+        """
+        knows = self.knowledge(place.speed_mps, place.spectrum, place.variance)
+        rough = _rough_log_std(knows.accel_variance, place.sensor)
+        if rough > _MOST_ROUGH:
+            return None
+        louder = self.knowledge(place.speed_mps, raised(place.spectrum), place.variance)
+        numbers = np.flatnonzero(inside)
+        span = slice(max(int(numbers[0]) - self._running + 1, 0), int(numbers[-1]) + 1)
+        mean = weighted_mps2[span]
+        std = _deviation(knows, unread[span])
+        # Were the level higher, more of the readings would be taken for ride, and more be left open.
+        stretched = mean * (louder.resolved / max(knows.resolved, _LEAST_RESOLVED))
+        louder_std = _deviation(louder, unread[span])
+        noise_off = 2 * place.noise_log_std * place.sensor.noise_rms_mps2**2 * knows.noise_share
+
+        def sums_of(chosen: Bools | slice) -> tuple[PowerSum, PowerSum]:
+            squares, fourths = power_sums(mean[chosen], std[chosen], knows.correlation)
+            more_squares, more_fourths = power_means(stretched[chosen], louder_std[chosen])
+            per_log_level = place.log_level_std / LEVEL_TRIAL
+            count = len(mean[chosen])
+            return (replace(squares, shared=hypot((more_squares - squares.mean) * per_log_level, noise_off * count,
+                                                  2 * rough * squares.mean)),
+                    replace(fourths, shared=hypot((more_fourths - fourths.mean) * per_log_level,
+                                                  6 * noise_off * squares.mean, 4 * rough * fourths.mean)))
+
+        squares, fourths = sums_of(inside[span])
+        energy = np.concatenate([[0.0], np.cumsum(mean**2 + std**2)])
+        ends = numbers - span.start + 1
+        sums = energy[ends] - energy[np.maximum(ends - self._running, 0)]
+        largest, before = None, 0
+        for part in np.array_split(np.arange(len(ends)), 1 + len(ends) // (self._running // _RUNNING_PARTS)):
+            end = int(ends[part[np.argmax(sums[part])]])
+            running, _ = sums_of(slice(max(end - self._running, 0), end))
+            common = max(1 - (end - before) / self._running, 0.0)
+            largest, before = running if largest is None else larger(largest, running, common), end
+        assert largest is not None
+        return RideSums(len(numbers), squares, fourths, largest, self._running)
+
+
+def _frequencies_hz(count: int, rate_hz: float) -> Array:
+    return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+
+
+def _deviation(knows: RideKnowledge, unread: Bools) -> Array:
+    return np.sqrt(np.where(unread, knows.variance, knows.left))
+
+
+def _rough_log_std(accel_variance: float, sensor: Sensor) -> float:
+    """Share by which a ride may be off because noise and ride blur the steps little: how rough the road is and where
+    gravity lies within a step are then hard to tell apart, and the propagation of bounds is rough."""
+    noise_steps = sensor.noise_rms_mps2 / sensor.step_mps2
+    blur_steps = sqrt(accel_variance + sensor.noise_rms_mps2**2) / sensor.step_mps2
+    return _ROUGH_SHARE / (noise_steps * blur_steps**3)
