@@ -65,7 +65,7 @@ def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> 
     decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
     noise = None
     if given == AUTO:
-        noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2, sensor.step_mps2)
+        noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2)
     return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)}, noise)
 
 

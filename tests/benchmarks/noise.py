@@ -88,7 +88,7 @@ def four_ways(noise: float, range_g: int, mph: int, level: float, windows: int, 
     def driven(seed: int, believed: float, before: NoiseBelief | None = None) -> Logged:
         return logged_drive(drive, chip, Receiver(), WINDOW_M, LATENCY_S, seed, Sensor(believed, step), before)
 
-    guess = NoiseBelief.guessed(GRANTED_MPS2, step)
+    guess = NoiseBelief.guessed(GRANTED_MPS2)
     first = driven(2 * number, guess.noise_rms_mps2, guess)
     assert first.noise is not None
     carried = first.noise.next_drive()
