@@ -119,6 +119,13 @@ class NoiseLearner:
         self._mean, self._std = self._moments(self._excess(at))
         self._forget(1 - exp(-_FORGOTTEN_PER_LOG * abs(self._mean - before)))
 
+    def next_drive(self) -> None:
+        """Another drive begins: the noise may have wandered, as in ``NoiseBelief.next_drive``."""
+        kept = self._std**2 / (self._std**2 + _WANDERED_LOG_STD**2)
+        self._prior = kept * self._prior + (1 - kept) * self._usual
+        self._forget(1 - kept)
+        self._std = min(hypot(self._std, _WANDERED_LOG_STD), UNKNOWN_LOG_STD)
+
     def _forget(self, share: float) -> None:
         self._told = (1 - share) * self._told
         self._slopes = (1 - share) * self._slopes

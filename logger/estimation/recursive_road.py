@@ -93,6 +93,11 @@ class FollowedRoad:
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
 
+    def next_drive(self) -> None:
+        """Time has passed since what was heard last: of the noise a little less is known."""
+        if self._learner is not None:
+            self._learner.next_drive()
+
     @property
     def noise_stretches(self) -> int:
         """From how many stretches the noise was learnt."""

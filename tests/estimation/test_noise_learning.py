@@ -188,6 +188,19 @@ def test_an_upper_bound_leaves_the_belief_below_it_as_it_was() -> None:
     assert 0.5 < learner.belief.log_std <= 1.0
 
 
+def test_within_a_service_that_runs_for_weeks_each_drive_begins_less_certain() -> None:
+    learner = NoiseLearner(USUAL, USUAL, 0.0)
+    for _ in range(40):
+        learner.take(-100 * (learner.log_noise - np.log(0.2)) ** 2)
+    driven = learner.belief
+    learner.next_drive()
+    assert learner.belief.log_mean == driven.log_mean
+    assert learner.belief.log_std == pytest.approx(driven.next_drive().log_std)
+    for _ in range(20):
+        learner.take(-100 * (learner.log_noise - np.log(0.3)) ** 2)
+    assert learner.belief.noise_rms_mps2 == pytest.approx(0.28, abs=0.03)
+
+
 @settings(deadline=None)
 @given(noise=st.floats(0.01, 1.0), share=st.floats(0.0, 2.0), std=st.floats(0.01, 0.1))
 def test_rounding_is_taken_in_and_out_again(noise: float, share: float, std: float) -> None:
