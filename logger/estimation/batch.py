@@ -116,7 +116,7 @@ def learnt_noise(
     What was found on the way may come from far off, so the drive is gone through again from there.
     """
     count = len(reading_mps2)
-    belief = NoiseBelief.guessed(sensor.noise_rms_mps2, sensor.step_mps2)
+    belief = NoiseBelief.guessed(sensor.noise_rms_mps2)
     for _ in range(_NOISE_ROUNDS):
         before = NoiseBelief(belief.log_mean, UNKNOWN_LOG_STD)
         tried = Sensor(before.noise_rms_mps2, sensor.step_mps2)

@@ -1,65 +1,46 @@
-"""Evidence of coarse readings: would another noise have made them more probable?
+"""Evidence of readings for the noise that they had: coarse ones by their bounds, others by what no road explains.
 
-Each reading says that acceleration plus noise lay between two bounds. What all other readings say of the acceleration
-is a Gaussian of mean m and variance v (expectation propagation, ``quantisation``), so the reading had the probability
+Each coarse reading says that acceleration plus noise lay between two bounds. What all other readings say of the
+acceleration is a Gaussian of mean m and variance v (expectation propagation, ``quantisation``), so the reading had the
+probability
 
     Z = Phi((high - m) / sqrt(V)) - Phi((low - m) / sqrt(V)),  V = v + noise^2
 
 Where the propagation has settled, the slope of its log evidence in a parameter of the likelihood is the sum of the
-slopes of log Z with m and v held (Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.6 and
-5.5.2). Z solves the heat equation, dZ/dV = 1/2 d2Z/dm2, so the slope of log Z in V is half of
-(E(x - m)^2 - V) / V^2 with x the truncated Gaussian. The information is the expected square of that slope, over all
-steps on which the reading could have been.
+slopes of log Z with m and v held (Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.6 and 5.5.2): at
+the noise that the propagation was made with, the sum of log Z has the right slope, and it says what becomes of it far
+from there, where a slope alone would lead astray. As much as the noise moves, the next stretches are solved anew.
 """
 
 from __future__ import annotations
 
-from math import ceil, log
-
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.noise_belief import NoiseScore
-from logger.estimation.normal_distribution import density, distribution, within
+from logger.estimation.normal_distribution import distribution
 
 Array = npt.NDArray[np.float64]
 
-_FARTHEST = 3.0  # deviations: what is farther out is a hole that the solution has not found yet
-_REACH = 5.0
-_LEAST_SHARE = 1e-12
+_LEAST_PROBABILITY = 0.0027  # beyond 3 deviations: what is farther out is a hole that the solution has not found yet
 
 
-def interval_score(expected: Array, others: Array, low: Array, high: Array, noise_rms_mps2: float) -> NoiseScore:
-    """Score of readings for the logarithm of their noise, at this noise.
+def interval_evidence(expected: Array, others: Array, low: Array, high: Array, log_noise: Array) -> Array:
+    """Log evidence (g,) of coarse readings for noises (g,), given as logarithms of m/s2.
 
     expected, others    (n,) mean [m/s2] and variance [(m/s2)2] of each acceleration by all other readings
-    low, high           (n,) bounds of each reading, finite, the same width apart [m/s2]
+    low, high           (n,) bounds of each reading [m/s2]
     """
-    at = log(noise_rms_mps2)
-    if not len(expected):
-        return NoiseScore(at, 0.0, 0.0)
-    noise = noise_rms_mps2**2
-    variance = others + noise
-    mean, left = within(expected, variance, low, high)
-    square = np.minimum((mean - expected) ** 2, _FARTHEST**2 * variance)
-    slope = (square + left - variance) / (2 * variance**2)
-    per_log = 2 * noise
-    information = _information(expected, variance, low, high)
-    return NoiseScore(at, per_log * float(slope.sum()), per_log**2 * float(information.sum()))
+    deviation = np.sqrt(others + np.exp(2 * log_noise)[:, None])
+    below, above = (low - expected) / deviation, (high - expected) / deviation
+    mirrored = below > 0  # differences in the lower tail keep their digits
+    share = distribution(np.where(mirrored, -below, above)) - distribution(np.where(mirrored, -above, below))
+    evidence: Array = np.log(np.maximum(share, _LEAST_PROBABILITY)).sum(axis=1)
+    return evidence
 
 
-def _information(expected: Array, variance: Array, low: Array, high: Array) -> Array:
-    """Expected square (n,) of the slope of log Z in V."""
-    deviation = np.sqrt(variance)
-    step = high - low
-    steps_off = np.round((expected - 0.5 * (low + high)) / step)
-    reach = ceil(_REACH * float((deviation / step).max())) + 1
-    total = np.zeros(len(expected))
-    for number in range(-reach, reach + 1):
-        below = (low + (steps_off + number) * step - expected) / deviation
-        above = below + step / deviation
-        mirrored = below > 0
-        share = (distribution(np.where(mirrored, -below, above)) - distribution(np.where(mirrored, -above, below)))
-        slope = 0.5 * (below * density(below) - above * density(above)) / variance
-        total += slope**2 / np.maximum(share, _LEAST_SHARE)
-    return total
+def residual_evidence(slope: float, free: float, at: float, log_noise: Array) -> Array:
+    """Log evidence (g,) of residuals for noises (g,), given as logarithms of m/s2: that of ``free`` readings whose mean
+    square makes it rise by ``slope`` at the log noise ``at`` (the scaled chi-squared distribution)."""
+    off = log_noise - at
+    evidence: Array = -free * off - 0.5 * (free + slope) * np.exp(-2 * off)
+    return evidence

@@ -154,6 +154,10 @@ class RoadEstimator:
         """What is believed of the sensor's noise now; None where it is not learnt."""
         return self._road.noise
 
+    def next_drive(self) -> None:
+        """The car stood for long: what comes now is the same sensor on another day."""
+        self._road.next_drive()
+
     def _start_anew(self) -> None:
         self._waiting = Samples.unread(0, 0.0, 0.0)
         self._heard = 0

@@ -53,6 +53,10 @@ class RoughnessQueue:
         self._take(self._estimator.finish())
         self._leg = None  # what waits from here on has no estimate to wait for
 
+    def next_drive(self) -> None:
+        """The drive has ended."""
+        self._estimator.next_drive()
+
     @property
     def noise(self) -> NoiseBelief | None:
         """What is believed of the sensor's noise now; None where it is not learnt."""

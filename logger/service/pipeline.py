@@ -134,6 +134,7 @@ class Pipeline:
         records = self._records()
         if ended:
             self._active_us = None
+            self._roughness.next_drive()
             self.drive += 1
         self._forget()
         return records

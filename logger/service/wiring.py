@@ -71,7 +71,7 @@ def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> 
     decoder = kind.decoder(settings, Axis.from_word(config.vertical_axis).column)
     noise = None
     if given == AUTO:
-        noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2, sensor.step_mps2)
+        noise = known.belief if known else NoiseBelief.guessed(sensor.noise_rms_mps2)
     return Instrument(decoder, readings.oversample, sensor, {"driver": kind.name, **kind.facts(settings)}, noise)
 
 
@@ -83,6 +83,7 @@ def gps_decoder(config: Config) -> NmeaDecoder:
 def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> Pipeline:
     """The pipeline as the settings want it. ``receiver``: what is known of its delay; None: as before any drive."""
     receiver = receiver or at_start(config.gps, None)
+    low_pass_hz = config.pipeline.low_pass_hz
     settings = PipelineSettings(
         window_m=config.pipeline.window_m,
         blind_window_s=config.pipeline.blind_window_s,
