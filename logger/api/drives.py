@@ -40,6 +40,7 @@ class Run(drive_file.Drive, Shown):
     speed_mps      [m/s]
     distance_m     where the front tires stand on the profile [m]
     lat_deg, lon_deg    None where they were not recorded
+    usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
     profile        the road that was driven; None: not known
     """
 
@@ -95,8 +96,8 @@ def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
     Raises BadInput as ``read_run``, and for what would give a wrong result.
     """
     if isinstance(run, Run):
-        names = (*drive_file.COLUMNS, *drive_file.PLACE)
-        arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg)
+        names = (*drive_file.COLUMNS, *drive_file.PLACE, drive_file.USABLE)
+        arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg, run.usable)
         columns = {name: one for name, one in zip(names, arrays, strict=True) if one is not None}
         place, profile = run.path, run.profile
     else:
@@ -119,7 +120,7 @@ def write_run(folder: Path | str, run: Run) -> None:
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     columns = {"t_s": run.time_s, "accel_z_mps2": run.accel_z_mps2, "speed_mps": run.speed_mps,
-               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg}
+               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable}
     drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items() if one is not None})
     if run.profile is not None:
         write_profile(place / drive_file.PROFILE, run.profile)

@@ -33,8 +33,6 @@ Tell = Callable[[str], None]
 RATE_HZ = 100.0
 LEAST_S, LEAST_M = 5.0, 30.0
 """A shorter run tells the lab nothing: it leaves out the first two seconds."""
-USABLE = "usable"
-_NO_READING, _READING, _CLIPPED = 0.0, 1.0, 2.0
 _AROUND_M = 150.0  # of the profile, kept before and after what was driven: a model comes to the first sample over it
 
 
@@ -322,7 +320,7 @@ def _readings(recorded: _Recorded, fixes: _Fixes) -> tuple[Array, Array, Array]:
     present, clipped = readings.present[inside], readings.clipped[inside]
     accel = readings.accel_mps2[inside]
     whole = present & ~clipped
-    usable = np.where(present, np.where(clipped, _CLIPPED, _READING), _NO_READING)
+    usable = np.where(present, np.where(clipped, drive_file.CLIPPED, drive_file.READING), drive_file.NO_READING)
     return readings.time_s[inside], accel - (accel[whole].mean() if whole.any() else 0.0), usable
 
 
@@ -334,7 +332,7 @@ def _written(folder: Path, drive: _Drive, recorded: _Recorded, measured: Measure
     folder.mkdir(parents=True, exist_ok=True)
     columns = {drive_file.TIME: drive.time_s, drive_file.VERTICAL: drive.accel_mps2, drive_file.SPEED: drive.speed_mps,
                drive_file.DISTANCE: drive.distance_m, **dict(zip(drive_file.PLACE, (drive.lat_deg, drive.lon_deg),
-                                                                 strict=True)), USABLE: drive.usable}
+                                                                 strict=True)), drive_file.USABLE: drive.usable}
     drive_file.write_drive(folder / drive_file.DRIVE, columns)
     if measured is not None:
         drive_file.write_profile(folder / drive_file.PROFILE, _around(measured.profile, drive.distance_m))
@@ -345,7 +343,7 @@ def _written(folder: Path, drive: _Drive, recorded: _Recorded, measured: Measure
         sensor.sensor.step_mps2, range_g and range_g * STANDARD_GRAVITY_MPS2, sensor.sensor.noise_rms_mps2, place_std_m,
         receiver.delay_s, receiver.std_s, source))
     metres = float(np.ptp(drive.distance_m))
-    gaps = int(np.count_nonzero(np.diff((drive.usable == _NO_READING).astype(int)) == 1))
+    gaps = int(np.count_nonzero(np.diff((drive.usable == drive_file.NO_READING).astype(int)) == 1))
     return ExtractedRun(folder, len(drive.time_s) / RATE_HZ, metres, None if found is None else metres, place_std_m,
                         None if found is None else found.by_road, receiver.delay_s, gaps)
 

@@ -42,7 +42,6 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True) -> SimulatedR
 
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
-    from logger.runs import Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.drive_file import DRIVE
 
@@ -53,9 +52,36 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True) -> SimulatedR
             raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
                            f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
         check_record(drive, file, drives[:number])
-    runs = [Run(str(one.path), one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, one.track)
-            for one in drives]
+    runs = [run for one in drives for run in driven_stretches(one)]
     return SimulatedRuns(thinned_runs(runs) if thin else runs)
+
+
+def driven_stretches(drive: DriveOnRoad) -> list[Run]:
+    """The parts of a drive in which the car moved and there were readings, each a run; of one that stood or had none
+    nowhere the whole. A part says in its name which seconds it is of.
+
+    Raises BadInput where no part lasts ``LEAST_S``.
+    """
+    import numpy as np
+
+    from logger.lab.likelihood.lag import SLOWEST_MPS
+    from logger.runs import Run
+    from logger.store.formats.drive_file import NO_READING
+
+    told = drive.speed_mps >= SLOWEST_MPS
+    if drive.usable is not None:
+        told = told & (drive.usable != NO_READING)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], told.astype(int), [0]])))
+    parts = [slice(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
+             if last - first >= LEAST_S * drive.rate_hz]
+    if not parts:
+        raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings at {SLOWEST_MPS:g} m/s or faster, without "
+                       "a break")
+    whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
+    return [Run(str(drive.path) if whole else
+                f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
+                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track)
+            for part in parts]
 
 
 def thinned_runs(runs: Sequence[Run]) -> list[Run]:

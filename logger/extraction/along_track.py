@@ -4,8 +4,8 @@ Problem: a receiver tells the speed once or ten times a second, with noise, now 
 distance a hundred times a second, to some centimetres. Solution: the speed of a car changes smoothly. Its acceleration
 is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch, F. Tung and C.
 Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration wanders, and how large
-the errors of the fixes are, is chosen by evidence; those far off count less (Student's t). Places along a line that are
-known from elsewhere enter as further observations. Errors come from drawing the motion that all could be (G.
+the errors of the fixes are, is chosen by evidence; wild ones count less. Places along a line that are known from
+elsewhere enter as further observations, with errors by Student's t. Errors come from drawing the motion that all could be (G.
 Papandreou and A. Yuille, NIPS 2010).
 """
 
@@ -22,11 +22,13 @@ Ints = npt.NDArray[np.intp]
 
 NEAREST_FIXES_S = 0.02
 """Fixes nearer to each other than that are one: no receiver sends 50 a second."""
-_FREEDOM = 4.0  # of Student's t: one fix in twenty lies beyond three deviations
+_FREEDOM = 4.0  # of Student's t, of places: one in twenty lies beyond three deviations
+_WILD = 5.0  # deviations of a speed: noise alone is never so far off, and braking is not taken for it
 _ROUNDS = 3
 _LEAST_NOISE_MPS = 0.005  # of a speed that is written in thousandths of a knot
 _RATIOS = np.logspace(-2.0, 5.0, 15)
 """Of the walk of the acceleration over the square of a speed's noise [1/s3]: from a ship to a braking car."""
+_FINER = np.logspace(-0.5, 0.5, 7)
 _SLIP_S = 0.05
 """The way differs from the integral of the speed by a random walk as well, of so much of a speed's noise after a
 second: next to nothing, but without it the equations of ten fixes a second cannot be solved in double precision."""
@@ -105,19 +107,19 @@ def _strengths(speeds: Observations) -> tuple[float, float]:
     middle = slice(first, first + _ENOUGH_FIXES)
     speeds = Observations(speeds.time_s[middle], speeds.value[middle], speeds.deviation[middle])
     start = Observations(speeds.time_s[:1], np.zeros(1), np.full(1, 0.001))
-    best = (-np.inf, 1.0, 0.1)
     weights = np.ones(len(speeds.time_s))
+    ratios = _RATIOS
     for _ in range(_ROUNDS):
         weighted = replace(speeds, deviation=speeds.deviation / np.sqrt(weights))
-        best = (-np.inf, 1.0, 0.1)
-        for ratio in _RATIOS:
-            system = _System(speeds.time_s, float(ratio), 1.0)
-            state, evidence, scale = system.solved([(1, weighted)], start)
-            if evidence > best[0]:
-                best, left = (evidence, float(ratio), scale), state[:, 1] - speeds.value
-        weights = _student(left / speeds.deviation / best[2])
-    noise = max(best[2], _LEAST_NOISE_MPS)
-    return best[1] * noise**2, noise
+        best = -np.inf
+        for tried in ratios:
+            state, evidence, scale = _System(speeds.time_s, float(tried), 1.0).solved([(1, weighted)], start)
+            if evidence > best:
+                best, ratio, noise_mps, left = evidence, float(tried), scale, state[:, 1] - speeds.value
+        weights = _without_wild(left / speeds.deviation / noise_mps)
+        ratios = ratio * _FINER
+    noise_mps = max(noise_mps, _LEAST_NOISE_MPS)
+    return ratio * noise_mps**2, noise_mps
 
 
 def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: float) -> Motion:
@@ -130,10 +132,15 @@ def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: 
         rows = [(1, replace(speeds, deviation=deviation / np.sqrt(weights))),
                 (0, replace(places, deviation=places.deviation / np.sqrt(seen)))]
         state = system.solved(rows)[0]
-        weights = _student((state[:, 1] - speeds.value) / deviation)
+        weights = _without_wild((state[:, 1] - speeds.value) / deviation)
         at = Motion(speeds.time_s, state, walk, noise_mps)
         seen = _student((at._curve(places.time_s, 0) - places.value) / places.deviation)
     return Motion(speeds.time_s, state, walk, noise_mps)
+
+
+def _without_wild(off: Array) -> Array:
+    """Weights (k,) of speeds that are off by so many deviations: less the farther they are beyond ``_WILD``."""
+    return np.asarray((_WILD / np.maximum(np.abs(off), _WILD)) ** 2)
 
 
 def _student(off: Array) -> Array:

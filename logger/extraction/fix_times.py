@@ -34,7 +34,7 @@ def fix_times_s(arrival_s: Array, time_of_day_s: Array, delay_s: float) -> Array
     if not len(named):
         return times_s
     lag_s = arrival_s[named] - time_of_day_s[named]
-    lag_s = lag_s - DAY_S * np.round((lag_s - np.median(lag_s)) / DAY_S)
+    lag_s = lag_s - DAY_S * np.round((lag_s - lag_s[0]) / DAY_S)
     about_s = _running_median(lag_s)
     true = np.abs(lag_s - about_s) <= _STRAY_S
     named, lag_s = named[true], lag_s[true]

@@ -8,7 +8,7 @@ as records and profiles are. Columns of other names are not read.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +28,13 @@ DRIVE, PROFILE = "drive.csv", "profile.csv"
 SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
+USABLE = "usable"
+NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
+"""What stands in the column ``usable``."""
 MAX_SPEED_MPS = 150.0
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
 _LINES_AT_ONCE = 50_000
-_HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}], each once"
+_HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}][,{USABLE}], each once"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,7 @@ class Drive:
     speed_mps      [m/s]
     distance_m     where the front tires stand on the track [m]
     lat_deg, lon_deg    None where they were not recorded
+    usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
     """
 
     path: Path
@@ -55,6 +59,7 @@ class Drive:
     distance_m: Array
     lat_deg: Array | None
     lon_deg: Array | None
+    usable: Array | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +93,8 @@ def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> 
     """A drive of columns (n,) by name, at an even rate; the first of ``t_s`` is where its times begin."""
     time_s = columns[TIME][0] + np.arange(len(columns[VERTICAL])) / rate_hz
     lat_deg, lon_deg = (columns.get(name) for name in PLACE)
-    return Drive(
-        Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg
-    )
+    return Drive(Path(path), rate_hz, time_s, columns[VERTICAL], columns[SPEED], columns[DISTANCE], lat_deg, lon_deg,
+                 usable=columns.get(USABLE))
 
 
 def read_columns(path: Path | str) -> dict[str, Array]:
@@ -104,6 +108,9 @@ def read_columns(path: Path | str) -> dict[str, Array]:
     check_times(columns[TIME], file)
     _check_size(columns[VERTICAL], VERTICAL, MAX_MPS2, "m/s2", file)
     _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
+    if USABLE in columns and not (known := np.isin(columns[USABLE], (NO_READING, READING, CLIPPED))).all():
+        row = int(np.argmin(known))
+        raise BadInput(f"{file}:{row + 2}: expected {USABLE} 0, 1 or 2, found {columns[USABLE][row]:g}")
     return columns
 
 
@@ -166,6 +173,7 @@ def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
 def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
     """The columns to read; None when one of them is missing or there twice."""
     wanted = COLUMNS + (PLACE if any(name in names for name in PLACE) else ())
+    wanted += (USABLE,) if USABLE in names else ()
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 
 

@@ -11,6 +11,7 @@ for that strength with a coarser step; what is recorded, and the strength that i
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -272,11 +273,12 @@ def _model(rng: np.random.Generator, effects: list[Effect]) -> str:
 
 def _attempt(
     rng: np.random.Generator, chosen: list[tuple[Effect, float, float]], attempt: int,
+    noise_of: Callable[[np.random.Generator], Noise],
 ) -> tuple[Scene, Noise, tuple[Hidden, ...]]:
     effects = [effect for effect, _, _ in chosen]
     car = draw_car(rng, _model(rng, effects))
     rough = max([effect.rough for effect in effects], default=0) + attempt // 3
-    noise = draw_noise(rng)
+    noise = noise_of(rng)
     scene = Scene(car, draw_drives(rng, rough))
     hidden: tuple[Hidden, ...] = ()
     for effect, wanted, _ in sorted(chosen, key=lambda each: each[0].name != "wheel_lift"):
@@ -285,8 +287,10 @@ def _attempt(
     return scene, noise, hidden
 
 
-def case(kind: str, seed: int, effect: str | None = None) -> Case:
+def case(kind: str, seed: int, effect: str | None = None,
+         noise_of: Callable[[np.random.Generator], Noise] = draw_noise) -> Case:
     """Make a case. ``effect`` fixes the (first) effect of the kinds that have one; else the seeds go round the list.
+    ``noise_of`` draws the sensor's noise, by which strengths are measured.
 
     A draw whose effects cannot be as strong as they must be is drawn again, on rougher roads after some tries.
     """
@@ -295,7 +299,7 @@ def case(kind: str, seed: int, effect: str | None = None) -> Case:
     rng = generator(kind, seed, effect)
     chosen = _choose(rng, kind, seed, effect)
     for attempt in range(_TRIES):
-        scene, noise, hidden = _attempt(rng, chosen, attempt)
+        scene, noise, hidden = _attempt(rng, chosen, attempt, noise_of)
         strengths = [strength(scene, hidden, i, noise) for i in range(len(hidden))]
         least = [max(0.9 * low, 0.5 * each.wanted) for each, (_, _, low) in zip(hidden, chosen, strict=True)]
         if all(value >= low for value, low in zip(strengths, least, strict=True)):
