@@ -15,7 +15,7 @@ from logger.errors import BadInput
 from logger.service.config import Config
 from logger.store.formats import drive_file
 from logger.store.formats.profile_file import Profile, read_places, read_profile
-from logger.store.formats.run_file import RecordFacts, write_run_facts
+from logger.store.formats.run_file import RUN, RecordFacts, source_of, write_run_facts
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class ExtractedRun:
     on_profile_m    how much of that lies on the profile; None: none was given
     place_std_m     standard error of a place on the profile; None likewise
     by_road         the road was recognised; False: its places are the receiver's; None likewise
-    delay_s         of the receiver, taken out
+    delay_s, delay_std_s    of the receiver, taken out, and its standard error
     gaps            holes between readings, each too short to end the run
     """
 
@@ -56,13 +56,14 @@ class ExtractedRun:
     place_std_m: float | None
     by_road: bool | None
     delay_s: float
+    delay_std_s: float
     gaps: int
 
     def as_json(self) -> dict[str, Any]:
         """For a program."""
         return {"run": str(self.run), "seconds": self.seconds, "metres": self.metres,
                 "on_profile_m": self.on_profile_m, "place_std_m": self.place_std_m, "by_road": self.by_road,
-                "delay_s": self.delay_s, "gaps": self.gaps}
+                "delay_s": self.delay_s, "delay_std_s": self.delay_std_s, "gaps": self.gaps}
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,16 @@ def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
     from logger.extraction.measured_line import MeasuredLine
 
-    return MeasuredProfile(path, read_profile(path), MeasuredLine.of(*read_places(path)))
+    profile, places = read_profile(path), read_places(path)
+    try:
+        return MeasuredProfile(path, profile, MeasuredLine.of(*places))
+    except ValueError as error:
+        raise BadInput(f"{path}: {error}") from None
+
+
+def name_of(dump: Path) -> str:
+    """What the first run of a dump is called."""
+    return dump.name.removesuffix(".gz").removesuffix(".dump")
 
 
 def extract_dump(dump: Path, out: Path, given: Config | None, measured: MeasuredProfile | None = None,
@@ -98,8 +108,13 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
     given       settings of that drive; None: the defaults, with what the recording's header says
     measured    the profile that was driven on; None: the runs have no profile
 
-    Raises BadInput for a dump of which nothing can be used, with the reason, and DumpError for one that is damaged.
+    Runs that were made of a dump of this name before are replaced.
+
+    Raises BadInput for a dump of which nothing can be used, with the reason, and for a folder that holds the run of
+    something else; DumpError for a dump that is damaged.
     """
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"{out}: expected a folder")
     recorded = _recorded(dump, given, tell)
     fixes = recorded.fixes
     if not len(recorded.readings.time_s) or not recorded.readings.present.any():
@@ -112,13 +127,26 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
     if not drives:
         why = "on the profile" if measured is not None and left_out_s > 0 else "with fixes and readings"
         raise BadInput(f"{dump}: expected {LEAST_S:g} s and {LEAST_M:g} m of driving {why}, found none{recorded.hint}")
-    name = dump.name.removesuffix(".gz").removesuffix(".dump")
+    folders = [out / (name_of(dump) + (f"-{number}" if number > 1 else "")) for number in range(1, len(drives) + 1)]
+    _make_room(folders, dump, out)
     runs = []
-    for number, drive in enumerate(drives, 1):
-        folder = out / (name if number == 1 else f"{name}-{number}")
+    for folder, drive in zip(folders, drives, strict=True):
         tell(f"writing {folder.name}")
         runs.append(_written(folder, drive, recorded, measured, dump.name))
     return Extracted(tuple(runs), left_out_s, recorded.torn_tail)
+
+
+def _make_room(folders: list[Path], dump: Path, out: Path) -> None:
+    """Take away the runs that were made of a dump of this name before; BadInput where a folder holds anything else."""
+    earlier = [one.parent for one in out.glob(f"*/{RUN}") if source_of(one.parent) == dump.name]
+    for folder in folders:
+        if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise BadInput(f"{folder}: expected an empty folder for a run of {dump}, found the run of something else")
+    for folder in earlier:
+        for name in (drive_file.DRIVE, drive_file.PROFILE, RUN):
+            (folder / name).unlink(missing_ok=True)
+        if not any(folder.iterdir()):
+            folder.rmdir()
 
 
 # --- what was recorded ---
@@ -337,15 +365,31 @@ def _written(folder: Path, drive: _Drive, recorded: _Recorded, measured: Measure
     if measured is not None:
         drive_file.write_profile(folder / drive_file.PROFILE, _around(measured.profile, drive.distance_m))
     sensor, receiver, found = recorded.sensor, recorded.receiver, drive.registered
-    place_std_m = None if found is None else float(f"{found.place_std_m:.3g}")
+    place_std_m = None if found is None else float(f"{_place_std_m(found, drive, receiver):.3g}")
     range_g = sensor.description.get("range_g")
+    by_road = None if found is None else found.by_road
     write_run_facts(folder, RecordFacts(
-        sensor.sensor.step_mps2, range_g and range_g * STANDARD_GRAVITY_MPS2, sensor.sensor.noise_rms_mps2, place_std_m,
-        receiver.delay_s, receiver.std_s, source))
+        sensor.sensor.step_mps2, range_g and range_g * STANDARD_GRAVITY_MPS2, _noise_mps2(recorded), place_std_m,
+        receiver.delay_s, receiver.std_s, {None: None, True: "road", False: "receiver"}[by_road],
+        recorded.model.vehicle.name if by_road else None, source))
     metres = float(np.ptp(drive.distance_m))
     gaps = int(np.count_nonzero(np.diff((drive.usable == drive_file.NO_READING).astype(int)) == 1))
     return ExtractedRun(folder, len(drive.time_s) / RATE_HZ, metres, None if found is None else metres, place_std_m,
-                        None if found is None else found.by_road, receiver.delay_s, gaps)
+                        by_road, receiver.delay_s, receiver.std_s, gaps)
+
+
+def _place_std_m(found: Registered, drive: _Drive, receiver: Belief) -> float:
+    """By the receiver alone, what it is late by is a length as well."""
+    late_m = 0.0 if found.by_road else receiver.std_s * float(np.sqrt(np.mean(drive.speed_mps**2)))
+    return float(np.hypot(found.place_std_m, late_m))
+
+
+def _noise_mps2(recorded: _Recorded) -> float | None:
+    """Of the sensor, where it was set or learnt; None: nobody knows."""
+    if recorded.config.accelerometer.noise_mps2 is None:
+        return None
+    learnt = recorded.sensor.noise
+    return learnt.noise_rms_mps2 if learnt is not None else recorded.sensor.sensor.noise_rms_mps2
 
 
 def _around(profile: Profile, distance_m: Array) -> Any:

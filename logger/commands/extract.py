@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.printable import printable
 
 if TYPE_CHECKING:
     from logger.api.extraction import Extracted
@@ -38,11 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog extract``."""
     from drivers.errors import DriverError
-    from logger.api.extraction import extract_dump, read_measured_profile
+    from logger.api.extraction import extract_dump, name_of, read_measured_profile
     from logger.commands.lab_model import on_screen, wipe
     from logger.service.config import load_config
 
-    names = [one.name.removesuffix(".gz").removesuffix(".dump") for one in args.dumps]
+    names = [name_of(one) for one in args.dumps]
     if again := next((one for number, one in enumerate(args.dumps) if names[number] in names[:number]), None):
         raise BadInput(f"{again}: expected dumps of different names, so that each has a folder of its own")
     config = load_config(args.config) if args.config else None
@@ -52,19 +53,21 @@ def run(args: argparse.Namespace) -> int:
         try:
             found = extract_dump(dump, args.out, config, measured, on_screen())
         except (BadInput, DriverError) as error:
+            wipe()
             if len(args.dumps) == 1:
                 raise
-            wipe()
-            print(f"ridelog: {error}", file=sys.stderr)
+            print(f"ridelog: {printable(str(error))}", file=sys.stderr)
             continue
         wipe()
         done.append(found)
         if not args.json:
             _show(dump, found)
     if not done:
-        raise BadInput(f"{args.out}: expected a dump that can be used, found none")
+        raise BadInput(f"expected a dump that can be used, found none among {len(args.dumps)}")
     if args.json:
-        print(json.dumps({"runs": [one.as_json() for each in done for one in each.runs]}))
+        print(json.dumps({"runs": [one.as_json() for each in done for one in each.runs],
+                          "left_out_s": sum(each.left_out_s for each in done),
+                          "torn_tail": any(each.torn_tail for each in done)}))
     return EXIT_DONE if len(done) == len(args.dumps) else EXIT_CHECK_FAILED
 
 
@@ -76,7 +79,7 @@ def _show(dump: Path, found: Extracted) -> None:
             words += f" on the profile, places +- {one.place_std_m:.2g} m ({how})"
         if one.gaps:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
-        print(f"{words}; the receiver's delay of {one.delay_s:.2f} s is taken out")
+        print(f"{words}; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s")
     if found.left_out_s >= 1:
         print(f"{dump}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:

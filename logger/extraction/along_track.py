@@ -5,8 +5,8 @@ distance a hundred times a second, to some centimetres. Solution: the speed of a
 is taken for a random walk; the most likely motion given all fixes together (the smoother of A. Rauch, F. Tung and C.
 Striebel, AIAA Journal 3, 1965) is the solution of one banded system. How much the acceleration wanders, and how large
 the errors of the fixes are, is chosen by evidence; wild ones count less. Places along a line that are known from
-elsewhere enter as further observations, with errors by Student's t. Errors come from drawing the motion that all could be (G.
-Papandreou and A. Yuille, NIPS 2010).
+elsewhere enter as further observations, with errors by Student's t. Errors come from drawing the motion that all could
+be (G. Papandreou and A. Yuille, NIPS 2010).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _FINER = np.logspace(-0.5, 0.5, 7)
 _SLIP_S = 0.05
 """The way differs from the integral of the speed by a random walk as well, of so much of a speed's noise after a
 second: next to nothing, but without it the equations of ten fixes a second cannot be solved in double precision."""
-_UNKNOWN = (1e4, 100.0, 5.0)  # deviations of the first distance [m], speed [m/s] and acceleration [m/s2]
+_UNKNOWN = (1e4, 1e4, 500.0)  # deviations of the first distance [m], speed [m/s] and acceleration [m/s2]
 _DRAWS = 24
 _ENOUGH_FIXES = 1500  # for what all of a drive has in common
 
@@ -69,10 +69,19 @@ class Motion:
         return np.maximum(self._curve(time_s, 1), 0.0)
 
     def _curve(self, time_s: Array, order: int) -> Array:
-        from scipy.interpolate import BPoly
-
-        curve = BPoly.from_derivatives(self.time_s, self.state[:, :, None])
-        return np.asarray(curve(time_s, nu=order)[:, 0])
+        """The distance, or its first derivative (n,), by Hermite's quintics through the states."""
+        first = np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, len(self.time_s) - 2)
+        step = self.time_s[first + 1] - self.time_s[first]
+        u = (time_s - self.time_s[first]) / step
+        scale = np.stack([np.ones_like(step), step, step**2], axis=1)
+        begin, end = (self.state[one] * scale for one in (first, first + 1))
+        c = [begin[:, 0], begin[:, 1], 0.5 * begin[:, 2]]
+        ahead, faster, harder = end[:, 0] - sum(c), end[:, 1] - c[1] - 2 * c[2], end[:, 2] - 2 * c[2]
+        c += [10 * ahead - 4 * faster + 0.5 * harder, -15 * ahead + 7 * faster - harder,
+              6 * ahead - 3 * faster + 0.5 * harder]
+        if order == 0:
+            return np.asarray(c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5])))))
+        return np.asarray((c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))) / step)
 
 
 def motion_of(speeds: Observations, places: Observations | None = None, like: Motion | None = None) -> Motion:
@@ -182,7 +191,7 @@ class _System:
         root = cholesky_banded(self._bands(blocks))
         state = cho_solve_banded((root, False), pulls.ravel())
         left = max(squares - float(pulls.ravel() @ state), 1e-12)
-        variance = left / count
+        variance = left / max(count - 2, 1)  # the first speed and acceleration are known by nothing else
         determinant = -2 * float(np.log(root[-1]).sum()) + float(np.linalg.slogdet(self._inverse)[1].sum())
         evidence = 0.5 * (determinant - logs - count * np.log(variance))
         return state.reshape(-1, 3), evidence, float(np.sqrt(variance))

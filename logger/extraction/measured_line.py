@@ -21,6 +21,9 @@ ASIDE_M = 25.0
 _APART_M = 15.0
 """By so much the place on the line and the way that was driven may differ from fix to fix on one pass."""
 _LEAST_FIXES = 5
+_MORE, _LESS, _PLACE_M = 0.05, 0.7, 20.0
+"""Places that were measured well lie no farther apart than the way between them, but for errors, and, where few of
+them are given, nearer by the bends; a third is more than bends take."""
 _SPACING_M = 1.0
 
 
@@ -36,10 +39,21 @@ class MeasuredLine:
 
     @staticmethod
     def of(distance_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLine:
-        """By geographic coordinates (m,) [degrees]. ValueError for fewer than two places."""
+        """By geographic coordinates (m,) [degrees]. ValueError for fewer than two places, distances that do not grow,
+        and places that cannot be so far apart on the ground, or lie much nearer together."""
         if len(distance_m) < 2:
             raise ValueError("expected two places or more")
+        if not (np.diff(distance_m) > 0).all():
+            raise ValueError("expected distances that grow from place to place")
         east_m, north_m = _flat(lat_deg, lon_deg, float(lat_deg[0]), float(lon_deg[0]))
+        apart_m, ahead_m = np.hypot(np.diff(east_m), np.diff(north_m)), np.diff(distance_m)
+        if (far := apart_m > (1 + _MORE) * ahead_m + _PLACE_M).any():
+            at = int(np.argmax(far))
+            raise ValueError(f"expected places no farther apart than their distances, found {apart_m[at]:.0f} m "
+                             f"between those at {distance_m[at]:g} and {distance_m[at + 1]:g} m")
+        if apart_m.sum() < _LESS * ahead_m.sum() - _PLACE_M:
+            raise ValueError(f"expected places {ahead_m.sum():.0f} m apart all in all, as the distances are, found "
+                             f"{apart_m.sum():.0f} m")
         return MeasuredLine(distance_m, east_m, north_m, float(lat_deg[0]), float(lon_deg[0]))
 
     def passed(self, lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:

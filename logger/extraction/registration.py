@@ -24,11 +24,12 @@ Array = npt.NDArray[np.float64]
 GPS_PLACE_M = 3.0
 """Of a receiver's positions; they are wrong in the same way for a minute or so."""
 _GPS_LASTS_S = 60.0
-_REACH_M, _GRID_M = 30.0, 0.1
-_CLEAR = 6.0
-"""A shift counts if the pass is more alike there than elsewhere by so many deviations of what it is elsewhere."""
-_PEAK_M = 3.0
+_REACH_M, _GRID_M = 30.0, 0.1  # ten deviations of a receiver's place; a fifth of the shortest wave that is felt
+_LOUD_M = 20.0  # places are compared by their loudness over so much road
 _ROUNDS = 4
+_AGREE_M, _FEWEST = 0.2, 4
+"""So many windows or more were felt, and half of them lie so near to the motion: those of another road lie anywhere
+within 0.3 s, half of them 0.75 m off or more at 5 m/s and above, and no motion that fits the speeds follows them."""
 _LEAST_STD_M = 0.01  # of a window: no model of a car is exact
 
 
@@ -58,35 +59,39 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
     time_s            (n,) of the readings, at ``rate_hz``, within the times of the fixes
     accel_mps2        (n,) what was read; 0 where nothing was
     """
-    spread_m = max(GPS_PLACE_M, float(np.median(places.deviation)))
     lasting = np.sqrt(max(1.0, _GPS_LASTS_S * len(places.time_s) / max(np.ptp(places.time_s), 1.0)))
-    weak = Observations(places.time_s, places.value, np.full(len(places.value), spread_m * lasting))
+    weak = Observations(places.time_s, places.value, places.deviation * lasting)
     motion = motion_of(speeds, weak)
-    shift_m = _shift_m(motion.distance_m(time_s), motion.speed_mps(time_s), accel_mps2, track, predict)
+    by_road = _by_road(motion, speeds, time_s, accel_mps2, rate_hz, track, predict)
+    motion, known = by_road or (motion, weak)
+    std_m = place_std_m(motion, speeds, known)
+    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), by_road is not None)
+
+
+def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,
+             predict: Predict) -> tuple[Motion, Observations] | None:
+    """The motion on the road as it was felt, and where that was; None where the road was not recognised."""
+    shift_m = _shift_m(motion.distance_m(time_s), accel_mps2, track, predict)
     if shift_m is None:
-        std_m = place_std_m(motion, speeds, weak)
-        return Registered(motion, float(np.sqrt(np.mean(std_m**2))), False)
+        return None
     state = motion.state.copy()
     state[:, 0] += shift_m
     motion = Motion(motion.time_s, state, motion.walk, motion.noise_mps)
-    felt = weak
+    felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
     for _ in range(_ROUNDS):
-        found = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
-        if found is None:
-            break
-        felt = found
-        motion = motion_of(speeds, felt, motion)
-    std_m = place_std_m(motion, speeds, felt)
-    return Registered(motion, float(np.sqrt(np.mean(std_m**2))), True)
+        if len(felt.time_s) < _FEWEST:
+            return None
+        motion, known = motion_of(speeds, felt, motion), felt
+        felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
+    off_m = np.interp(known.time_s, time_s, motion.distance_m(time_s)) - known.value
+    return (motion, known) if np.median(np.abs(off_m)) < _AGREE_M else None
 
 
-def _shift_m(distance_m: Array, speed_mps: Array, accel_mps2: Array, track: Track, predict: Predict) -> float | None:
-    """By how much the car was farther than these distances (n,) all the way; None where the road does not tell."""
+def _shift_m(distance_m: Array, accel_mps2: Array, track: Track, predict: Predict) -> float | None:
+    """By how much the car was farther than these distances (n,) all the way, if it was on this road; None where it
+    hardly moved."""
     from scipy.signal import correlate
 
-    moving = speed_mps > SLOWEST_MPS
-    if np.count_nonzero(moving) < 2:
-        return None
     grid_m = np.arange(distance_m[0], distance_m[-1], _GRID_M)
     if len(grid_m) < 2:
         return None
@@ -96,30 +101,25 @@ def _shift_m(distance_m: Array, speed_mps: Array, accel_mps2: Array, track: Trac
                            for one in (accel_mps2, predict(distance_m)))
     reach = min(round(_REACH_M / _GRID_M), len(grid_m) - 1)
     alike = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
-    best = int(alike.argmax())
-    far = np.abs(np.arange(len(alike)) - best) > _PEAK_M / _GRID_M
-    if not far.any() or alike[best] < _CLEAR * float(np.sqrt(np.mean(alike[far] ** 2))):
-        return None
-    return (best - reach) * _GRID_M
+    return (int(alike.argmax()) - reach) * _GRID_M
 
 
 def _evened(samples: Array) -> Array:
     """Of places (n,), each as loud as the others: one pothole shall not decide."""
-    loud = np.sqrt(np.convolve(samples**2, np.full(201, 1 / 201), "same"))
+    size = round(_LOUD_M / _GRID_M)
+    loud = np.sqrt(np.convolve(samples**2, np.full(size, 1 / size), "same"))[: len(samples)]
     return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
 
 
 def _felt(motion: Motion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict
-          ) -> Observations | None:
-    """Where windows of the road were felt; None where no window is like the profile."""
+          ) -> Observations:
+    """Where those windows of the road were felt in which the car did what the profile asks."""
     distance_m, speed_mps = motion.distance_m(time_s), motion.speed_mps(time_s)
     run = Run("", rate_hz, accel_mps2, distance_m, speed_mps, track)
     found = lags([run], [predict(distance_m)])
     at_m = distance_m[0] + found.along_m
     kept = (found.speed_mps > SLOWEST_MPS) & np.isfinite(found.error_s) & (at_m >= track.start_m) & (
         at_m <= track.end_m)
-    if not kept.any():
-        return None
     rising = distance_m + 1e-9 * np.arange(len(distance_m))
     deviation = np.hypot(found.error_s * found.speed_mps, _LEAST_STD_M)
     return Observations(np.interp(at_m, rising, time_s)[kept], (at_m - found.lag_m)[kept], deviation[kept])

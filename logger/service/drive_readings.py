@@ -24,8 +24,8 @@ from logger.units import US_PER_S
 
 Array = npt.NDArray[np.float64]
 
-_JUDGED_AFTER_US = 60 * US_PER_S
-"""A sensor that is frozen or repeats itself is known to be after half a minute."""
+_JUDGED_AFTER_US = 120 * US_PER_S
+"""A sensor that is frozen or repeats itself is known to be after half a minute, a wrong speed after one or two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,8 @@ class DriveReadings:
         self.alignment.take_readings(block.t_us / US_PER_S, block.accel_mps2)
         self._stillness.take(block, fixes)
         self.repetition.take(block)
-        self._fresh += self._chain.push(block) + self._chain.advance(self._start_us, now_us)
+        self._fresh += [part for part in self._chain.push(block) + self._chain.advance(self._start_us, now_us)
+                        if len(part)]
         while self._fresh and self._fresh[0].t_us[-1] < now_us - _JUDGED_AFTER_US:
             self._judge(self._fresh.pop(0))
         return []
@@ -86,7 +87,7 @@ class DriveReadings:
 
     def skip_to(self, t_us: int) -> None:
         """As ``Pipeline.skip_to``."""
-        self._fresh += self._chain.skip_to(t_us)
+        self._fresh += [part for part in self._chain.skip_to(t_us) if len(part)]
 
     def finish(self) -> list[WindowRecord]:
         """As ``Pipeline.finish``."""
@@ -105,7 +106,8 @@ class DriveReadings:
                             samples.clipped)
 
     def _judge(self, part: GridSamples) -> None:
-        """Keep readings, as missing where the sensor is known by now not to have been well."""
+        """Keep readings, as missing where the sensor or the speed is known by now not to have been right."""
         if len(part):
             doubtful = self._stillness.during(part.t_us) | self.repetition.during(part.t_us)
+            doubtful |= self.speed_check.during(part.t_us)
             self._parts.append(replace(part, present=part.present & ~doubtful))

@@ -47,7 +47,7 @@ def test_errors_of_the_distance_are_as_large_as_they_are_said_to_be() -> None:
 
 
 def test_a_wild_fix_hardly_counts() -> None:
-    speeds, distance, _ = fixes(1.0, 3)
+    speeds, _, _ = fixes(1.0, 3)
     wild = speeds.value.copy()
     wild[100] += 30.0
     motion = motion_of(Observations(speeds.time_s, wild, speeds.deviation))

@@ -8,7 +8,7 @@ from logger.extraction.fix_times import fix_times_s
 
 
 def arrived(count: int = 600, drift: float = 20e-6, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """When fixes were true by the recorder's clock, when they arrived, and what time of day they name, over midnight."""
+    """When fixes were true by the recorder's clock, when they came, and what time of day they name, over midnight."""
     rng = np.random.default_rng(seed)
     gps_s = 86_400 - 300.0 + np.arange(count)
     true_s = (gps_s - gps_s[0]) * (1 + drift) + 50

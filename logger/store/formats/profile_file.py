@@ -108,7 +108,9 @@ def _place(texts: Sequence[str], place: str) -> tuple[float, float, float]:
         distance_m, lat_deg, lon_deg = map(float, texts)
     except ValueError:
         raise BadInput(f"{place}: expected numbers, found {','.join(texts)[:_SHOWN]}") from None
-    if not (abs(distance_m) <= FARTHEST_M and abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
+    if not abs(distance_m) <= FARTHEST_M:
+        raise BadInput(f"{place}: expected distances within {FARTHEST_M:g} m, found {texts[0][:_SHOWN]}")
+    if not (abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
         raise BadInput(f"{place}: expected degrees within 90 north and south and 180 east and west, found "
                        f"{','.join(texts)[:_SHOWN]}")
     return distance_m, lat_deg, lon_deg

@@ -17,7 +17,6 @@ from logger.files import write_text
 from logger.store.formats.yaml_nodes import load_mapping
 
 RUN = "run.yaml"
-_KEYS = ("sensor", "place_std_m", "source", "receiver")
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,9 @@ class RecordFacts:
     noise_mps2               r.m.s. of the sensor's noise, before rounding [m/s2]
     place_std_m              standard error of a place on the profile [m]
     delay_s, delay_std_s     of the receiver, and its standard error; taken out [s]
-    source                   what it was made of
+    places_by                "road": places were found by the road as this vehicle's model feels it; "receiver"
+    vehicle                  that vehicle
+    source                   the name of the file that it was made of
     """
 
     step_mps2: float | None = None
@@ -37,6 +38,8 @@ class RecordFacts:
     place_std_m: float | None = None
     delay_s: float | None = None
     delay_std_s: float | None = None
+    places_by: str | None = None
+    vehicle: str | None = None
     source: str | None = None
 
 
@@ -46,30 +49,23 @@ _RECEIVER = ("delay_s", "delay_std_s")
 
 def write_run_facts(folder: Path, facts: RecordFacts) -> None:
     """Write ``run.yaml`` into a run's folder. OSError if that fails."""
+    places = {"by": facts.places_by, "vehicle": facts.vehicle}
     said: dict[str, Any] = {"sensor": _some(facts, _SENSOR), "place_std_m": facts.place_std_m, "source": facts.source,
-                            "receiver": _some(facts, _RECEIVER)}
+                            "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None}
     write_text(folder / RUN, yaml.safe_dump({key: value for key, value in said.items() if value not in (None, {})},
                                             sort_keys=False, allow_unicode=True))
 
 
-def read_run_facts(folder: Path) -> RecordFacts:
-    """What the ``run.yaml`` of a run's folder says; nothing where there is none.
+def source_of(folder: Path) -> str | None:
+    """The name of the file that the run of a folder was made of, by its ``run.yaml``; None where it does not say.
 
     Raises BadInput ("file:line: expected ..., found ...").
     """
     path = folder / RUN
     if not path.exists():
-        return RecordFacts()
-    top = load_mapping(path).mapping(optional=_KEYS)
-    found: dict[str, Any] = {}
-    for key, names in (("sensor", _SENSOR), ("receiver", _RECEIVER)):
-        if key in top:
-            found |= {name: node.number(0.0) for name, node in top[key].mapping(optional=names).items()}
-    if "place_std_m" in top:
-        found["place_std_m"] = top["place_std_m"].number(0.0)
-    if "source" in top:
-        found["source"] = top["source"].text()
-    return RecordFacts(**found)
+        return None
+    said = load_mapping(path).mapping().get("source")
+    return said.text() if said is not None else None
 
 
 def _some(facts: RecordFacts, names: tuple[str, ...]) -> Mapping[str, float]:
