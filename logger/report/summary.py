@@ -30,6 +30,7 @@ COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 """ISO 2631 words, best first."""
 
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
+_HIDDEN = "hidden"
 _NOT_COUNTED = frozenset({"unsettled"})
 """Windows whose figures stand in no mean and no share: the filters still knew nothing of the ride."""
 
@@ -117,8 +118,12 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
 
 
 def _mean_square(record: WindowRecord) -> float | None:
-    """Of the weighted acceleration of a window, as it is expected: what is open of it counts too [(m/s2)2]."""
-    return None if record.a_w_mps2 is None else record.a_w_mps2**2 + (record.a_w_std_mps2 or 0.0)**2
+    """Of the weighted acceleration of a window, as it is expected: what is open of it counts too [(m/s2)2]. Of a ride
+    that hides, of which no value is known, the middle between nothing and all that was read: without these rows, which
+    are smooth ones, the mean of a drive would be too high."""
+    if record.a_w_mps2 is not None:
+        return record.a_w_mps2**2 + (record.a_w_std_mps2 or 0.0)**2
+    return record.a_w_raw_mps2**2 / 2 if record.a_w_raw_mps2 is not None and _HIDDEN in record.flags else None
 
 
 def counts(record: WindowRecord) -> bool:

@@ -42,12 +42,16 @@ class ComfortColumns:
     def __init__(self, floor: NoiseFloor, sensor: Sensor) -> None:
         self._floor = floor
         self._noise_mps2 = sensor.noise_rms_mps2
+        self._is_coarse = sensor.is_coarse
 
     def of(self, window: Window, estimate: WindowEstimate | None, noise: NoiseBelief | None) -> Comfort:
         """What can be said of a window. ``noise`` is what is believed of the sensor's; None: what the settings say."""
         if not isfinite(window.a_w_mps2):
             return NO_COMFORT
         noise_mps2, log_std = (noise.noise_rms_mps2, noise.log_std) if noise else (self._noise_mps2, 0.0)
+        if not self._is_coarse:
+            # What a drive tells of a fine sensor's noise holds what the car's model is wrong by: that is ride.
+            noise_mps2 = min(noise_mps2, self._noise_mps2)
         ride = estimate.ride if estimate is not None else NO_FIGURES
         if not isfinite(ride.a_w.value):
             raw = RawFigures(window.samples, window.accel_rms_mps2, window.a_w_mps2, window.mtvv_mps2,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.dump import DumpWriter, Event, open_dump
+from drivers.dump import DumpWriter, open_dump
 from drivers.events import GPS
 from logger.demo.motion import LEAD_M, SPACING_M, Stretch
 from logger.demo.receiver import Reception
@@ -138,10 +138,6 @@ def changed(place: Path, folder: Path, keep: object) -> Path:
     return out
 
 
-def without_speed(event: Event) -> bool:
-    return event.source != GPS or b"RMC" not in event.data
-
-
 def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, tmp_path: Path) -> None:
     (tmp_path / "mirrored.csv").write_text(line(drive, mirrored=True))
     header, *rows = line(drive).splitlines()
@@ -157,8 +153,8 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, t
         ((dump, "--profile", tmp_path / "far.csv"), "m aside of it"),
         ((dump, "--profile", tmp_path / "bare.csv"), "two rows or more with lat_deg,lon_deg"),
         ((dump, "--profile", tmp_path / "typo.csv"), "no farther apart than their distances"),
-        ((changed(place, tmp_path / "a", lambda event: event.source != GPS),), "expected fixes with a speed and a place"),
-        ((changed(place, tmp_path / "b", lambda event: event.source == GPS),), "expected readings of the accelerometer"),
+        ((changed(place, tmp_path / "a", lambda one: one.source != GPS),), "expected fixes with a speed and a place"),
+        ((changed(place, tmp_path / "b", lambda one: one.source == GPS),), "expected readings of the accelerometer"),
         ((dump, dump), "dumps of different names"),
     ):
         done = call(*words, "--out", tmp_path / "runs")

@@ -103,3 +103,10 @@ def test_class_limits_are_those_by_which_rows_get_their_class(letter: str) -> No
     lower, upper = class_limits_m_per_km(letter)
     assert iri_class((lower or 0.0) * 1.002) == letter
     assert iri_class(min(upper or inf, 1e6) * 0.998) == letter
+
+
+def test_a_ride_that_hides_counts_as_the_middle_of_what_it_can_be(drive) -> None:
+    rough = {"a_w_mps2": 0.6, "a_w_std_mps2": 0.0, "duration_s": 1.0}
+    hidden = {"a_w_mps2": None, "a_w_std_mps2": None, "a_w_raw_mps2": 0.2, "duration_s": 1.0, "flags": ("hidden",)}
+    summary = summarise(drive(2, {0: hidden, 1: rough}))
+    assert summary.a_w_mps2 == pytest.approx(sqrt((0.6**2 + 0.2**2 / 2) / 2))

@@ -111,3 +111,11 @@ def test_rows_without_readings_hold_no_ride(records: list[WindowRecord]) -> None
             assert row.a_w_mps2 is row.vdv_mps175 is row.mtvv_mps2 is row.a_w_std_mps2 is None
             assert row.comfort == ""
             assert "hidden" not in row.flags
+
+
+def test_of_a_fine_sensor_no_more_than_the_usual_noise_is_taken_off() -> None:
+    """What a drive tells of it holds the misfit of the car's model, which is ride."""
+    fine = columns(step_mps2=0.0, noise_mps2=0.05)
+    usual = fine.of(WINDOW, None, NoiseBelief.guessed(0.05)).ride.a_w.value
+    assert fine.of(WINDOW, None, NoiseBelief.guessed(0.4)).ride.a_w.value == pytest.approx(usual)
+    assert fine.of(WINDOW, None, NoiseBelief.guessed(0.01)).ride.a_w.value > usual
