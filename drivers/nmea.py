@@ -55,8 +55,14 @@ GPS_EPOCH_DAY = datetime.date(1980, 1, 6).toordinal() - EPOCH_ORDINAL
 DAYS_OF_WEEK = 7
 """A date in the first week of a count is that of a receiver that has not heard yet which week it is."""
 
-LATEST_UTC_US = (datetime.date(2069, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
-RELEASE_UTC_US = (datetime.date(2026, 1, 1).toordinal() - EPOCH_ORDINAL) * DAY_US
+
+def midnight_utc_us(day: datetime.date) -> int:
+    """When a day begins [us since 1970-01-01 UTC]."""
+    return (day.toordinal() - EPOCH_ORDINAL) * DAY_US
+
+
+LATEST_UTC_US = midnight_utc_us(datetime.date(2069, 1, 1))
+RELEASE_UTC_US = midnight_utc_us(datetime.date(2026, 1, 1))
 
 
 @dataclass(frozen=True)

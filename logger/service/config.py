@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -55,17 +56,21 @@ class AccelerometerConfig:
         return self.sections[self.driver]
 
 
+_GPS_BEGAN = date(1980, 1, 6)
+
+
 @dataclass(frozen=True)
 class GpsConfig:
     """The receiver's line; its latency (None: as it was learnt), the longest loss that is bridged, 1024-week periods to
-    add; where its antenna sits, and how far off the places are that it gives from one window to another (standard
-    deviation)."""
+    add, and the date (ISO 8601) before which what it says cannot be true; where its antenna sits, and how far off the
+    places are that it gives from one window to another (standard deviation)."""
 
     port: str = "/dev/serial0"
     baud: int = 9600
     latency_s: float | None = None
     bridge_s: float = 10.0
     week_rollovers: int = 0
+    earliest_date: str = "2026-01-01"
     antenna_behind_front_axle_m: float = 0.0
     place_std_m: float = 1.0
 
@@ -253,12 +258,24 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
     return config
 
 
+def _date(node: Node) -> str:
+    text = node.text()
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        raise node.wrong(f"a date such as {_GPS_BEGAN:%Y-%m-%d}") from None
+    if day < _GPS_BEGAN:
+        raise node.wrong(f"a date from {_GPS_BEGAN:%Y-%m-%d} on, when GPS time began")
+    return day.isoformat()
+
+
 _gps = _section(GpsConfig, {
     "port": Node.text,
     "baud": _reader(BAUDS),
     "latency_s": _or_none("auto", _number(0, 2)),
     "bridge_s": _number(0, 60),
     "week_rollovers": _whole(0, ROLLOVERS_MAX),
+    "earliest_date": _date,
     "antenna_behind_front_axle_m": _number(-3, 15),
     "place_std_m": _number(0, 100),
 })

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from datetime import date
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from drivers.accelerometers import accelerometers
 from drivers.accelerometers.accelerometer import Decoder
 from drivers.dump import DumpHeader
 from drivers.errors import SettingsError, shortened
-from drivers.nmea import NmeaDecoder
+from drivers.nmea import NmeaDecoder, midnight_utc_us
 from logger.comfort.noise_floor import NoiseFloor
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.sections import BlockFilter
@@ -77,7 +78,7 @@ def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> 
 
 def gps_decoder(config: Config) -> NmeaDecoder:
     """Decoder of the receiver's sentences."""
-    return NmeaDecoder(week_rollovers=config.gps.week_rollovers)
+    return NmeaDecoder(config.gps.week_rollovers, midnight_utc_us(date.fromisoformat(config.gps.earliest_date)))
 
 
 def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> Pipeline:

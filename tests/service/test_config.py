@@ -1,6 +1,8 @@
 """The settings file: what is documented is what loads, and what is wrong is named with its line."""
 
 from dataclasses import fields, is_dataclass
+from functools import reduce
+from operator import xor
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import yaml
 
 from logger.errors import BadInput
 from logger.service.config import Config, find_config, load_config
+from logger.service.wiring import gps_decoder
 from logger.shipped import shipped, vehicle_file, vehicle_names
 from logger.store.export.pairing import Pairing
 
@@ -103,6 +106,8 @@ def test_calibration_points_become_counts_at_0_and_1_g(tmp_path: Path) -> None:
     ("gps:\n  baud: 9600\n  baud: 4800\n", r":3: expected each key once"),
     ("gps:\n  bridge_s: long\n", r":2: expected a number from 0 to 60, found 'long'"),
     ("gps:\n  bridge_s: 61\n", r":2: expected a number from 0 to 60"),
+    ("gps:\n  earliest_date: yesterday\n", r":2: expected a date such as 1980-01-06, found 'yesterday'"),
+    ("gps:\n  earliest_date: 1979-01-01\n", r":2: expected a date from 1980-01-06 on"),
     ("gps:\n  baud: 9601\n", r":2: expected one of 1200, .*'9601'"),
     ("gps:\n", r":1: expected a mapping"),
     ("\n\nlog:\n  record_dump: yes\n", r":4: expected true or false"),
@@ -136,3 +141,14 @@ def test_a_status_file_that_is_a_device_is_refused(tmp_path: Path) -> None:
     config.write_text("status_file: /dev/null\n")
     with pytest.raises(BadInput, match=r"ridelog\.yaml:1: expected the name of a file"):
         load_config(config)
+
+
+@pytest.mark.parametrize(("earliest", "is_known"), [("2019-01-01", True), ("2026-01-01", False)])
+def test_dates_before_the_earliest_are_refused(tmp_path: Path, earliest: str, is_known: bool) -> None:
+    """A sentence of 2019, as an old recording holds it."""
+    decoder = gps_decoder(load(tmp_path, f"gps:\n  earliest_date: {earliest}\n"))
+    text = "GNRMC,120000.00,A,4807.03800,N,01131.00000,E,10.0,,060419,,,A"
+    check = reduce(xor, text.encode())
+    decoder.feed(1_000_000, f"${text}*{check:02X}\r\n".encode())
+    (fix,) = decoder.flush()
+    assert (fix.utc_us is not None) is is_known
