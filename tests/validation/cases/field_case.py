@@ -29,7 +29,9 @@ _FINE = 10  # times the recorder's rate at which the record is looked up between
 _G_MPS2 = 9.80665
 _BMA220_STEP_MPS2 = 2 * _G_MPS2 / 32
 _START = datetime(2026, 6, 9, 13, 5, 20, 400_000, UTC)
-_START_US = 41_300_000
+START_S = 41.3
+"""Of a dump, on its monotonic clock."""
+_START_US = round(1e6 * START_S)
 _METRES_PER_DEG = 111_195.0
 _LAT_DEG, _LON_DEG = 48.137, 11.575
 _PLACES_EVERY_M = 10.0

@@ -65,9 +65,9 @@ def examined(made: Case, in_process: bool) -> Record:
                           "failed": None}
         runs = [str(folder / f"run{number}") for number in range(1, len(made.recordings) + 1)]
         try:
-            said, record["diagnosing"] = _asked(
+            said, record["diagnosing"] = asked(
                 ["diagnose", "--json", "--vehicle", str(folder / "vehicle.yaml"), *runs], in_process)
-            record["said"] = _kept(said)
+            record["said"] = kept_of(said)
             record["added"] = _added(folder, runs, said, in_process)
         except NoAnswer as error:
             record["failed"] = str(error)
@@ -82,7 +82,7 @@ def fingerprint() -> str:
     return found.hexdigest()[:10]
 
 
-def _kept(said: Record) -> Record:
+def kept_of(said: Record) -> Record:
     """The part of a diagnosis that is judged or told of."""
     candidates = [{key: one[key] for key in ("effect", "parameters", "error", "p_value", "confused_with")}
                   for one in said["candidates"][:_KEPT]]
@@ -98,7 +98,7 @@ def _added(folder: Path, runs: Sequence[str], said: Record, in_process: bool) ->
     for number, name in enumerate(said["verdict"]):
         values = ",".join(f"{key}={value!r}" for key, value in found[name].items())
         out = folder / f"with-{number}.yaml"
-        after, cost = _asked(["add-effect", f"{name}:{values}" if values else name, "--json", "--vehicle", str(before),
+        after, cost = asked(["add-effect", f"{name}:{values}" if values else name, "--json", "--vehicle", str(before),
                               "--out", str(out), *runs], in_process)
         before, seconds = out, seconds + cost["cpu_s"]
     if after is None:
@@ -109,7 +109,8 @@ def _added(folder: Path, runs: Sequence[str], said: Record, in_process: bool) ->
 
 # --- asking ---------------------------------------------------------------------------------------------------------
 
-def _asked(arguments: list[str], in_process: bool) -> tuple[Record, dict[str, float]]:
+def asked(arguments: list[str], in_process: bool) -> tuple[Record, dict[str, float]]:
+    """What a command printed as JSON, and what it took. NoAnswer where it failed."""
     return _called(arguments) if in_process else _started(arguments)
 
 
