@@ -54,10 +54,11 @@ def main() -> int:
         print(f"{seed} {'right' if is_right else 'WRONG'}: {words} -> {said(record)}; places off "
               f"{', '.join(f'{one:.3f}' for one in places_m)} m", flush=True)
     share = named / strong if strong else float("nan")
-    print(f"named of those above {STANDS_OUT:g} deviations: {named} of {strong} (goal {GOALS[options.sensor]:.0%})")
+    goal = GOALS[options.sensor]
+    print(f"named of those above {STANDS_OUT:g} deviations: {named} of {strong} (goal {goal:.0%})")
     print(f"wrong names: {wrong} of {options.cases} (goal 5 %)")
     print(f"places off, r.m.s. of runs: median {np.median(off):.3f} m, largest {max(off):.3f} m (goal {PLACE_GOAL_M} m)")
-    return int(share < GOALS[options.sensor] or wrong > 0.05 * options.cases or max(off) > PLACE_GOAL_M)
+    return int(share < goal or wrong > 0.05 * options.cases or max(off) > PLACE_GOAL_M)
 
 
 def put(made: Case, sensor: str) -> tuple[Record, list[float]]:
