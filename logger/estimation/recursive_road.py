@@ -14,7 +14,6 @@ from math import log, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
@@ -70,9 +69,8 @@ class FollowedRoad:
     """
 
     def __init__(
-        self, car: CarResponse, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
+        self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
     ) -> None:
-        self._car = car
         self._vehicle_error = vehicle_error
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
@@ -163,7 +161,7 @@ class FollowedRoad:
         readings = self._as_gaussian(samples)
         there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
         variance = readings.variance + vehicle_error_variance(
-            self._car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
+            block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
         )
         weight = np.where(read, 1 / variance, 0.0)
         seen, seen_share = block.seen(read), block.seen_points(read) / block.count
@@ -226,7 +224,7 @@ class FollowedRoad:
 
         def left(even: float) -> float:
             noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
-            return acceleration_variance_left(self._car, speed_mps, spectrum, noise_psd)
+            return acceleration_variance_left(block.car, speed_mps, spectrum, noise_psd)
 
         return cavity(left, variance)
 

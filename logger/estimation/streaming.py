@@ -8,7 +8,7 @@ Splitting the readings differently changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import ceil, hypot, nan, sqrt
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
@@ -34,7 +35,8 @@ from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ, Samples
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import KnownCar
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -50,6 +52,7 @@ _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
 _FIRST_SAMPLES = 1000
+_COMMON_MPS = 15.0  # with the road that is common, until it is known what is driven
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,21 @@ class _Piece:
     ride: RideSums | None = None
 
 
+@dataclass(frozen=True)
+class _Answers:
+    """How the car answers the road, linear, and what follows from that."""
+
+    car: LinearCar
+    response: CarResponse
+    errors: SlopeErrors
+    grid: TimeGrid
+    ride: RidePosterior | None
+
+
 class RoadEstimator:
     """Readings of a body accelerometer in, IRI of windows out, some seconds late.
 
-    structure    the car
-    output       the motion of it that is read: an acceleration
+    car          with its effects, and where its sensor sits
     sensor       noise and step of the readings
     window_m     length of a window [m]
     place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
@@ -112,12 +125,14 @@ class RoadEstimator:
     noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
     ride_response    of the comfort weighting at frequencies (n,) [Hz], and the figures of the ride are told; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
+    off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
+                     that have nothing to do with one another
+    driven_share     way that was driven over what the distance says; windows are of that distance
     """
 
     def __init__(
         self,
-        structure: Structure,
-        output: Output,
+        car: KnownCar,
         sensor: Sensor,
         window_m: float,
         place_std_m: float = 0.0,
@@ -127,8 +142,12 @@ class RoadEstimator:
         noise: NoiseBelief | None = None,
         ride_response: Callable[[Array], ComplexArray] | None = None,
         ride_ahead_m: float = 0.0,
+        off: Sequence[KnownCar] = (),
+        driven_share: float = 1.0,
     ) -> None:
-        self._car = CarResponse(structure, output)
+        self._car, self._off = car, tuple(off)
+        self._driven_share = driven_share
+        window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
         self._takes_bounds = sensor.is_coarse
         self._place_std_m = place_std_m
         self._late_std_s = late_std_s
@@ -137,12 +156,23 @@ class RoadEstimator:
         self._points = ceil(self._piece_m / _SPACING_M)
         self._spacing_m = self._piece_m / self._points
         self._on_road = on_road
-        self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
-        self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
-        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error, noise)
-        self._ride = RidePosterior(self._car, ride_response, BLOCK_SAMPLES, RATE_HZ) if ride_response else None
+        self._ride_response = ride_response
+        self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise)
+        self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
         self._start_anew()
+
+    def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float, before: _Answers | None = None) -> _Answers:
+        """How the car answers such a road at such a speed; what was there ``before`` if it does so all the same."""
+        psd = spectrum.psd(WAVE_NUMBERS_CPM)
+        car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
+        if before is not None and before.car is car:
+            return before
+        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in self._off])
+        return _Answers(
+            car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
+            TimeGrid(response, BLOCK_SAMPLES, RATE_HZ),
+            RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None)
 
     @property
     def noise_stretches(self) -> int:
@@ -176,7 +206,10 @@ class RoadEstimator:
 
         Returns the windows that have become certain, in order and without gaps, from the first whole one on.
         """
-        waiting = self._waiting.then(self._readable(reading_mps2, usable, at_end, distance_m))
+        return self._pushed(self._readable(reading_mps2, usable, at_end, self._driven_share * distance_m))
+
+    def _pushed(self, more: Samples) -> list[WindowEstimate]:
+        waiting = self._waiting.then(more)
         estimates: list[WindowEstimate] = []
         taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
         for low in range(0, taken, HOP_SAMPLES):
@@ -199,7 +232,7 @@ class RoadEstimator:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
             after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
-            estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
+            estimates = self._pushed(after)
         self._start_anew()
         return estimates
 
@@ -225,16 +258,21 @@ class RoadEstimator:
 
     def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
-        block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
+        block = self._block(samples)
         read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
+        begins = not self._road.begun
         solved = self._road.solved(block, samples, read)
+        if begins and self._car.depends_on_motion:  # of the road nothing was known
+            block = self._block(samples)
+            solved = self._road.solved(block, samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(block.seen(read), self._spacing_m)
-        weighted = self._ride.weighted(solved.accel_mps2) if self._ride is not None else None
+        ride = self._answers.ride
+        weighted = ride.weighted(solved.accel_mps2) if ride is not None else None
         estimates: list[WindowEstimate] = []
         for number in due:
             low = round((number * self._piece_m - block.start_m) / self._spacing_m)
@@ -255,15 +293,26 @@ class RoadEstimator:
             estimates += self._window(number, piece)
         return estimates
 
+    def _block(self, samples: Samples) -> Block:
+        """The block, with the car as it is on this road at this speed."""
+        block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
+        if self._car.depends_on_motion:
+            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+            answers = self._answers_on(there, block.mean_speed_mps, self._answers)
+            if answers is not self._answers:
+                self._answers = answers
+                block = Block(answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
+        return block
+
     def _ride_sums(
         self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
-        assert self._ride is not None
+        assert self._answers.ride is not None
         begin_m = number * self._piece_m + self._ride_ahead_m
         inside = (samples.distance_m >= begin_m) & (samples.distance_m < begin_m + self._piece_m) & moving
         inside[:round(ENTRY_S * RATE_HZ)] = False
-        return self._ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
+        return self._answers.ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
 
     def _speed_mps(self, samples: Samples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
@@ -282,8 +331,8 @@ class RoadEstimator:
         spectrum: RoadSpectrum,
         log_level_std: float,
     ) -> _Piece:
-        knowledge = self._errors.at(speed_mps, spectrum, variance)
-        louder = self._errors.at(speed_mps, raised(spectrum), variance)
+        knowledge = self._answers.errors.at(speed_mps, spectrum, variance)
+        louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
@@ -316,7 +365,7 @@ class RoadEstimator:
         if self._on_road is None:
             return
         noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        seen = resolved_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
+        seen = resolved_share(self._answers.response, speed_mps, spectrum, noise_psd) > 0.5
         resolved = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
         shortest_m, longest_m = (1 / resolved[-1], 1 / resolved[0]) if len(resolved) else (nan, nan)
         self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))
