@@ -38,12 +38,13 @@ Array = npt.NDArray[np.float64]
 # Values of a normal variable at which laws are asked, and how likely each is; the one of two variables has fewer.
 _REACH = 6.0
 _POINTS, _POINTS_OF_TWO = 601, 61
-_MOST_TURNS, _NEAR_ENOUGH = 60, 1e-3
+_MOST_TURNS, _NEAR_ENOUGH = 60, 5e-3
 # Slopes of a car that does not move are asked over motions as small as these: a car's engine moves it more.
 _LEAST_TRAVEL_M, _LEAST_RATE_MPS = 1e-7, 1e-6
 # Speeds, levels (as height) and wavinesses of roads within so much share one linear car.
 _STEPS_PER_E, _WAVINESS_STEPS = 10, 5
 _KEPT = 64
+_EVERY = 3  # of the wave numbers that others look at: sums over the road need fewer
 
 
 class KnownCar(Protocol):
@@ -102,6 +103,7 @@ class MovedCar:
     def at(self, speed_mps: float, wave_number_cpm: Array, psd_m3: Array) -> LinearCar:
         """The linear car at a speed [m/s] on a road of a spectrum (f,) [m3] at wave numbers (f,) [cycle/m], which are
         spaced evenly on a logarithmic scale."""
+        wave_number_cpm, psd_m3 = wave_number_cpm[::_EVERY], psd_m3[::_EVERY]
         log_n, log_psd = np.log(wave_number_cpm), np.log(psd_m3)
         middle = len(log_n) // 2
         slope = (log_psd[-1] - log_psd[middle]) / (log_n[-1] - log_n[middle])

@@ -7,7 +7,7 @@ Python that reading it runs, which the service on board never does: ``read_on_bo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ import yaml
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.store.formats.yaml_nodes import Node, load_mapping
-from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.named_parameters import changed, names, read, sized
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
@@ -104,12 +104,13 @@ def read_model(path: Path | str) -> Model:
     from logger.store.formats.effect_file import read_effects
 
     vehicle, keys = _read(path)
+    effects = read_effects(keys["effects"], vehicle) if "effects" in keys else ()
     return Model(
         vehicle,
-        read_effects(keys["effects"], vehicle) if "effects" in keys else (),
+        effects,
         tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
         _read_given(keys["given"], vehicle) if "given" in keys else None,
-        _read_errors(keys) if "standard_errors" in keys else None,
+        _read_errors(keys, vehicle, effects) if "standard_errors" in keys else None,
     )
 
 
@@ -123,9 +124,11 @@ def read_on_board(path: Path | str) -> Model:
     return read_model(path)
 
 
-def _read_errors(keys: Mapping[str, Node]) -> NumberErrors:
+def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[Chosen]) -> NumberErrors:
     """Standard errors of numbers, and how they hang together."""
-    errors = {name: node.number(above=0.0) for name, node in keys["standard_errors"].mapping().items()}
+    known = [*names(vehicle), *(f"{one.effect.name}.{name}" for one in effects for name in one.values)]
+    said = keys["standard_errors"].mapping(optional=known)
+    errors = {name: node.number(above=0.0) for name, node in said.items()}
     rows = [[node.number(low=-1.0, high=1.0) for node in row.items()] for row in keys["correlations"].items()
             ] if "correlations" in keys else []
     if rows and [len(row) for row in rows] != list(range(len(errors))):
