@@ -143,26 +143,33 @@ class FollowedRoad:
             np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
         )
 
-    def solved(self, block: Block, samples: Samples, read: Bools) -> SolvedBlock:
-        """The block's road, while the belief follows; ``read`` (t,) says which samples count."""
+    def take_off(self, change_mps2: Array) -> None:
+        """From here on readings come with so much less (t,) of what is not the linear car's."""
+        if self._gaussian is not None:
+            self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
+
+    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0) -> SolvedBlock:
+        """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
+        uncertain that is which was taken off the readings [(m/s2)2]."""
         rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         self._begun = True
         for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, steps, before, left == 0)
+            result = self._round(block, samples, read, steps, before, left == 0, beyond_variance)
         return result
 
     def _round(
-        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool
+        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool,
+        beyond_variance: float,
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``."""
         readings = self._as_gaussian(samples)
         there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
         variance = readings.variance + vehicle_error_variance(
             block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
-        )
+        ) + beyond_variance
         weight = np.where(read, 1 / variance, 0.0)
         seen, seen_share = block.seen(read), block.seen_points(read) / block.count
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum

@@ -213,9 +213,12 @@ class Block:
 
     def driven(self, road: ComplexArray) -> Array:
         """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
+        return np.fft.irfft((self.under(road) * self._grid.by_axle).sum(axis=0), len(self._front))
+
+    def under(self, road: ComplexArray) -> ComplexArray:
+        """The rfft in time of the elevations under the axles (x, f) [m], contact patch and all, of such a road."""
         elevation = np.fft.irfft(road * self._averaged, self.count)
-        under = np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
-        return np.fft.irfft((under * self._grid.by_axle).sum(axis=0), len(self._front))
+        return np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
 
     def transposed(self, row: Array) -> ComplexArray:
         """A' times a row (t,) in time, as an rfft."""

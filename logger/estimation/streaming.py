@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
+from logger.estimation.bent_forces import BentForces
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
 from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
@@ -29,14 +30,14 @@ from logger.estimation.iri_posterior import (
     window_iri,
 )
 from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.recursive_road import FollowedRoad
+from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
 from logger.estimation.ride_posterior import Place, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ, Samples
 from logger.vehicle.linear_car import LinearCar
-from logger.vehicle.linearise import KnownCar
+from logger.vehicle.linearise import KnownCar, MovedCar
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -52,6 +53,8 @@ _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
 _FIRST_SAMPLES = 1000
+# Of a car whose laws are not linear: turns of road and forces in each block, and how far towards the forces each goes.
+_TURNS, _FIRST_TURNS, _WAY = 2, 4, 0.5
 _COMMON_MPS = 15.0  # with the road that is common, until it is known what is driven
 
 
@@ -109,6 +112,7 @@ class _Answers:
     errors: SlopeErrors
     grid: TimeGrid
     ride: RidePosterior | None
+    bent: BentForces | None
 
 
 class RoadEstimator:
@@ -172,7 +176,8 @@ class RoadEstimator:
         return _Answers(
             car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
             TimeGrid(response, BLOCK_SAMPLES, RATE_HZ),
-            RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None)
+            RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None,
+            BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
 
     @property
     def noise_stretches(self) -> int:
@@ -194,6 +199,7 @@ class RoadEstimator:
         self._samples: Samples | None = None
         self._road.start_anew()
         self._next = 0
+        self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
         self._gathered: list[_Piece] = []
 
     def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
@@ -242,6 +248,7 @@ class RoadEstimator:
             windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
+        self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])
         self._road.move_on(fresh)
         self._heard += len(fresh)
         if not self._road.begun and self._heard < _FIRST_SAMPLES:
@@ -263,11 +270,10 @@ class RoadEstimator:
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
-        begins = not self._road.begun
-        solved = self._road.solved(block, samples, read)
-        if begins and self._car.depends_on_motion:  # of the road nothing was known
-            block = self._block(samples)
+        if self._answers.bent is None:
             solved = self._road.solved(block, samples, read)
+        else:
+            block, solved = self._solved_in_turns(samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(block.seen(read), self._spacing_m)
@@ -303,6 +309,24 @@ class RoadEstimator:
                 self._answers = answers
                 block = Block(answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
         return block
+
+    def _solved_in_turns(self, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
+        """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
+        for _ in range(_TURNS if self._road.begun else _FIRST_TURNS):
+            block = self._block(samples)
+            linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
+            solved = self._road.solved(block, linear, read, self._beyond_variance)
+            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+            noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
+            resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
+            assert self._answers.bent is not None
+            psd = there.psd(WAVE_NUMBERS_CPM)
+            found, self._beyond_variance = self._answers.bent.reading(block.under(solved.road), psd, resolved)
+            solved = replace(solved, accel_mps2=solved.accel_mps2 + self._beyond)
+            change = _WAY * (found - self._beyond)
+            self._beyond = self._beyond + change
+            self._road.take_off(change)
+        return block, solved
 
     def _ride_sums(
         self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place

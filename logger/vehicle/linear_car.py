@@ -34,6 +34,7 @@ class CornerSlopes:
     tire_n_per_m              beyond the linear tire
     tire_damping_n_s_per_m    of the tire
     contact                   share of its force that the tire gives, 1 while it never lifts
+    rest_m                    mean travel of the suspension, where its laws push it one way
     """
 
     spring_n_per_m: float
@@ -43,6 +44,7 @@ class CornerSlopes:
     tire_n_per_m: float
     tire_damping_n_s_per_m: float
     contact: float = 1.0
+    rest_m: float = 0.0
 
     def passed(self, s: Complex) -> Complex:
         """Share (f,) of the suspension's rate that reaches the damper, at s (f,) [1/s]."""
@@ -106,10 +108,7 @@ class LinearCar:
             read = s[..., None] ** output.order * (output.row @ self._coordinates(s)) + output.road_row
         else:
             read = frequency_response(self.structure, [output], f_hz)[..., 0, :]
-        for one in self.sensors:
-            assert isinstance(one.effect, SensorEffect)
-            read = read * one.effect.factor(one.p, s)[..., None]
-        return np.asarray(read)
+        return self._through_sensors(s, read)
 
     def response(self, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike) -> Complex:
         """The reading per elevation under the front wheel [1/s2], at constant speed.
@@ -134,13 +133,36 @@ class LinearCar:
         rate = s[:, None] * travel
         return Waves(travel, rate, passed * rate, deflection, whole * deflection)
 
+    def travel_by_wheel(self, f_hz: Array) -> Complex:
+        """Travel of each suspension per elevation under each wheel separately (f, w, w), of a car with laws of its own;
+        waves and delays as ``by_wheel``."""
+        return np.asarray(self.structure.travel @ self._coordinates(np.asarray(2j * np.pi * f_hz)))
+
+    def by_force(self, f_hz: Array) -> Complex:
+        """The reading per force in each suspension (f, w) [1/kg], of a car with laws of its own; a force pulls body and
+        wheel together."""
+        s, structure = np.asarray(2j * np.pi * f_hz), self.structure
+        moved = np.linalg.solve(self._dynamic(s)[0], -structure.travel.T.astype(complex))
+        return self._through_sensors(s, s[..., None] ** self.output.order * (self.output.row @ moved))
+
+    def _through_sensors(self, s: Complex, read: Complex) -> Complex:
+        for one in self.sensors:
+            assert isinstance(one.effect, SensorEffect)
+            read = read * one.effect.factor(one.p, s)[..., None]
+        return np.asarray(read)
+
     def _coordinates(self, s: Complex) -> Complex:
         """Of the car with laws of its own, per elevation under each wheel (..., n, w), at s (...) [1/s]."""
+        dynamic, pressed = self._dynamic(s)
+        return np.asarray(np.linalg.solve(dynamic, self.structure.road + pressed))
+
+    def _dynamic(self, s: Complex) -> tuple[Complex, Complex]:
+        """What q is multiplied by (..., n, n), and what the laws of the tires add to the road's force (..., n, w)."""
         structure = self.structure
-        dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
         suspension = np.stack(
             [one.suspension(s, own) for one, own in zip(self.corners, structure.dampers, strict=True)], axis=-1)
         tire = np.stack([one.tire(s, own) for one, own in zip(self.corners, structure.tires, strict=True)], axis=-1)
+        dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
         dynamic = dynamic + (structure.travel.T * suspension[..., None, :]) @ structure.travel
         pressed = structure.wheels.T * tire[..., None, :]
-        return np.asarray(np.linalg.solve(dynamic + pressed @ structure.wheels, structure.road + pressed))
+        return np.asarray(dynamic + pressed @ structure.wheels), np.asarray(pressed)

@@ -127,16 +127,14 @@ def linearised(car: Car, output: Output, speed_mps: float, wave_number_cpm: Arra
     power = psd_m3 * wave_number_cpm * log(wave_number_cpm[1] / wave_number_cpm[0])
     loads_n = static_tire_loads_n(structure)
     slopes = tuple(_linear_slopes(one) for one in car.laws)
-    rests = [0.0] * len(slopes)
     for _ in range(_MOST_TURNS):
         tried = LinearCar(structure, output, slopes, car.sensors)
         moves = tried.waves(wave_number_cpm, speed_mps)
         found = [_Corner(*(_deviation(one[:, i], power) for one in
                            (moves.travel, moves.rate, moves.own_rate, moves.deflection, moves.force)))
-                 .slopes(laws, float(structure.springs[i]), float(loads_n[i]), rests[i])
+                 .slopes(laws, float(structure.springs[i]), float(loads_n[i]), slopes[i].rest_m)
                  for i, laws in enumerate(car.laws)]
-        rests = [rest for _, rest in found]
-        after = tuple(_between(old, new) for old, (new, _) in zip(slopes, found, strict=True))
+        after = tuple(_between(old, new) for old, new in zip(slopes, found, strict=True))
         change = max(_change(old, new) for old, new in zip(slopes, after, strict=True))
         slopes = after
         if change < _NEAR_ENOUGH:
@@ -158,7 +156,7 @@ def _between(old: CornerSlopes, new: CornerSlopes) -> CornerSlopes:
 
 
 def _change(old: CornerSlopes, new: CornerSlopes) -> float:
-    pairs = [(getattr(old, one.name), getattr(new, one.name)) for one in fields(CornerSlopes)]
+    pairs = [(getattr(old, one.name), getattr(new, one.name)) for one in fields(CornerSlopes) if one.name != "rest_m"]
     return max(abs(after - before) / max(abs(after), abs(before)) if after != before else 0.0
                for before, after in pairs)
 
@@ -174,8 +172,8 @@ class _Corner:
     force_n: float
 
     def slopes(self, laws: CornerLaws, spring_n_per_m: float, load_n: float, rest_m: float
-               ) -> tuple[CornerSlopes, float]:
-        """Slopes that stand in for its laws, and the mean travel to be tried next [m]."""
+               ) -> CornerSlopes:
+        """Slopes that stand in for its laws, with the mean travel to be tried next."""
         travel, rate = max(self.travel_m, _LEAST_TRAVEL_M), max(self.rate_mps, _LEAST_RATE_MPS)
         own_rate = max(self.own_rate_mps, _LEAST_RATE_MPS)
         spring, pull = _sloped(sum((law(rest_m + travel * _NORMAL) for law in laws.springs), 0 * _NORMAL), travel)
@@ -195,8 +193,8 @@ class _Corner:
         tire, _ = _sloped(sum((law(pressed * _NORMAL) for law in laws.tires), 0 * _NORMAL), pressed)
         holds = 1.0 if laws.tire_pulls else 0.5 * (1 + erf(load_n / (sqrt(2.0) * self.force_n)))
         unbalanced = spring_n_per_m * rest_m + pull + drag
-        return (CornerSlopes(spring, damper, laws.mount_n_per_m, rubs, tire, laws.tire_damping_n_s_per_m, holds),
-                rest_m - unbalanced / (spring_n_per_m + max(spring, 0.0)))
+        return CornerSlopes(spring, damper, laws.mount_n_per_m, rubs, tire, laws.tire_damping_n_s_per_m, holds,
+                            rest_m - unbalanced / (spring_n_per_m + max(spring, 0.0)))
 
 
 def _normal(points: int) -> tuple[Array, Array]:

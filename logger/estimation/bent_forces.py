@@ -1,0 +1,98 @@
+"""What a car's own laws answer beyond the linear ones that stand in for them, along the motion that was found.
+
+Problem: a linear car is right on the average of a road (``vehicle.linearise``), but a damper that resists rebound more
+than bump has no linear stand-in at all, and friction pushes the more evenly the harder a stretch shakes. Solution: once
+a block's road is known, so is how the suspensions moved; what the laws answer to that, less what the linear ones do, is
+a force, and what a force does to the reading is linear again. Its share is taken off the readings, and the road is
+found anew. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds off
+the corners that would keep the two from coming to rest.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM
+from logger.vehicle.laws import CornerLaws
+from logger.vehicle.linear_car import CornerSlopes, LinearCar
+from logger.vehicle.linearise import MovedCar
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_AT, _SHARE = np.polynomial.hermite_e.hermegauss(9)
+_SHARE = _SHARE / _SHARE.sum()
+# Laws are rounded off over at least so much of how far a corner moves: the slope of friction at rest stays within three
+# times that of its stand-in, so that half a step towards what is found leads there.
+_LEAST_ROUNDING = 1 / 3
+_AT_REST_MPS = 1e-9
+
+
+class BentForces:
+    """For blocks of ``count`` samples at ``rate_hz``.
+
+    moved     the car
+    linear    what stands in for it on this road, at ``speed_mps``
+    """
+
+    def __init__(self, moved: MovedCar, linear: LinearCar, speed_mps: float, count: int, rate_hz: float) -> None:
+        self._laws, self._slopes = moved.car.laws, linear.corners
+        f_hz = np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+        seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
+        asked = np.where(seen, f_hz, 1.0)
+        axle = np.unique(linear.structure.behind_m, return_inverse=True)[1]
+        by_wheel = linear.travel_by_wheel(asked)
+        travel = np.stack([by_wheel[..., axle == one].sum(axis=-1) for one in range(axle.max() + 1)])
+        self._travel = np.where(seen, np.moveaxis(travel, 1, -1), 0.0)  # (axles, corners, f)
+        self._by_force = np.where(seen, linear.by_force(asked).T, 0.0)
+        s = 2j * np.pi * f_hz
+        self._rate = s * self._travel
+        self._own_rate = np.stack([one.passed(s) for one in self._slopes]) * self._rate
+        waves = linear.waves(WAVE_NUMBERS_CPM, speed_mps)
+        self._powers = [np.abs(one) ** 2 * WAVE_NUMBER_STEPS_CPM[:, None]
+                        for one in (waves.travel, waves.rate, waves.own_rate)]
+        self._count = count
+
+    def reading(self, under: ComplexArray, psd_m3: Array, resolved: Array) -> tuple[Array, float]:
+        """What the forces beyond the linear ones do to the reading (count,) [m/s2], and the variance of what they may
+        do besides, because the motion is not known exactly [(m/s2)2].
+
+        under       (axles, f) rfft of the elevations under the axles [m]
+        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
+        """
+        motions = [np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
+                   for gain in (self._travel, self._rate, self._own_rate)]
+        rounded = [np.sqrt(np.maximum((psd_m3 * (1 - resolved)) @ power, (psd_m3 @ power) * _LEAST_ROUNDING**2))
+                   for power in self._powers]
+        found = [_beyond(laws, slopes, *(one[i] for one in motions), *(float(one[i]) for one in rounded))
+                  for i, (laws, slopes) in enumerate(zip(self._laws, self._slopes, strict=True))]
+        forces, variances = np.array([force for force, _ in found]), np.array([variance for _, variance in found])
+        return (np.fft.irfft((np.fft.rfft(forces) * self._by_force).sum(axis=0), self._count),
+                float(variances @ (np.abs(self._by_force) ** 2).mean(axis=1)))
+
+
+def _beyond(laws: CornerLaws, slopes: CornerSlopes, travel: Array, rate: Array, own_rate: Array,
+            travel_std: float, rate_std: float, own_rate_std: float) -> tuple[Array, float]:
+    """The mean force (t,) [N] of a corner's laws over what its motion may have been, less that of their stand-ins; and
+    the variance of what is left of it [N2], on the average."""
+    at, at_rate, at_own = (std * _AT[:, None] + one for std, one in (
+        (travel_std, slopes.rest_m + travel), (rate_std, rate), (own_rate_std, own_rate)))
+    springs = sum((law(at) for law in laws.springs), np.zeros_like(at))
+    parts = [springs - slopes.spring_n_per_m * (at - slopes.rest_m),
+             laws.damper(at_own) - slopes.damper_n_s_per_m * at_own]
+    beside = sum((law(np.broadcast_to(slopes.rest_m + travel, at.shape), at_rate) for law in laws.others),
+                 np.zeros_like(at))
+    means = [_SHARE @ one for one in parts]
+    if laws.dry_friction_n:
+        share = rate / max(sqrt(rate_std**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
+        held = laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share + 0.044715 * share**3))  # nearly its mean, by erf
+        means.append(held + _SHARE @ beside - slopes.beside_n_s_per_m * rate)
+        beside = beside + laws.dry_friction_n * np.sign(at_rate)
+    else:
+        means.append(_SHARE @ beside - slopes.beside_n_s_per_m * rate)
+    parts.append(beside - slopes.beside_n_s_per_m * at_rate)
+    variance = sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in parts)
+    return sum(means[1:], means[0]), variance
