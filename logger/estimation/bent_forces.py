@@ -48,7 +48,7 @@ class BentForces:
         travel = np.stack([by_wheel[..., axle == one].sum(axis=-1) for one in range(axle.max() + 1)])
         self._travel = np.where(seen, np.moveaxis(travel, 1, -1), 0.0)  # (axles, corners, f)
         self._by_force = np.where(seen, linear.by_force(asked).T, 0.0)
-        s = 2j * np.pi * f_hz
+        s = np.asarray(2j * np.pi * f_hz, dtype=np.complex128)
         self._rate = s * self._travel
         self._own_rate = np.stack([one.passed(s) for one in self._slopes]) * self._rate
         waves = linear.waves(WAVE_NUMBERS_CPM, speed_mps)

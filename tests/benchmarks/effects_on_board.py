@@ -39,6 +39,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.linearise import known_vehicle
+from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.uncertain import NumberErrors, cars_off
 from logger.vehicle.vehicle import Vehicle
 
