@@ -148,10 +148,11 @@ class FollowedRoad:
         if self._gaussian is not None:
             self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
 
-    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0) -> SolvedBlock:
+    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
+               ) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
-        uncertain that is which was taken off the readings [(m/s2)2]."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS)
+        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved."""
+        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None

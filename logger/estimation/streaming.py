@@ -55,6 +55,7 @@ _SPACING_M = 0.155
 _FIRST_SAMPLES = 1000
 # Of a car whose laws are not linear: turns of road and forces in each block, and how far towards the forces each goes.
 _TURNS, _FIRST_TURNS, _WAY = 2, 4, 0.5
+_KEPT = 24  # of its answers to other roads at other speeds, some 0.4 MB each
 _COMMON_MPS = 15.0  # with the road that is common, until it is known what is driven
 
 
@@ -162,22 +163,26 @@ class RoadEstimator:
         self._on_road = on_road
         self._ride_response = ride_response
         self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise)
+        self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
         self._start_anew()
 
-    def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float, before: _Answers | None = None) -> _Answers:
-        """How the car answers such a road at such a speed; what was there ``before`` if it does so all the same."""
+    def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float) -> _Answers:
+        """How the car answers such a road at such a speed; the last few are kept."""
         psd = spectrum.psd(WAVE_NUMBERS_CPM)
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
-        if before is not None and before.car is car:
-            return before
+        if car in self._kept:
+            return self._kept[car]
         response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in self._off])
-        return _Answers(
+        if len(self._kept) >= _KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[car] = _Answers(
             car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
             TimeGrid(response, BLOCK_SAMPLES, RATE_HZ),
             RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None,
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
+        return self._kept[car]
 
     @property
     def noise_stretches(self) -> int:
@@ -304,7 +309,7 @@ class RoadEstimator:
         block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
         if self._car.depends_on_motion:
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
-            answers = self._answers_on(there, block.mean_speed_mps, self._answers)
+            answers = self._answers_on(there, block.mean_speed_mps)
             if answers is not self._answers:
                 self._answers = answers
                 block = Block(answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
@@ -315,7 +320,7 @@ class RoadEstimator:
         for _ in range(_TURNS if self._road.begun else _FIRST_TURNS):
             block = self._block(samples)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
-            solved = self._road.solved(block, linear, read, self._beyond_variance)
+            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)

@@ -41,8 +41,8 @@ _POINTS, _POINTS_OF_TWO = 601, 61
 _MOST_TURNS, _NEAR_ENOUGH = 60, 5e-3
 # Slopes of a car that does not move are asked over motions as small as these: a car's engine moves it more.
 _LEAST_TRAVEL_M, _LEAST_RATE_MPS = 1e-7, 1e-6
-# Speeds, levels (as height) and wavinesses of roads within so much share one linear car.
-_STEPS_PER_E, _WAVINESS_STEPS = 10, 5
+# Speeds and levels (as height) of roads within 20 %, and wavinesses within 0.2, share one linear car.
+_STEPS_PER_E, _WAVINESS_STEPS = 5, 5
 _KEPT = 64
 _EVERY = 3  # of the wave numbers that others look at: sums over the road need fewer
 
@@ -89,7 +89,7 @@ def _linear_slopes(one: CornerLaws) -> CornerSlopes:
 @dataclass(frozen=True, eq=False)
 class MovedCar:
     """A car whose laws are not linear: linear for each speed and road, by statistical linearisation. Speeds and heights
-    of roads within 10 % share one."""
+    of roads within 20 % share one."""
 
     car: Car
     output: Output
