@@ -29,6 +29,7 @@ _SHARE = _SHARE / _SHARE.sum()
 # times that of its stand-in, so that half a step towards what is found leads there.
 _LEAST_ROUNDING = 1 / 3
 _AT_REST_MPS = 1e-9
+_EVERY = 4  # of the samples that the variance is asked at: it is a mean over the block
 
 
 class BentForces:
@@ -63,36 +64,46 @@ class BentForces:
         under       (axles, f) rfft of the elevations under the axles [m]
         psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
         """
-        motions = [np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
-                   for gain in (self._travel, self._rate, self._own_rate)]
-        rounded = [np.sqrt(np.maximum((psd_m3 * (1 - resolved)) @ power, (psd_m3 @ power) * _LEAST_ROUNDING**2))
-                   for power in self._powers]
-        found = [_beyond(laws, slopes, *(one[i] for one in motions), *(float(one[i]) for one in rounded))
-                  for i, (laws, slopes) in enumerate(zip(self._laws, self._slopes, strict=True))]
+        motions = np.array([np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
+                            for gain in (self._travel, self._rate, self._own_rate)])
+        left = np.sqrt(np.array([(psd_m3 * (1 - resolved)) @ power for power in self._powers]))
+        rounded = np.maximum(left, _LEAST_ROUNDING * np.sqrt(np.array([psd_m3 @ power for power in self._powers])))
+        found = [(_beyond(laws, slopes, motions[:, i], rounded[:, i]),
+                  _variance(laws, slopes, motions[:, i, ::_EVERY], left[:, i]))
+                 for i, (laws, slopes) in enumerate(zip(self._laws, self._slopes, strict=True))]
         forces, variances = np.array([force for force, _ in found]), np.array([variance for _, variance in found])
         return (np.fft.irfft((np.fft.rfft(forces) * self._by_force).sum(axis=0), self._count),
                 float(variances @ (np.abs(self._by_force) ** 2).mean(axis=1)))
 
 
-def _beyond(laws: CornerLaws, slopes: CornerSlopes, travel: Array, rate: Array, own_rate: Array,
-            travel_std: float, rate_std: float, own_rate_std: float) -> tuple[Array, float]:
-    """The mean force (t,) [N] of a corner's laws over what its motion may have been, less that of their stand-ins; and
-    the variance of what is left of it [N2], on the average."""
-    at, at_rate, at_own = (std * _AT[:, None] + one for std, one in (
-        (travel_std, slopes.rest_m + travel), (rate_std, rate), (own_rate_std, own_rate)))
-    springs = sum((law(at) for law in laws.springs), np.zeros_like(at))
-    parts = [springs - slopes.spring_n_per_m * (at - slopes.rest_m),
-             laws.damper(at_own) - slopes.damper_n_s_per_m * at_own]
-    beside = sum((law(np.broadcast_to(slopes.rest_m + travel, at.shape), at_rate) for law in laws.others),
-                 np.zeros_like(at))
-    means = [_SHARE @ one for one in parts]
+def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> Array:
+    """The mean force (t,) [N] of a corner's laws, less that of their stand-ins, over what its motion may have been:
+    travel, rate and the damper's own rate (3, t) within standard errors (3,)."""
+    springs, dampers, beside = _parts(laws, slopes, motion, std)
+    force = np.asarray(_SHARE @ (springs + dampers + beside))
     if laws.dry_friction_n:
-        share = rate / max(sqrt(rate_std**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
-        held = laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share + 0.044715 * share**3))  # nearly its mean, by erf
-        means.append(held + _SHARE @ beside - slopes.beside_n_s_per_m * rate)
-        beside = beside + laws.dry_friction_n * np.sign(at_rate)
-    else:
-        means.append(_SHARE @ beside - slopes.beside_n_s_per_m * rate)
-    parts.append(beside - slopes.beside_n_s_per_m * at_rate)
-    variance = sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in parts)
-    return sum(means[1:], means[0]), variance
+        share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
+        # nearly its mean over a normal distribution, which is an erf
+        force += laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share + 0.044715 * share**3))
+    return force
+
+
+def _variance(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> float:
+    """The variance [N2] of that force, over what its motion may have been, on the average."""
+    springs, dampers, beside = _parts(laws, slopes, motion, std)
+    if laws.dry_friction_n:
+        beside = beside + laws.dry_friction_n * np.sign(motion[1] + std[1] * _AT[:, None])
+    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (springs, dampers, beside))
+
+
+def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> tuple[Array, Array, Array]:
+    """Forces (p, t) of springs, dampers and what lies beside them, less those of their stand-ins, without dry friction,
+    at the points of a normal distribution."""
+    travel, rate, own_rate = motion[:, None] + std[:, None, None] * _AT[:, None]
+    at = slopes.rest_m + travel
+    springs = sum((law(at) for law in laws.springs), -slopes.spring_n_per_m * travel)
+    dampers = laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate
+    # travel and rate of one instant are not correlated: what asks for both is asked at the mean travel
+    middle = np.broadcast_to(slopes.rest_m + motion[0], rate.shape)
+    beside = sum((law(middle, rate) for law in laws.others), -slopes.beside_n_s_per_m * rate)
+    return springs, dampers, beside

@@ -51,7 +51,7 @@ def test_a_drive_is_judged_by_the_file_that_has_its_effects(
     plain, own = (told(capsys, "estimate", tmp_path, "--vehicle", vehicle)["comparison"]
                   for vehicle in ("rav4-2009", car))
     assert abs(own["bias"]) < 0.05 < abs(plain["bias"])
-    assert own["r2"] > max(plain["r2"], 0.9 * own["limit_r2"])
+    assert own["r2"] > max(plain["r2"], 0.85 * own["limit_r2"])
 
 
 def test_standard_errors_of_the_file_are_in_those_of_the_windows(
