@@ -133,7 +133,12 @@ def test_what_runs_on_board_never_loads_what_belongs_to_the_desk() -> None:
 
 
 def test_a_service_that_logs_a_drive_has_loaded_nothing_of_the_desk(short_dump: Path, tmp_path: Path) -> None:
-    """In a process of its own: every module of the service, and a drive through the code that runs in the car."""
+    """In a process of its own: every module of the service, and a drive through the code that runs in the car, in one
+    that has effects."""
+    plain = (ROOT / "config/vehicles/rav4-2009.yaml").read_text("utf-8")
+    effects = "effects: [{name: dry_friction, friction_force_n: 60}, {name: sensor_gain, gain: 1.1}]"
+    car = tmp_path / "car.yaml"
+    car.write_text(plain.replace("effects: []", f"{effects}\nstandard_errors: {{sprung_mass_kg: 20}}"), "utf-8")
     code = f"""
 import importlib, json, pkgutil, sys
 import logger.service
@@ -141,7 +146,7 @@ from logger.commands.main import main
 for module in pkgutil.walk_packages(logger.service.__path__, "logger.service."):
     importlib.import_module(module.name)
 import logger.commands.run
-assert main(["replay", {str(short_dump)!r}, "--out", {str(tmp_path)!r}, "--json"]) == 0
+assert main(["replay", {str(short_dump)!r}, "--out", {str(tmp_path)!r}, "--json", "--vehicle", {str(car)!r}]) == 0
 print(json.dumps(sorted(sys.modules)))
 """
     played = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
@@ -149,7 +154,7 @@ print(json.dumps(sorted(sys.modules)))
     assert "logger.service.serve" in loaded
     assert list(tmp_path.glob("*.csv"))
     assert {"lab", "identification", "modal", "studies"} <= DESK
-    desk = {"scipy"} | {f"logger.{folder}" for folder in DESK - {"report"}}  # a replay ends with a summary
+    desk = {"scipy", "numba"} | {f"logger.{folder}" for folder in DESK - {"report"}}  # a replay ends with a summary
     assert not [name for name in loaded if ".".join(name.split(".")[:2]) in desk or name.split(".")[0] in desk]
 
 

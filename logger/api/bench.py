@@ -184,7 +184,7 @@ class Bench:
                        Step("numbers refitted", found.error_refitted, found.noise_floor_error))
         step = Step(f"added {' and '.join(found.names)}", found.error_after, found.noise_floor_error)
         return Model(found.vehicle, found.effects, (*history, step),
-                     self.model.given or self.model.vehicle)
+                     self.model.given or self.model.vehicle, found.errors)
 
     @contextmanager
     def _blamed(self) -> Iterator[None]:

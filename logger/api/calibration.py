@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.estimation.rms_calibration import Settings, SpeedCalibration
     from logger.report.calibration_text import Calibrated
+    from logger.vehicle.effect import Chosen
     from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -96,8 +97,9 @@ def calibrate(
     """How much a vehicle shakes on roads of known roughness: its model drives over random roads of IRI 1 to 10 m/km, at
     10 to 70 mph.
 
-    vehicle               without effects; a model, or a name or file as in ``read_vehicle``. What is found of a name or
-                          a file is kept beside the file or in the user's cache, and taken from there the next time
+    vehicle               with its effects; a model, or a name or file as in ``read_vehicle``. What is found of a name
+                          or a file is kept beside the file or in the user's cache, and taken from there the next
+                          time, unless an effect of your own is in it
     window_m              length of a window, 2 to 200 [m]; 25 ft by default
     low_pass_hz           of the recorder's settings, 1 to 45 [Hz]; None: none
     passengers            people of 75 kg more in the car; a half car gets half of their mass, a quarter car a quarter
@@ -106,7 +108,7 @@ def calibrate(
     recompute             do not look for a stored result
     progress              told where the result is from
 
-    Raises BadInput for numbers out of range, a vehicle with effects, and as ``read_vehicle``. Source: Blum 2015,
+    Raises BadInput for numbers out of range, and as ``read_vehicle``. Source: Blum 2015,
     section 6.3 (Fig 6.3 to 6.8, 6.16, 6.17).
 
     >>> found = calibrate(car)
@@ -121,12 +123,10 @@ def calibrate(
     SEED.check("seed", seed)
     question = Question(window_m, low_pass_hz, passengers, sprung_mass_factor, seed, recompute)
     if isinstance(vehicle, Model):
-        if vehicle.effects:
-            raise BadInput(f"{vehicle.vehicle.name}: expected a vehicle without effects")
-        found = calibrated(vehicle.vehicle, None, question, progress)
+        found = calibrated(vehicle, None, question, progress)
     else:
         path = vehicle_path(str(vehicle))
-        found = calibrated(vehicle_file.read_vehicle(path), path, question, progress)
+        found = calibrated(vehicle_file.read_model(path), path, question, progress)
     summary, speeds = as_json(found), found.speeds
     return Calibration(
         "\n".join(lines(found)), summary, summary["sprung_mass_kg"], np.array([one.speed_mps for one in speeds]),
@@ -139,8 +139,9 @@ def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:
     return Slopes(*(np.array([getattr(line, one.name) for line in lines]) for one in fields(Slopes)))
 
 
-def calibrated(vehicle: Vehicle, path: Path | None, question: Question, tell: Tell = unsaid) -> Calibrated:
-    """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has.
+def calibrated(model: vehicle_file.Model, path: Path | None, question: Question, tell: Tell = unsaid) -> Calibrated:
+    """The lines of a vehicle, and with a load if there is to be one. BadInput for a window that no road has, and for a
+    vehicle that lacks what its model or an effect needs.
 
     path    of the vehicle's file, beside which they are kept; None: nowhere
     tell    told where they are from
@@ -153,7 +154,10 @@ def calibrated(vehicle: Vehicle, path: Path | None, question: Question, tell: Te
         settings = Settings(window_m=question.window_m, seed=question.seed)
     except ValueError as error:
         raise BadInput(f"{question.said}: {error}") from None
-    ask = _Ask(path, recorder_gain(question.low_pass_hz), settings, question.recompute, tell)
+    vehicle = model.vehicle
+    if any(one.file is not None for one in model.effects):
+        path = None  # what is in that file may change
+    ask = _Ask(path, model.effects, recorder_gain(question.low_pass_hz), settings, question.recompute, tell)
     plain = _answer(ask, vehicle, vehicle.name)
     people, factor = question.passengers, question.sprung_mass_factor
     if not people and factor == 1.0:
@@ -169,6 +173,7 @@ class _Ask:
     """What is asked of a vehicle, where an answer may lie, and who is told where it was."""
 
     path: Path | None
+    effects: Sequence[Chosen]
     gain: Callable[[Array], Array]
     settings: Settings
     recompute: bool
@@ -179,14 +184,19 @@ def _answer(ask: _Ask, vehicle: Vehicle, title: str) -> tuple[SpeedCalibration, 
     """The stored calibration of this vehicle, or a new one, which is then stored."""
     from logger.estimation import rms_calibration
     from logger.store.formats.calibration_file import find, fingerprint, keep, places
+    from logger.vehicle.linearise import known_vehicle
 
-    kept_in, key = () if ask.path is None else places(ask.path), fingerprint(vehicle, ask.gain, ask.settings)
+    kept_in = () if ask.path is None else places(ask.path)
+    key = fingerprint(vehicle, ask.gain, ask.settings, ask.effects)
     found = None if ask.recompute else find(kept_in, key)
     if found is not None:
         ask.tell(f"{title}: found in {found.path}")
         return found.speeds
     started_s = time.perf_counter()
-    speeds = rms_calibration.calibrate(vehicle, ask.gain, ask.settings)
+    try:
+        speeds = rms_calibration.calibrate(known_vehicle(vehicle, ask.effects), ask.gain, ask.settings)
+    except ValueError as error:
+        raise BadInput(f"{vehicle.name}: {error}") from None
     took_s = time.perf_counter() - started_s
     path = keep(kept_in, key, speeds)
     where = (f"kept in {path}" if path else "not kept" if not kept_in else

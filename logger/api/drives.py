@@ -15,7 +15,7 @@ from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
-from logger.store.formats import drive_file
+from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
 from logger.units import WINDOW_M
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
     from logger.estimation.sensor_noise import Sensor
     from logger.profiles.track import Track
-    from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -280,15 +279,15 @@ def estimate(
     the run has a profile.
 
     run           as ``read_run``; its distance may go back by up to 1 m, and is then laid anew
-    vehicle       without effects; where its sensor sits is in it
+    vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
                   its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
     step_mps2     step that readings are rounded to; 0: none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
     unit, resample_hz    as ``comfort``
 
-    Raises BadInput for a drive that cannot be used, what makes the result wrong (repeated samples, gravity in g), a
-    vehicle with effects, and as ``read_run`` and ``read_vehicle``.
+    Raises BadInput for a drive that cannot be used, what makes the result wrong (repeated samples, gravity in g),
+    and as ``read_run`` and ``read_vehicle``.
     Source: a smoother of the road's state as ISO 8608 lets expect it (``logger.estimation``).
 
     >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
@@ -300,15 +299,13 @@ def estimate(
     from logger.report.record_checks_text import checks_json, checks_lines
 
     model = model_of(vehicle)
-    if model.effects:
-        raise BadInput(f"{model.vehicle.name}: expected a vehicle without effects")
     learns = noise_mps2 == "auto"
     given_mps2 = NOISE_MPS2 if noise_mps2 == "auto" else noise_mps2
     NOISE.check("noise_mps2", given_mps2)
     ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
-    found = assessed(drive, model.vehicle, Sensor(given_mps2, step_mps2), window_m, learns)
+    found = assessed(drive, model, Sensor(given_mps2, step_mps2), window_m, learns)
     summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
@@ -320,7 +317,8 @@ def estimate(
                     tuple(doubt.words for doubt in checked.doubts))
 
 
-def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float, learns_noise: bool = False) -> Assessment:
+def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False
+             ) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used."""
     from logger.estimation.assessment import Unusable, assess, estimable
@@ -331,6 +329,6 @@ def assessed(run: Run, vehicle: Vehicle, sensor: Sensor, window_m: float, learns
         file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
         raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     try:
-        return assess(ready, vehicle, sensor, window_m, run.track, learns_noise)
+        return assess(ready, model.vehicle, sensor, window_m, run.track, learns_noise, model.effects, model.errors)
     except ValueError as error:
-        raise BadInput(f"{vehicle.name}: {error}") from None
+        raise BadInput(f"{model.vehicle.name}: {error}") from None

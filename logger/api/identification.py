@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from logger.profiles.track import Track
     from logger.store.formats.drive_file import Drive
     from logger.vehicle.named_parameters import Free
+    from logger.vehicle.uncertain import NumberErrors
 
 Array = npt.NDArray[np.float64]
 
@@ -326,14 +327,24 @@ def _options(model: DriveModel, question: Question) -> FitOptions:
 
 
 def _fitted(given: vehicle_file.Model, model: DriveModel, fit: Fit) -> vehicle_file.Model:
-    """The model with the numbers that were found, and the standard errors of its effects'."""
+    """The model with the numbers that were found and their standard errors, those of its effects with them too."""
     values = np.array(list(fit.parameters.values()))
     effects = []
     for one in model.effects_with(values):
         errors = {name.partition(".")[2]: error for name, error in fit.standard_errors.items()
                   if name.partition(".")[0] == one.effect.name and name.partition(".")[2] in one.values}
         effects.append(replace(one, standard_errors={**one.standard_errors, **errors}))
-    return replace(given, vehicle=model.vehicle_with(values), effects=tuple(effects))
+    return replace(given, vehicle=model.vehicle_with(values), effects=tuple(effects),
+                   errors=_errors(list(fit.parameters), fit.covariance))
+
+
+def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
+    """How far the numbers of car and effects may be off, without those of the road."""
+    from logger.identification.unknown_inputs import is_input
+    from logger.vehicle.uncertain import NumberErrors
+
+    kept = [place for place, name in enumerate(found) if not is_input(name)]
+    return NumberErrors.of_covariance([found[place] for place in kept], covariance[np.ix_(kept, kept)])
 
 
 # --- roads of which only the kind is known ---
@@ -365,9 +376,21 @@ def on_unmeasured_roads(given: vehicle_file.Model, word: str, records: list[Reco
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
     return FittedNumbers(
-        fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values())))),
+        fit, vehicle_file.Model(car.vehicle_with(np.array(list(fit.parameters.values()))),
+                                errors=_road_fit_errors(fit)),
         {**as_json(fit, parameters), "runs": [record.name for record in records]},
         [_head(given, len(parameters), records, f"; over {where}", ","), *lines(fit, parameters)])
+
+
+def _road_fit_errors(fit: RoadFit) -> NumberErrors:
+    """Of the car's numbers, whose covariance holds shares of sizes."""
+    from logger.vehicle.uncertain import NumberErrors
+
+    kept = [fit.names.index(name) for name in fit.parameters]
+    relative = fit.covariance[np.ix_(kept, kept)]
+    errors = np.array([fit.standard_errors[name] for name in fit.parameters])
+    units = errors / np.sqrt(np.maximum(np.diag(relative), 1e-300))
+    return NumberErrors.of_covariance(list(fit.parameters), relative * np.outer(units, units))
 
 
 def _road_options(question: Question) -> tuple[RoadOptions, Question]:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.ranges import DECREMENT, MODAL_METHODS, RESPONSES, SPECTRUM
+from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, DECREMENT, IRI, MODAL_METHODS, RESPONSES, SPECTRUM, SPEED
 from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.store.formats import channel_file
 
@@ -186,6 +187,59 @@ def modes(
         frequency_std_hz, damping_ratio, damping_std,
         np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VehicleModes(CommandResult):
+    """Vibrations of a vehicle with its effects, m of them, slowest first.
+
+    frequency_hz, damping_ratio           (m,) as in ``Modes``
+    frequency_std_hz, damping_std         (m,) by the standard errors of the vehicle's numbers; NaN where they are not
+                                          known
+    """
+
+    frequency_hz: Array
+    frequency_std_hz: Array
+    damping_ratio: Array
+    damping_std: Array
+
+
+def vehicle_modes(
+    vehicle: Model | Path | str, iri_m_per_km: float = COMMON_IRI, speed_mps: float = COMMON_SPEED_MPS
+) -> VehicleModes:
+    """Natural frequencies and damping ratios of a vehicle with its effects, which laws that are not linear have on a
+    road of this roughness at this speed.
+
+    vehicle    a model, or a name or file as in ``read_vehicle``
+
+    Raises BadInput for numbers out of range, and as ``read_vehicle``.
+
+    >>> vehicle_modes("rav4-2009").frequency_hz.round(2).tolist()
+    [1.12, 1.48, 10.74, 10.84]
+    """
+    from logger.estimation.car_response import WAVE_NUMBERS_CPM
+    from logger.estimation.road_spectrum import RoadSpectrum
+    from logger.report.modal_text import vehicle_json, vehicle_lines
+    from logger.vehicle.linearise import known_vehicle
+    from logger.vehicle.modes import mode_errors
+    from logger.vehicle.uncertain import cars_off
+
+    IRI.check("iri_m_per_km", iri_m_per_km)
+    SPEED.check("speed_mps", speed_mps)
+    model = model_of(vehicle)
+    psd = RoadSpectrum.of_iri(iri_m_per_km).psd(WAVE_NUMBERS_CPM)
+    try:
+        known = known_vehicle(model.vehicle, model.effects)
+        cars = [one.at(speed_mps, WAVE_NUMBERS_CPM, psd)
+                for one in (known, *cars_off(model.vehicle, model.effects, model.errors))]
+    except ValueError as error:
+        raise BadInput(f"{model.vehicle.name}: {error}") from None
+    found, frequency_std_hz, damping_std = mode_errors(cars[0], cars[1:])
+    columns = (np.array([one.frequency_hz for one in found]), frequency_std_hz,
+               np.array([one.damping_ratio for one in found]), damping_std)
+    at = f", at {speed_mps:g} m/s on a road of {iri_m_per_km:g} m/km" if known.depends_on_motion else ""
+    text = "\n".join(vehicle_lines(f"{model.vehicle.name}{at}", *columns))
+    return VehicleModes(text, vehicle_json(*columns), *columns)
 
 
 def found_modes(given: channel_file.ChannelRecord | Path | str, question: Question) -> Found:

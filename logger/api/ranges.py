@@ -42,6 +42,8 @@ NOISE_MODELS = ("auto", "white", "ar", "road")
 SPECTRUM, DECREMENT = "fft", "decrement"
 MODAL_METHODS = ("era", "ssi", "ssi-cov", "n4sid", "ar", "arx", "armax", SPECTRUM, DECREMENT)
 RESPONSES = ("decay", "random")
+COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
+"""Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
 """Of modes: the methods, of which the last two know no poles, and what a record may be."""
 PASSENGERS, MASS_FACTOR, SEED = Range(0, 60), Range(0.2, 10.0), Range(0, 2**63)
 LOW_PASS = Range(1.0, 45.0, "Hz")

@@ -26,6 +26,7 @@ class Model(vehicle_file.Model, Shown):
     effects    what it has besides, each with values and, where it was fitted, standard errors
     history    the steps that led to it, each with its error
     given      the car before any of its numbers was refitted; None: none was
+    errors     standard errors of its numbers with their correlations; None: none are known
     """
 
     @property

@@ -45,14 +45,14 @@ def run(args: argparse.Namespace) -> int:
     from logger.api.calibration import Question, calibrated
     from logger.report.calibration_text import as_json, csv_lines, lines
     from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
 
     path = vehicle_path(args.vehicle)
-    vehicle = read_vehicle(path)
+    model = read_model(path)
     if args.out is not None and args.out.exists() and args.out.samefile(path):
         raise BadInput(f"--out {args.out}: expected another file than the vehicle's")
-    found = calibrated(vehicle, path, Question(
+    found = calibrated(model, path, Question(
         WINDOW_M if args.window is None else args.window, args.low_pass, args.passengers, args.sprung_mass_factor,
         args.seed, args.recompute, "--window"), warned)
     if args.out is not None:

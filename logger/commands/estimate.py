@@ -75,17 +75,17 @@ def run(args: argparse.Namespace) -> int:
     from logger.report.record_checks_text import checks_json, checks_lines
     from logger.shipped import vehicle_path
     from logger.store.formats.record_checks import Asked
-    from logger.store.formats.vehicle_file import read_vehicle
+    from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
 
     window_m = WINDOW_M if args.window is None else args.window
     vehicle_yaml = vehicle_path(args.vehicle)
-    vehicle = read_vehicle(vehicle_yaml)
+    model = read_model(vehicle_yaml)
     _check_files(args, vehicle_yaml)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
     learns = args.noise is None
     sensor = Sensor(NOISE_MPS2 if learns else args.noise, args.step)
-    found = assessed(drive, vehicle, sensor, window_m, learns)
+    found = assessed(drive, model, sensor, window_m, learns)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")

@@ -3,6 +3,12 @@
 FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response to
 random forces; --input names a column with a force or motion that was measured beside it. Nobody has to pick poles: the
 order and the modes are chosen by rule, and what the record does not support is listed as rejected, with the reason.
+
+  ridelog modes push.csv --method era
+  ridelog modes --vehicle mycar.yaml --iri 6 --speed 20
+
+With --vehicle instead of FILE they are those of a vehicle's file with its effects; the standard deviations follow from
+the standard errors that the file carries. Laws that are not linear are what they come to on a road at a speed.
 """
 
 from __future__ import annotations
@@ -12,7 +18,17 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logger.api.ranges import DECREMENT, MODAL_METHODS, RESPONSES, SPECTRUM
+from logger.api.ranges import (
+    COMMON_IRI,
+    COMMON_SPEED_MPS,
+    DECREMENT,
+    IRI,
+    MODAL_METHODS,
+    RESPONSES,
+    SPECTRUM,
+    SPEED,
+)
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -25,6 +41,11 @@ EXAMPLES = ("five-storey",)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog modes``."""
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="CSV with t_s and one column per sensor")
+    parser.add_argument("--vehicle", metavar="NAME|FILE", help="the modes of a vehicle's file, instead of FILE")
+    add_number(parser, "--iri", *IRI, metavar="M_PER_KM",
+               help=f"with --vehicle: road for laws that are not linear (default: {COMMON_IRI:g})")
+    add_number(parser, "--speed", *SPEED, metavar="MPS",
+               help=f"with --vehicle: speed on it (default: {COMMON_SPEED_MPS:g})")
     parser.add_argument("--method", choices=MODAL_METHODS, metavar="NAME",
                         help=f"{', '.join(MODAL_METHODS)} (default: ssi). era suits a free decay, ssi a random "
                              "response, n4sid a measured input; decrement is Eq 5.2, for one mode")
@@ -51,6 +72,10 @@ def run(args: argparse.Namespace) -> int:
     from logger.api.modal import USUAL_METHOD, Question, found_modes
     from logger.report.modal_text import as_json, lines
 
+    if args.vehicle is not None:
+        return _of_vehicle(args)
+    if args.iri is not None or args.speed is not None:
+        raise BadInput("--iri and --speed: expected --vehicle with them")
     if args.example is not None:
         _check_example(args)
         example = _five_storey()
@@ -78,15 +103,33 @@ def _option(name: str) -> str:
     return f"--{name.removesuffix('_s').removesuffix('_column')}"
 
 
+def _of_vehicle(args: argparse.Namespace) -> int:
+    from logger.api.modal import vehicle_modes
+    from logger.api.vehicles import read_vehicle
+
+    if args.example is not None:
+        raise BadInput(f"--vehicle {args.vehicle}: expected no --example beside it")
+    _check_alone(args, f"--vehicle {args.vehicle}")
+    found = vehicle_modes(read_vehicle(args.vehicle), COMMON_IRI if args.iri is None else args.iri,
+                          COMMON_SPEED_MPS if args.speed is None else args.speed)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else str(found))
+    return EXIT_DONE
+
+
 def _check_example(args: argparse.Namespace) -> None:
     """BadInput for anything beside an example but --json."""
+    _check_alone(args, f"--example {args.example}")
+
+
+def _check_alone(args: argparse.Namespace, said: str) -> None:
+    """BadInput for a FILE, or options that need one."""
     if args.file is not None:
-        raise BadInput(f"--example {args.example}: expected no FILE beside it, found {args.file}")
+        raise BadInput(f"{said}: expected no FILE beside it, found {args.file}")
     given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
              "--response": args.response, "--from": args.from_s, "--to": args.to_s, "--segments": args.segments,
              "--diagram": args.diagram}
     if options := [option for option, value in given.items() if value is not None]:
-        raise BadInput(f"{options[0]}: expected a FILE with it, not --example {args.example}")
+        raise BadInput(f"{options[0]}: expected a FILE with it, not {said}")
 
 
 def _diagram_csv(result: ModalResult) -> str:

@@ -7,7 +7,7 @@ estimator could reach that knew the road's spectrum, the sensor's noise and the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -32,8 +32,10 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
-from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_point
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen
+from logger.vehicle.linearise import known_car
+from logger.vehicle.uncertain import NumberErrors, cars_off
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -136,29 +138,34 @@ class Assessment:
 
 
 def assess(
-    drive: Estimable, vehicle: Vehicle, sensor: Sensor, window_m: float, track: Track | None, learns_noise: bool = False
+    drive: Estimable, vehicle: Vehicle, sensor: Sensor, window_m: float, track: Track | None,
+    learns_noise: bool = False, effects: Sequence[Chosen] = (), errors: NumberErrors | None = None,
 ) -> Assessment:
     """Estimate a drive's road in windows [m] and compare it with the track it was driven on, if that is known.
 
-    Where the noise is to be learnt, the sensor's is a guess. ValueError if the vehicle lacks what its model needs.
+    effects, errors    of the vehicle, and how far its numbers may be off
+
+    Where the noise is to be learnt, the sensor's is a guess. ValueError if the vehicle lacks what its model or an
+    effect needs.
     """
-    structure = structure_of(vehicle)
-    output = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
-    gridded, readings, distance_m = on_grid(sensor, drive.rate_hz, drive.accel_z_mps2, drive.distance_m)
+    composed = compose(vehicle, effects)
+    car = known_car(composed)
+    gridded, readings, distance_m = on_grid(sensor, drive.rate_hz, drive.accel_z_mps2,
+                                            composed.driven(drive.distance_m))
     noise = None
     if learns_noise:
-        noise = learnt_noise(structure, output, gridded, window_m, readings, distance_m)
+        noise = learnt_noise(car, gridded, window_m, readings, distance_m)
     if noise is not None:
         gridded = Sensor(noise.noise_rms_mps2, gridded.step_mps2)
         noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)
         if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
             noise = noise.without_rounding(sensor.step_mps2)
         sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)
-    windows, road = estimated(structure, output, gridded, window_m, readings, distance_m)
+    windows, road = estimated(car, gridded, window_m, readings, distance_m, cars_off(vehicle, effects, errors))
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     if track is not None:
         exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
-    limits = Limits(structure, output, gridded, window_m)
+    limits = Limits(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
                       least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise)

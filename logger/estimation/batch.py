@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -19,7 +20,7 @@ from logger.estimation.streaming import RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
 from logger.roads.golden_car import START_M
 from logger.roads.iri import rectified_slope, window_iri
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.linearise import KnownCar
 
 Array = npt.NDArray[np.float64]
 
@@ -85,11 +86,13 @@ def laid_anew(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
 
 
 def estimated(
-    structure: Structure, output: Output, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
+    car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array,
+    off: Sequence[KnownCar] = (),
 ) -> tuple[Windows, RoadProfile | None]:
-    """Windows and road of a drive on the grid of 100 Hz, arrays (t,) as ``RoadEstimator.push`` takes them."""
+    """Windows and road of a drive on the grid of 100 Hz, arrays (t,) as ``RoadEstimator.push`` takes them; ``off`` the
+    cars that it may be instead."""
     pieces: list[RoadPiece] = []
-    estimator = RoadEstimator(structure, output, sensor, window_m, on_road=pieces.append)
+    estimator = RoadEstimator(car, sensor, window_m, on_road=pieces.append, off=off)
     count = len(reading_mps2)
     found = estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
     found += estimator.finish()
@@ -108,7 +111,7 @@ def estimated(
 
 
 def learnt_noise(
-    structure: Structure, output: Output, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
+    car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
 ) -> NoiseBelief | None:
     """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it; None where the
     drive tells nothing of it.
@@ -120,7 +123,7 @@ def learnt_noise(
     for _ in range(_NOISE_ROUNDS):
         before = NoiseBelief(belief.log_mean, UNKNOWN_LOG_STD)
         tried = Sensor(before.noise_rms_mps2, sensor.step_mps2)
-        estimator = RoadEstimator(structure, output, tried, window_m, noise=before)
+        estimator = RoadEstimator(car, tried, window_m, noise=before)
         estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
         found = estimator.noise
         if found is None or not estimator.noise_stretches:

@@ -1,7 +1,8 @@
-"""How a car's reading depends on the road, by frequency: the bridge from a structure to the estimator."""
+"""How a car's reading depends on the road, by frequency: the bridge from a car to the estimator."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import exp, log
 
@@ -10,9 +11,10 @@ import numpy.typing as npt
 
 from logger.roads.golden_car import STANDARD_SPEED_MPS, TIRE_BASE_M
 from logger.vehicle.frequency_response import frequency_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.quarter_car import GOLDEN_CAR
 from logger.vehicle.quarter_car import structure as quarter_car
-from logger.vehicle.structure import Output, Structure, suspension_travel
+from logger.vehicle.structure import suspension_travel
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -24,22 +26,26 @@ WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBER
 
 
 class CarResponse:
-    """One output of one car, as a function of the road under its axles; left and right wheels see the same road.
+    """The reading of one car, as a function of the road under its axles; left and right wheels see the same road.
+
+    off    the cars that it may be instead: each a standard error away, in directions that have nothing to do with one
+           another
 
     ``behind_m`` (x,) is how far behind the front axle each axle stands [m], the front axle first.
     """
 
-    def __init__(self, structure: Structure, output: Output) -> None:
-        self._structure = structure
-        self._output = output
+    def __init__(self, car: LinearCar, off: Sequence[LinearCar] = ()) -> None:
+        self._car = car
+        self._off = tuple(off)
         self._powers: dict[int, Array] = {}
-        self.behind_m, self._axle = np.unique(structure.behind_m, return_inverse=True)
-        self.contact_patch_m = structure.contact_patch_m
+        self._changes: dict[int, ComplexArray] = {}
+        self.behind_m, self._axle = np.unique(car.structure.behind_m, return_inverse=True)
+        self.contact_patch_m = car.structure.contact_patch_m
 
     def by_axle(self, f_hz: Array) -> ComplexArray:
-        """Output per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
+        """Reading per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
-        by_wheel = frequency_response(self._structure, [self._output], np.where(seen, f_hz, 1.0))[:, 0, :]
+        by_wheel = self._car.by_wheel(np.where(seen, f_hz, 1.0))
         response = np.stack([by_wheel[:, self._axle == axle].sum(axis=1) for axle in range(len(self.behind_m))])
         return np.where(seen, response, 0.0)
 
@@ -51,7 +57,7 @@ class CarResponse:
         return apart
 
     def power(self, speed_mps: float) -> Array:
-        """Squared gain from road to output at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.
+        """Squared gain from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4]: delays and contact patch included.
 
         The speed is rounded to steps of 5 %, and what was computed is kept.
         """
@@ -62,6 +68,22 @@ class CarResponse:
             gain = (self.by_axle(f_hz) * delays).sum(axis=0) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
             self._powers[key] = np.abs(gain) ** 2
         return self._powers[key]
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether nothing is known of how far its numbers may be off."""
+        return not self._off
+
+    def changes(self, speed_mps: float) -> ComplexArray:
+        """What the gain from road to reading, at ``WAVE_NUMBERS_CPM``, changes by for each of the cars that it may be
+        instead, as a share of its own (o, n). Where the gain is nothing that may be any number; speeds as ``power``."""
+        key = round(log(speed_mps) * _SPEEDS_PER_E)
+        if key not in self._changes:
+            speed_mps = exp(key / _SPEEDS_PER_E)
+            f_hz = WAVE_NUMBERS_CPM * speed_mps
+            own, *others = (one.response(f_hz, speed_mps) for one in (self._car, *self._off))
+            self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(f_hz))
+        return self._changes[key]
 
 
 @lru_cache(maxsize=32)

@@ -28,14 +28,14 @@ from math import ceil, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.car_response import HIGHEST_HZ, golden_car_slope
+from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.iri_posterior import reading_noise_psd
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.roads.iri import PER_KM
-from logger.vehicle.frequency_response import frequency_response
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import KnownCar
 
 Array = npt.NDArray[np.float64]
 
@@ -63,11 +63,10 @@ class Limit:
 
 
 class Limits:
-    """The limit for a car, the acceleration of it that is read, a sensor on the grid of 100 Hz and a window [m]."""
+    """The limit for a car with its sensor's place, a sensor on the grid of 100 Hz and a window [m]."""
 
-    def __init__(self, structure: Structure, output: Output, sensor: Sensor, window_m: float) -> None:
-        self._structure = structure
-        self._output = output
+    def __init__(self, car: KnownCar, sensor: Sensor, window_m: float) -> None:
+        self._car = car
         self._variance = sensor.variance_mps2_2
         self._lags = ceil(window_m / _SPACING_M)
         spacing_m = window_m / self._lags
@@ -81,7 +80,8 @@ class Limits:
     def at(self, speed_mps: float, spectrum: RoadSpectrum) -> Limit:
         """For a steady speed, above 0, on road of this spectrum."""
         psd = spectrum.psd(self._wave_number_cpm)
-        signal = self._gain_power(speed_mps) * psd
+        car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, spectrum.psd(WAVE_NUMBERS_CPM))
+        signal = self._gain_power(car, speed_mps) * psd
         resolved = signal / (signal + reading_noise_psd(self._variance, RATE_HZ, speed_mps))
         covariance = np.fft.irfft(self._slope_power * psd, self._count)
         covariance_resolved = np.fft.irfft(self._slope_power * psd * resolved, self._count)
@@ -93,14 +93,12 @@ class Limits:
             PER_KM * mean, PER_KM * mean * sqrt(exact), PER_KM * mean * sqrt(max(exact - best, 0.0))
         )
 
-    def _gain_power(self, speed_mps: float) -> Array:
+    def _gain_power(self, car: LinearCar, speed_mps: float) -> Array:
         """Squared gain from road to reading, delays and contact patch included [1/s4]."""
         n = self._wave_number_cpm
         seen = n * speed_mps <= HIGHEST_HZ
         power = np.zeros(len(n))
-        by_wheel = frequency_response(self._structure, [self._output], n[seen] * speed_mps)[:, 0, :]
-        gain = (by_wheel * np.exp(-2j * np.pi * n[seen, None] * self._structure.behind_m)).sum(axis=1)
-        power[seen] = np.abs(gain * np.sinc(n[seen] * self._structure.contact_patch_m)) ** 2
+        power[seen] = np.abs(car.response(n[seen] * speed_mps, speed_mps)) ** 2
         return power
 
     def _window_variance(self, correlation: Array) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import pi, sqrt
+from math import hypot, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -47,10 +47,14 @@ def vehicle_error_variance(
     car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, vehicle_error: float, rate_hz: float
 ) -> float:
     """White noise of readings that costs the IRI as much as a model whose axles' gains are each off by a share
-    ``vehicle_error`` [(m/s2)2]: the error's density over wave numbers, weighted as the IRI weights them."""
+    ``vehicle_error`` [(m/s2)2], or whose numbers are off by their standard errors where that is more: the error's
+    density over wave numbers, weighted as the IRI weights them."""
     road = spectrum.psd(WAVE_NUMBERS_CPM)
     weight = _SLOPE_POWER * road
-    density = float((vehicle_error**2 * car.power_apart(speed_mps) * road) @ weight / weight.sum())
+    off = vehicle_error**2 * car.power_apart(speed_mps)
+    if not car.is_exact:
+        off = np.maximum(off, car.power(speed_mps) * (np.abs(car.changes(speed_mps)) ** 2).sum(axis=0))
+    density = float((off * road) @ weight / weight.sum())
     return density * rate_hz / (2 * speed_mps)
 
 
@@ -67,11 +71,13 @@ class SlopeKnowledge:
     variance         before anything is read [m2/m2]
     left             of it, once the readings are known [m2/m2]
     correlation      (l,) of what is left, at lags of whole steps of the distance grid
+    vehicle_std      share by which the vehicle's numbers, by their standard errors, may make the slope wrong
     """
 
     variance: float
     left: float
     correlation: Array
+    vehicle_std: float = 0.0
 
     @property
     def resolved(self) -> float:
@@ -92,12 +98,21 @@ class SlopeErrors:
         prior = _SLOPE_POWER * spectrum.psd(WAVE_NUMBERS_CPM)
         resolved = resolved_share(self._car, speed_mps, spectrum, reading_noise_psd(variance, self._rate_hz, speed_mps))
         left = (prior * (1 - resolved)) @ self._waves
-        return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0])
+        return SlopeKnowledge(float(prior.sum()), float(left[0]), left / left[0],
+                              self._vehicle_std(speed_mps, prior * resolved**2))
+
+    def _vehicle_std(self, speed_mps: float, weight: Array) -> float:
+        """A gain that is off by a share dH / H makes the wave that is found off by as much, as far as the readings
+        tell it; the road's level is learnt from those waves, so that what they do not tell goes with them."""
+        if self._car.is_exact:
+            return 0.0
+        return float(np.linalg.norm(self._car.changes(speed_mps).real @ weight)) / float(weight.sum())
 
 
 @dataclass(frozen=True)
 class WindowIri:
-    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level, ``shared`` with neighbours.
+    """IRI of a window [m/km]; its standard error is ``own`` and, from the road's level and the vehicle's numbers,
+    ``shared`` with neighbours.
 
     change_per_m    how much the IRI of a window a metre further on is higher [m/km per m]
     """
@@ -134,9 +149,9 @@ def window_iri(
     # Were the level higher, more of the readings would be taken for road, and more be left open.
     stretched = slope * (louder.resolved / max(knowledge.resolved, 1e-3))
     more = float(weight @ mean_absolute(stretched, _deviation(louder, unseen)))
-    shared = (more - mean) / LEVEL_TRIAL * log_level_std
+    shared = hypot((more - mean) / LEVEL_TRIAL * log_level_std, mean * knowledge.vehicle_std)
     change = float(absolute[-1] - absolute[0]) / length_m
-    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * abs(shared), PER_KM * change)
+    return WindowIri(PER_KM * mean, PER_KM * own, PER_KM * shared, PER_KM * change)
 
 
 def raised(spectrum: RoadSpectrum) -> RoadSpectrum:

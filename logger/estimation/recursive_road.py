@@ -14,7 +14,6 @@ from math import log, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.estimation.car_response import CarResponse
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
 from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
@@ -70,9 +69,8 @@ class FollowedRoad:
     """
 
     def __init__(
-        self, car: CarResponse, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
+        self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None
     ) -> None:
-        self._car = car
         self._vehicle_error = vehicle_error
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._sensor = sensor
@@ -145,26 +143,34 @@ class FollowedRoad:
             np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
         )
 
-    def solved(self, block: Block, samples: Samples, read: Bools) -> SolvedBlock:
-        """The block's road, while the belief follows; ``read`` (t,) says which samples count."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS)
+    def take_off(self, change_mps2: Array) -> None:
+        """From here on readings come with so much less (t,) of what is not the linear car's."""
+        if self._gaussian is not None:
+            self._gaussian = replace(self._gaussian, value_mps2=self._gaussian.value_mps2 - change_mps2)
+
+    def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
+               ) -> SolvedBlock:
+        """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
+        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved."""
+        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
         self._begun = True
         for left in reversed(range(rounds)):
-            result = self._round(block, samples, read, steps, before, left == 0)
+            result = self._round(block, samples, read, steps, before, left == 0, beyond_variance)
         return result
 
     def _round(
-        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool
+        self, block: Block, samples: Samples, read: Bools, steps: int, before: RoadSpectrum | None, learns: bool,
+        beyond_variance: float,
     ) -> SolvedBlock:
         """Solve with what is believed, then believe what the solution says; of the noise where it ``learns``."""
         readings = self._as_gaussian(samples)
         there, _ = self.level_at(round(block.start_m / self._spacing_m), block.count)
         variance = readings.variance + vehicle_error_variance(
-            self._car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
-        )
+            block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ
+        ) + beyond_variance
         weight = np.where(read, 1 / variance, 0.0)
         seen, seen_share = block.seen(read), block.seen_points(read) / block.count
         first, spectrum = round(block.start_m / self._spacing_m), self._belief.spectrum
@@ -226,7 +232,7 @@ class FollowedRoad:
 
         def left(even: float) -> float:
             noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
-            return acceleration_variance_left(self._car, speed_mps, spectrum, noise_psd)
+            return acceleration_variance_left(block.car, speed_mps, spectrum, noise_psd)
 
         return cavity(left, variance)
 

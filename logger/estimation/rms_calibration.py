@@ -27,8 +27,7 @@ from logger.dsp.sections import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.roads import golden_car, iso8608
 from logger.units import MPH_MPS, WINDOW_M
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.models import structure_of
+from logger.vehicle.linearise import KnownCar
 from logger.vehicle.vehicle import Vehicle, with_load
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +42,7 @@ METHOD = 1  # another number whenever the same settings give other results
 
 _ROAD_M = 1000.0
 _SPACING_M = 0.05  # nearly: a window is a whole number of steps
+_LAW_WAVES = 400  # of a road, by which laws that are not linear are judged
 _TIRE_SAMPLES = 5  # the 250 mm of the IRI
 _PER_KM = 1000.0
 _WITHIN = 68.0  # percentage of roads within one standard error
@@ -118,22 +118,23 @@ def loaded(vehicle: Vehicle, passengers: int = 0, sprung_mass_factor: float = 1.
 
 
 def calibrate(
-    vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None = None, settings: Settings | None = None
+    car: KnownCar, recorder_gain: Callable[[Array], Array] | None = None, settings: Settings | None = None
 ) -> tuple[SpeedCalibration, ...]:
-    """Drive the vehicle over random ISO 8608 roads of IRI 1 to 10 m/km; the lines of each speed.
+    """Drive the car over random ISO 8608 roads of IRI 1 to 10 m/km; the lines of each speed.
 
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
 
     The acceleration belongs to the stretch under the front wheel, as in the logs. IRI is the exact one of each road,
     on the average 0.8 % above Eq 4.39 (``gd_iri``), so the slopes lie that much above ``rms_relation``.
-    ValueError if the vehicle lacks what its model needs.
+    A car whose laws are not linear is another one on each level of road; its lines go through the middle of them.
     """
     settings = settings or Settings()
     roads = _Roads(settings)
-    responses = _responses(vehicle, recorder_gain, roads.wave_number, settings.speeds_mps)
+    levels = LEVELS_IRI if car.depends_on_motion else LEVELS_IRI[:1]
+    responses = [_responses(car, recorder_gain, roads.wave_number, settings.speeds_mps, level) for level in levels]
     iri, accel, weighted = (
-        np.array(values) for values in zip(*(roads.drive(number, responses) for number in range(settings.roads)),
-                                           strict=True))
+        np.array(values) for values in zip(
+            *(roads.drive(number, responses[number % len(levels)]) for number in range(settings.roads)), strict=True))
     root_gd = roads.root_gd
     whole_iri = iri.mean(axis=-1)
     rms, a_w = (np.sqrt(squares.mean(axis=-1)) for squares in (accel, weighted))
@@ -168,12 +169,17 @@ def fit(x: Array, y: Array, level: Array) -> Line:
 
 
 def _responses(
-    vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, wave_number: Array, speeds_mps: tuple[float, ...]
+    car: KnownCar, recorder_gain: Callable[[Array], Array] | None, wave_number: Array, speeds_mps: tuple[float, ...],
+    level_m_per_km: float,
 ) -> npt.NDArray[np.complex128]:
-    """Recorded acceleration, and the same weighted with Wk, per elevation (2, speeds, waves). No delay of filters."""
+    """Recorded acceleration, and the same weighted with Wk, per elevation (2, speeds, waves), on roads of this IRI. No
+    delay of filters."""
     speeds = np.array(speeds_mps)[:, None]
     f_hz = speeds * wave_number
-    body = body_acceleration_response(structure_of(vehicle), f_hz, speeds, vehicle.sensor)
+    even = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, _LAW_WAVES)
+    psd = iso8608.displacement_psd(even, iso8608.gd_n0_from_iri(level_m_per_km))
+    body = np.array([car.at(speed, even, psd).response(row, speed)
+                     for row, speed in zip(f_hz, speeds_mps, strict=True)])
     if recorder_gain is not None:
         body = body * recorder_gain(f_hz)
     return np.stack([body, body * np.abs(WEIGHTING.response(f_hz))])

@@ -24,10 +24,9 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
+from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.roads import iso8608
-from logger.vehicle.frequency_response import body_acceleration_response
-from logger.vehicle.models import structure_of
-from logger.vehicle.vehicle import Vehicle
+from logger.vehicle.linearise import KnownCar
 
 Array = npt.NDArray[np.float64]
 
@@ -60,20 +59,21 @@ class RmsRelation:
 
 
 def rms_relation(
-    vehicle: Vehicle,
+    car: KnownCar,
     recorder_gain: Callable[[Array], Array] | None = None,
     speeds_mps: npt.ArrayLike = SPEEDS_MPS,
 ) -> RmsRelation:
-    """The relation of a vehicle (Fig 6.6), computed.
+    """The relation of a car (Fig 6.6), computed; of one whose laws are not linear, as it is on a common road.
 
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
     speeds_mps       where to compute it, increasing [m/s]; between them a straight line is taken
     """
-    structure = structure_of(vehicle)
     speeds = np.asarray(speeds_mps, dtype=float)
     wave_number = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, _WAVE_NUMBERS)
     f_hz = speeds[:, None] * wave_number
-    gain = np.abs(body_acceleration_response(structure, f_hz, speeds[:, None], vehicle.sensor))
+    psd = COMMON_ROAD.psd(wave_number)
+    gain = np.array([np.abs(car.at(float(speed), wave_number, psd).response(row, speed))
+                     for row, speed in zip(f_hz, speeds, strict=True)])
     if recorder_gain is not None:
         gain = gain * recorder_gain(f_hz)
     trapezoid = wave_number * np.log(wave_number[1] / wave_number[0])  # dn of a log-spaced grid

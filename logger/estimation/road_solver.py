@@ -78,13 +78,15 @@ class Block:
     distance_m    (t,) where the front axle is, not decreasing
     spacing_m     of the distance grid
 
-    ``start_m`` is the first distance of the grid, a whole multiple of ``align_m``, and ``count`` its number of points;
+    ``car`` is how the car answers, ``start_m`` the first distance of the grid, a whole multiple of ``align_m``, and
+    ``count`` its number of points;
     ``moving`` (t,) says where the car is not standing, ``mean_speed_mps`` how fast it is there.
     """
 
     def __init__(self, grid: TimeGrid, distance_m: Array, spacing_m: float, align_m: float) -> None:
         car, rate_hz = grid.car, grid.rate_hz
         self._grid = grid
+        self.car = car
         self.spacing_m = spacing_m
         first_m = distance_m[0] - car.behind_m.max() - _MARGIN_M
         self.start_m = float(np.floor(first_m / align_m) * align_m)
@@ -211,9 +213,12 @@ class Block:
 
     def driven(self, road: ComplexArray) -> Array:
         """A r: the readings (t,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
+        return np.fft.irfft((self.under(road) * self._grid.by_axle).sum(axis=0), len(self._front))
+
+    def under(self, road: ComplexArray) -> ComplexArray:
+        """The rfft in time of the elevations under the axles (x, f) [m], contact patch and all, of such a road."""
         elevation = np.fft.irfft(road * self._averaged, self.count)
-        under = np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
-        return np.fft.irfft((under * self._grid.by_axle).sum(axis=0), len(self._front))
+        return np.fft.rfft((elevation[self._points] * self._shares).sum(axis=0))
 
     def transposed(self, row: Array) -> ComplexArray:
         """A' times a row (t,) in time, as an rfft."""

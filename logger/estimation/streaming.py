@@ -8,7 +8,7 @@ Splitting the readings differently changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import ceil, hypot, nan, sqrt
@@ -17,7 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
+from logger.estimation.bent_forces import BentForces
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
+from logger.estimation.hyperparameters import COMMON_ROAD
 from logger.estimation.iri_posterior import (
     SlopeErrors,
     WindowIri,
@@ -28,13 +30,14 @@ from logger.estimation.iri_posterior import (
     window_iri,
 )
 from logger.estimation.noise_belief import NoiseBelief
-from logger.estimation.recursive_road import FollowedRoad
+from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
 from logger.estimation.ride_posterior import Place, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ, Samples
-from logger.vehicle.structure import Output, Structure
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import KnownCar, MovedCar
 
 Array = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -50,6 +53,10 @@ _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
 _FIRST_SAMPLES = 1000
+# Of a car whose laws are not linear: turns of road and forces in each block, and how far towards the forces each goes.
+_TURNS, _FIRST_TURNS, _WAY = 2, 4, 0.5
+_KEPT = 24  # of its answers to other roads at other speeds, some 0.4 MB each
+_COMMON_MPS = 15.0  # with the road that is common, until it is known what is driven
 
 
 @dataclass(frozen=True)
@@ -97,11 +104,22 @@ class _Piece:
     ride: RideSums | None = None
 
 
+@dataclass(frozen=True)
+class _Answers:
+    """How the car answers the road, linear, and what follows from that."""
+
+    car: LinearCar
+    response: CarResponse
+    errors: SlopeErrors
+    grid: TimeGrid
+    ride: RidePosterior | None
+    bent: BentForces | None
+
+
 class RoadEstimator:
     """Readings of a body accelerometer in, IRI of windows out, some seconds late.
 
-    structure    the car
-    output       the motion of it that is read: an acceleration
+    car          with its effects, and where its sensor sits
     sensor       noise and step of the readings
     window_m     length of a window [m]
     place_std_m  standard error of the distance: a window that lies elsewhere has another IRI
@@ -112,12 +130,14 @@ class RoadEstimator:
     noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
     ride_response    of the comfort weighting at frequencies (n,) [Hz], and the figures of the ride are told; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
+    off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
+                     that have nothing to do with one another
+    driven_share     way that was driven over what the distance says; windows are of that distance
     """
 
     def __init__(
         self,
-        structure: Structure,
-        output: Output,
+        car: KnownCar,
         sensor: Sensor,
         window_m: float,
         place_std_m: float = 0.0,
@@ -127,8 +147,12 @@ class RoadEstimator:
         noise: NoiseBelief | None = None,
         ride_response: Callable[[Array], ComplexArray] | None = None,
         ride_ahead_m: float = 0.0,
+        off: Sequence[KnownCar] = (),
+        driven_share: float = 1.0,
     ) -> None:
-        self._car = CarResponse(structure, output)
+        self._car, self._off = car, tuple(off)
+        self._driven_share = driven_share
+        window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
         self._takes_bounds = sensor.is_coarse
         self._place_std_m = place_std_m
         self._late_std_s = late_std_s
@@ -137,12 +161,28 @@ class RoadEstimator:
         self._points = ceil(self._piece_m / _SPACING_M)
         self._spacing_m = self._piece_m / self._points
         self._on_road = on_road
-        self._errors = SlopeErrors(self._car, RATE_HZ, self._spacing_m, self._points + 1)
-        self._grid = TimeGrid(self._car, BLOCK_SAMPLES, RATE_HZ)
-        self._road = FollowedRoad(self._car, sensor, self._spacing_m, vehicle_error, noise)
-        self._ride = RidePosterior(self._car, ride_response, BLOCK_SAMPLES, RATE_HZ) if ride_response else None
+        self._ride_response = ride_response
+        self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise)
+        self._kept: dict[LinearCar, _Answers] = {}
+        self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
         self._start_anew()
+
+    def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float) -> _Answers:
+        """How the car answers such a road at such a speed; the last few are kept."""
+        psd = spectrum.psd(WAVE_NUMBERS_CPM)
+        car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, psd)
+        if car in self._kept:
+            return self._kept[car]
+        response = CarResponse(car, [one.at(speed_mps, WAVE_NUMBERS_CPM, psd) for one in self._off])
+        if len(self._kept) >= _KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[car] = _Answers(
+            car, response, SlopeErrors(response, RATE_HZ, self._spacing_m, self._points + 1),
+            TimeGrid(response, BLOCK_SAMPLES, RATE_HZ),
+            RidePosterior(response, self._ride_response, BLOCK_SAMPLES, RATE_HZ) if self._ride_response else None,
+            BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
+        return self._kept[car]
 
     @property
     def noise_stretches(self) -> int:
@@ -164,6 +204,7 @@ class RoadEstimator:
         self._samples: Samples | None = None
         self._road.start_anew()
         self._next = 0
+        self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
         self._gathered: list[_Piece] = []
 
     def push(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> list[WindowEstimate]:
@@ -176,7 +217,10 @@ class RoadEstimator:
 
         Returns the windows that have become certain, in order and without gaps, from the first whole one on.
         """
-        waiting = self._waiting.then(self._readable(reading_mps2, usable, at_end, distance_m))
+        return self._pushed(self._readable(reading_mps2, usable, at_end, self._driven_share * distance_m))
+
+    def _pushed(self, more: Samples) -> list[WindowEstimate]:
+        waiting = self._waiting.then(more)
         estimates: list[WindowEstimate] = []
         taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
         for low in range(0, taken, HOP_SAMPLES):
@@ -199,7 +243,7 @@ class RoadEstimator:
             count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
             after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
-            estimates = self.push(after.reading_mps2, after.usable, after.at_end, after.distance_m)
+            estimates = self._pushed(after)
         self._start_anew()
         return estimates
 
@@ -209,6 +253,7 @@ class RoadEstimator:
             windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
+        self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])
         self._road.move_on(fresh)
         self._heard += len(fresh)
         if not self._road.begun and self._heard < _FIRST_SAMPLES:
@@ -225,16 +270,20 @@ class RoadEstimator:
 
     def _estimates(self, samples: Samples, due: list[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
-        block = Block(self._grid, samples.distance_m, self._spacing_m, self._piece_m)
+        block = self._block(samples)
         read = samples.usable & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
         if block.seen_points(read) < self._points:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
-        solved = self._road.solved(block, samples, read)
+        if self._answers.bent is None:
+            solved = self._road.solved(block, samples, read)
+        else:
+            block, solved = self._solved_in_turns(samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
         unseen = unseen_share(block.seen(read), self._spacing_m)
-        weighted = self._ride.weighted(solved.accel_mps2) if self._ride is not None else None
+        ride = self._answers.ride
+        weighted = ride.weighted(solved.accel_mps2) if ride is not None else None
         estimates: list[WindowEstimate] = []
         for number in due:
             low = round((number * self._piece_m - block.start_m) / self._spacing_m)
@@ -255,15 +304,44 @@ class RoadEstimator:
             estimates += self._window(number, piece)
         return estimates
 
+    def _block(self, samples: Samples) -> Block:
+        """The block, with the car as it is on this road at this speed."""
+        block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
+        if self._car.depends_on_motion:
+            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+            answers = self._answers_on(there, block.mean_speed_mps)
+            if answers is not self._answers:
+                self._answers = answers
+                block = Block(answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
+        return block
+
+    def _solved_in_turns(self, samples: Samples, read: Bools) -> tuple[Block, SolvedBlock]:
+        """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
+        for _ in range(_TURNS if self._road.begun else _FIRST_TURNS):
+            block = self._block(samples)
+            linear = replace(samples, reading_mps2=samples.reading_mps2 - self._beyond)
+            solved = self._road.solved(block, linear, read, self._beyond_variance, _TURNS)
+            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+            noise_psd = reading_noise_psd(solved.variance, RATE_HZ, block.mean_speed_mps)
+            resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
+            assert self._answers.bent is not None
+            psd = there.psd(WAVE_NUMBERS_CPM)
+            found, self._beyond_variance = self._answers.bent.reading(block.under(solved.road), psd, resolved)
+            solved = replace(solved, accel_mps2=solved.accel_mps2 + self._beyond)
+            change = _WAY * (found - self._beyond)
+            self._beyond = self._beyond + change
+            self._road.take_off(change)
+        return block, solved
+
     def _ride_sums(
         self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
-        assert self._ride is not None
+        assert self._answers.ride is not None
         begin_m = number * self._piece_m + self._ride_ahead_m
         inside = (samples.distance_m >= begin_m) & (samples.distance_m < begin_m + self._piece_m) & moving
         inside[:round(ENTRY_S * RATE_HZ)] = False
-        return self._ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
+        return self._answers.ride.sums(weighted, inside, ~samples.usable, place) if inside.any() else None
 
     def _speed_mps(self, samples: Samples, number: int) -> float | None:
         return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
@@ -282,8 +360,8 @@ class RoadEstimator:
         spectrum: RoadSpectrum,
         log_level_std: float,
     ) -> _Piece:
-        knowledge = self._errors.at(speed_mps, spectrum, variance)
-        louder = self._errors.at(speed_mps, raised(spectrum), variance)
+        knowledge = self._answers.errors.at(speed_mps, spectrum, variance)
+        louder = self._answers.errors.at(speed_mps, raised(spectrum), variance)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, knowledge, louder, log_level_std, self._piece_m)
@@ -316,7 +394,7 @@ class RoadEstimator:
         if self._on_road is None:
             return
         noise_psd = reading_noise_psd(variance, RATE_HZ, speed_mps)
-        seen = resolved_share(self._car, speed_mps, spectrum, noise_psd) > 0.5
+        seen = resolved_share(self._answers.response, speed_mps, spectrum, noise_psd) > 0.5
         resolved = WAVE_NUMBERS_CPM[seen & (WAVE_NUMBERS_CPM * speed_mps > SLOWEST_WAVE_HZ)]
         shortest_m, longest_m = (1 / resolved[-1], 1 / resolved[0]) if len(resolved) else (nan, nan)
         self._on_road(RoadPiece(number * self._piece_m, self._spacing_m, elevation, shortest_m, longest_m))

@@ -6,8 +6,13 @@ from cmath import phase
 from math import degrees, floor, isfinite, log10
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from logger.modal.mode import FoundMode, ModalResult
 from logger.store.formats.channel_file import ChannelRecord
+
+Array = npt.NDArray[np.float64]
 
 _REJECTED_SHOWN = 12
 _IN_STEP = 0.02  # a shape whose parts are nearer to in step than this is shown with signs alone
@@ -32,6 +37,24 @@ def mode_json(mode: FoundMode, names: tuple[str, ...]) -> dict[str, Any]:
         "shape": [{"channel": name, "amplitude": float(abs(part)), "phase_deg": degrees(phase(part))}
                   for name, part in zip(names, mode.shape.tolist(), strict=True)],
     }
+
+
+def vehicle_json(frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
+                 ) -> dict[str, Any]:
+    """Modes (m,) of a vehicle's file; null where a standard deviation is not known."""
+    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, damping_ratio, damping_std)), strict=True)
+    return {"modes": [{"frequency_hz": hz, "damping_ratio": ratio, "frequency_std_hz": _known(hz_std),
+                       "damping_std": _known(ratio_std)} for hz, hz_std, ratio, ratio_std in rows]}
+
+
+def vehicle_lines(title: str, frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
+                  ) -> list[str]:
+    """The same for a person."""
+    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, 100 * damping_ratio, 100 * damping_std)),
+               strict=True)
+    return [title, "mode   frequency Hz           damping %",
+            *(f"{number:4}   {with_error(hz, hz_std):22} {with_error(percent, percent_std)}"
+              for number, (hz, hz_std, percent, percent_std) in enumerate(rows, start=1))]
 
 
 def _known(value: float) -> float | None:

@@ -29,7 +29,7 @@ from logger.service.status_reporter import StatusReporter
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
 from logger.service.systemd_notify import Notifier, watchdog_interval_s
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.disk_quota import Limits
 from logger.store.log.folder_lock import FolderLock
 
@@ -48,16 +48,16 @@ def serve(config: Config, stop: Stop) -> None:
 def _serve(config: Config, stop: Stop) -> None:
     noise = noise_learning.at_start(config.log.directory, config.accelerometer)
     sensor = wiring.instrument(config.accelerometer, noise)
-    vehicle = read_vehicle(config.vehicle)
+    model = read_on_board(config.vehicle)
     learnt = read_learnt(config.log.directory)
     receiver_delay = at_start(config.gps, learnt)
-    facts = wiring.sidecar(config, sensor, vehicle, receiver_delay, noise)
+    facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
     header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
     limits = Limits(config.log.quota_bytes, config.log.keep_free_bytes)
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
                       pairing=config.pairing)
     decoder = wiring.gps_decoder(config)
-    pipeline = wiring.pipeline(config, sensor, vehicle, receiver_delay)
+    pipeline = wiring.pipeline(config, sensor, model, receiver_delay)
     delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
     sensor_learning = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)
@@ -70,7 +70,7 @@ def _serve(config: Config, stop: Stop) -> None:
     listeners = [Listener(part, events, source.rest)
                  for part, source in zip((accelerometer, gps), sources, strict=True)]
     counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: asdict(decoder.counters)}
-    notices = wiring.notices(vehicle)
+    notices = wiring.notices(model.vehicle)
     for notice in notices:
         log.warning("%s", notice)
     observer = StatusReporter(config, core, storage, pipeline, accelerometer, gps, counters, notices, delay_learning,

@@ -35,8 +35,10 @@ from logger.service.pipeline import Pipeline, PipelineSettings
 from logger.service.receiver_learning import at_start, from_fields, header_fields
 from logger.service.signal_chain import GRID_RATE_HZ, Axis, SignalChain, recorder_gain, weighted_response
 from logger.shipped import vehicle_file, vehicle_names, version
-from logger.vehicle.models import structure_of
-from logger.vehicle.structure import body_point
+from logger.store.formats.vehicle_file import Model
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.linearise import known_car
+from logger.vehicle.uncertain import cars_off
 from logger.vehicle.vehicle import Vehicle
 
 _FLOOR_LINES = 1025  # finer than the slowest wave that a weighting lets through
@@ -81,8 +83,11 @@ def gps_decoder(config: Config) -> NmeaDecoder:
     return NmeaDecoder(config.gps.week_rollovers, midnight_utc_us(date.fromisoformat(config.gps.earliest_date)))
 
 
-def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None) -> Pipeline:
-    """The pipeline as the settings want it. ``receiver``: what is known of its delay; None: as before any drive."""
+def pipeline(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None) -> Pipeline:
+    """The pipeline as the settings want it. ``receiver``: what is known of its delay; None: as before any drive.
+
+    Raises BadInput for a vehicle that lacks what its model or an effect needs.
+    """
     receiver = receiver or at_start(config.gps, None)
     low_pass_hz = config.pipeline.low_pass_hz
     settings = PipelineSettings(
@@ -96,20 +101,34 @@ def pipeline(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Bel
         front_axle_ahead_m=config.gps.antenna_behind_front_axle_m,
     )
     axis = Axis.from_word(config.accelerometer.vertical_axis)
-    structure = structure_of(vehicle)
-    place = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
+    vehicle, effects = model.vehicle, model.effects
+    try:
+        composed = compose(vehicle, effects)
+        car, off = known_car(composed), cars_off(vehicle, effects, model.errors)
+    except ValueError as error:
+        raise BadInput(f"vehicle {vehicle.name}: {error}") from None
     estimator = RoadEstimator(
-        structure, place, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
+        car, sensor.sensor, config.pipeline.window_m, config.gps.place_std_m, config.vehicle_error,
         late_std_s=receiver.std_s,
         noise=sensor.noise,
         # Where the noise blurs the steps, its power is all there is to take off: no model of the car is needed.
         ride_response=weighted_response(WEIGHTING, low_pass_hz) if sensor.sensor.is_coarse else None,
         ride_ahead_m=settings.front_axle_ahead_m,
+        off=off,
+        driven_share=_driven_share(composed),
     )
     alignment = DriveAlignment(axis.column, axis.sign)
     columns = ComfortColumns(_noise_floor(sensor.sensor, low_pass_hz), sensor.sensor)
-    relation = rms_relation(vehicle, recorder_gain(low_pass_hz))
+    relation = rms_relation(car, recorder_gain(low_pass_hz))
     return Pipeline(settings, signal_chain(config, sensor), relation, estimator, alignment, columns)
+
+
+def _driven_share(car: Car) -> float:
+    """Way that is driven while the distance that is recorded grows by one metre [m]; 1 where nothing is said of it."""
+    if not car.drives:
+        return 1.0
+    begin_m, end_m = car.driven(np.array([0.0, 1.0]))
+    return float(end_m - begin_m)
 
 
 def signal_chain(config: Config, sensor: Instrument) -> SignalChain:
@@ -135,19 +154,26 @@ def notices(vehicle: Vehicle) -> tuple[str, ...]:
             "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.",)
 
 
-def sidecar(config: Config, sensor: Instrument, vehicle: Vehicle, receiver: Belief | None = None,
+def sidecar(config: Config, sensor: Instrument, model: Model, receiver: Belief | None = None,
             noise: KnownNoise | None = None) -> dict[str, Any]:
     """What lies beside every log file so that it can be read alone."""
     return {
         "ridelog_version": version(),
         "sensor": sensor.description,
-        "vehicle": asdict(vehicle),
+        "vehicle": asdict(model.vehicle) | _more_of(model),
         "settings": _plain(_as_written(config)),
         "receiver": header_fields(receiver or at_start(config.gps, None)),
         **_noise_said(config.accelerometer, noise),
         "iri_m_per_km": "IRI of the road estimated from acceleration, speed and the vehicle's model",
         "sees_up_to_hz": 50,
     }
+
+
+def _more_of(model: Model) -> dict[str, Any]:
+    """What a vehicle has beside its plain numbers."""
+    effects = [{"name": one.effect.name, **one.values} for one in model.effects]
+    errors = asdict(model.errors) if model.errors is not None else {}
+    return ({"effects": effects} if effects else {}) | errors
 
 
 def _noise_said(config: AccelerometerConfig, known: KnownNoise | None) -> dict[str, Any]:

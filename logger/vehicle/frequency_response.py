@@ -56,9 +56,14 @@ def body_acceleration_response(
     """
     f, speed = np.broadcast_arrays(np.asarray(f_hz, float), np.asarray(speed_mps, float))
     per_wheel = frequency_response(structure, [body_point(structure, sensor.ahead_m, sensor.left_m)], f)[..., 0, :]
-    wave_number = f / speed
-    delays = np.exp(-2j * np.pi * wave_number[..., None] * structure.behind_m)
-    return np.asarray((per_wheel * delays).sum(axis=-1) * np.sinc(wave_number * structure.contact_patch_m))
+    return at_steady_speed(structure, per_wheel, f / speed)
+
+
+def at_steady_speed(structure: Structure, by_wheel: Complex, wave_number_cpm: Array) -> Complex:
+    """Out of a response per elevation under each wheel separately (..., w), that per elevation under the front wheel
+    (...), for waves of the road (...) [cycle/m]: each wheel meets them later, over its contact patch."""
+    delays = np.exp(-2j * np.pi * wave_number_cpm[..., None] * structure.behind_m)
+    return np.asarray((by_wheel * delays).sum(axis=-1) * np.sinc(wave_number_cpm * structure.contact_patch_m))
 
 
 # --- and its derivatives ---

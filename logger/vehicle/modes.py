@@ -8,11 +8,13 @@ dampers. Each is one function here, so that a number can be set beside its like.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -43,8 +45,40 @@ def modes(structure: Structure) -> list[Mode]:
     A pair of conjugate roots is one mode. A vibration damped beyond critical has two real roots instead and becomes
     two modes of damping ratio 1.
     """
-    roots, vectors = np.linalg.eig(structure.state_space()[0])
-    shapes = vectors[:len(structure.mass)]
+    return _of_state_matrix(structure.state_space()[0], len(structure.mass))
+
+
+def modes_of_car(car: LinearCar) -> list[Mode]:
+    """The same of a car with laws of its own at the corners: a mount in series with a damper is one state more, its
+    compression y, with y' = J q' - k y / c and the force k y on the suspension."""
+    if not car.corners:
+        return modes(car.structure)
+    structure, corners = car.structure, car.corners
+    n, travel, wheels = len(structure.mass), structure.travel, structure.wheels
+    mounted = [i for i, one in enumerate(corners) if np.isfinite(one.mount_n_per_m) and one.damper_n_s_per_m > 0]
+    mounts = np.array([corners[i].mount_n_per_m for i in mounted])
+    beside = np.array([one.beside_n_s_per_m + (0.0 if i in mounted else one.damper_n_s_per_m)
+                       for i, one in enumerate(corners)])
+    springs = np.array([one.spring_n_per_m for one in corners])
+    tires = np.array([one.contact * (own + one.tire_n_per_m) - own
+                      for one, own in zip(corners, structure.tires, strict=True)])
+    tire_dampers = np.array([one.contact * one.tire_damping_n_s_per_m for one in corners])
+    beyond = beside - structure.dampers
+    damping = structure.damping + (travel.T * beyond) @ travel + (wheels.T * tire_dampers) @ wheels
+    stiffness = structure.stiffness + (travel.T * springs) @ travel + (wheels.T * tires) @ wheels
+    inverse, pressed = np.linalg.inv(structure.mass), travel[mounted]
+    slip = np.array([corners[i].mount_n_per_m / corners[i].damper_n_s_per_m for i in mounted])
+    return _of_state_matrix(np.block([
+        [np.zeros((n, n)), np.eye(n), np.zeros((n, len(mounted)))],
+        [-inverse @ stiffness, -inverse @ damping, -inverse @ (pressed.T * mounts)],
+        [np.zeros((len(mounted), n)), pressed, -np.diag(slip)],
+    ]), n)
+
+
+def _of_state_matrix(matrix: Array, n: int) -> list[Mode]:
+    """Of x' = A x, the first n states coordinates."""
+    roots, vectors = np.linalg.eig(matrix)
+    shapes = vectors[:n]
     found = []
     for index in np.argsort(np.abs(roots)):
         root, shape = roots[index], shapes[:, index]
@@ -52,6 +86,25 @@ def modes(structure: Structure) -> list[Mode]:
             largest = shape[np.abs(shape).argmax()]
             found.append(Mode(float(abs(root)) / (2 * np.pi), float(-root.real / abs(root)), shape / largest + 0j))
     return found
+
+
+def vibrating(found: Sequence[Mode]) -> list[Mode]:
+    """Those that swing."""
+    return [one for one in found if one.damping_ratio < 1]
+
+
+def mode_errors(car: LinearCar, off: Sequence[LinearCar]) -> tuple[list[Mode], Array, Array]:
+    """The swinging modes of a car, and standard errors of their frequencies [Hz] and damping ratios, by how they lie
+    in the cars that it may be instead; NaN where there are none, or a mode is none there."""
+    found = vibrating(modes_of_car(car))
+    changes = np.full((len(off), 2, len(found)), np.nan)
+    for change, other in zip(changes, off, strict=True):
+        others = vibrating(modes_of_car(other))
+        if len(others) == len(found):
+            change[0] = [one.frequency_hz - own.frequency_hz for one, own in zip(others, found, strict=True)]
+            change[1] = [one.damping_ratio - own.damping_ratio for one, own in zip(others, found, strict=True)]
+    errors = np.sqrt((changes**2).sum(axis=0)) if len(off) else np.full((2, len(found)), np.nan)
+    return found, errors[0], errors[1]
 
 
 def undamped_frequencies_hz(structure: Structure) -> Array:

@@ -23,6 +23,7 @@ from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.calibration_file import find, fingerprint, keep
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import FOOT_M, MPH_MPS
+from logger.vehicle.linearise import known_vehicle
 
 from .figures import Figures
 
@@ -39,7 +40,7 @@ def main() -> int:
     cost(figures)
     agreement(figures)
     errors(figures)
-    empty = calibrate(RAV4, GAIN)
+    empty = calibrate(known_vehicle(RAV4), GAIN)
     statements(figures, empty)
     window_lengths()
     comfort(empty)
@@ -51,7 +52,7 @@ def cost(figures: Figures) -> None:
     for name in vehicle_names():
         vehicle = read_vehicle(vehicle_file(name))
         started_s = time.perf_counter()
-        speeds = calibrate(vehicle, GAIN)
+        speeds = calibrate(known_vehicle(vehicle), GAIN)
         figures.at_most(f"calibration of {name}", time.perf_counter() - started_s, 2.0, "s")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "car.calibration.json"
@@ -69,8 +70,8 @@ def agreement(figures: Figures) -> None:
           f"{factor - 1:+.1%}. The integral uses the first, the roads have the second.")
     for name in vehicle_names():
         vehicle = read_vehicle(vehicle_file(name))
-        lines = [speed.iri_per_accel_rms for speed in calibrate(vehicle, GAIN)]
-        exact = factor * rms_relation(vehicle, GAIN, SPEEDS_MPS).iri_per_accel_rms
+        lines = [speed.iri_per_accel_rms for speed in calibrate(known_vehicle(vehicle), GAIN)]
+        exact = factor * rms_relation(known_vehicle(vehicle), GAIN, SPEEDS_MPS).iri_per_accel_rms
         off = [abs(line.slope - true) / line.standard_error for line, true in zip(lines, exact, strict=True)]
         figures.at_most(f"{name}: off the integral, worst speed", max(off), 3.0, "std")
         figures.at_most(f"{name}: standard error, worst speed",
@@ -79,8 +80,9 @@ def agreement(figures: Figures) -> None:
 
 def errors(figures: Figures) -> None:
     """Over other seeds: is the slope unbiased, and its standard error the scatter from one set of roads to another?"""
-    runs = [[speed.iri_per_accel_rms for speed in calibrate(RAV4, GAIN, Settings(seed=seed))] for seed in OTHER_SEEDS]
-    exact = rms_relation(RAV4, GAIN, SPEEDS_MPS).iri_per_accel_rms * iri_per_root_gd() / iso8608.IRI_PER_ROOT_GD
+    car = known_vehicle(RAV4)
+    runs = [[speed.iri_per_accel_rms for speed in calibrate(car, GAIN, Settings(seed=seed))] for seed in OTHER_SEEDS]
+    exact = rms_relation(car, GAIN, SPEEDS_MPS).iri_per_accel_rms * iri_per_root_gd() / iso8608.IRI_PER_ROOT_GD
     slopes = np.array([[line.slope for line in run] for run in runs])
     stds = np.array([[line.standard_error for line in run] for run in runs])
     figures.at_most(f"bias over {len(runs)} sets of roads, worst speed",
@@ -92,8 +94,8 @@ def errors(figures: Figures) -> None:
 
 def statements(figures: Figures, empty: Car) -> None:
     """What 6.3 says in words about Fig 6.4 to 6.8, and the figures it leaves to the pictures."""
-    people = calibrate(loaded(RAV4, passengers=2), GAIN)
-    double = calibrate(loaded(RAV4, sprung_mass_factor=2.0), GAIN)
+    people = calibrate(known_vehicle(loaded(RAV4, passengers=2)), GAIN)
+    double = calibrate(known_vehicle(loaded(RAV4, sprung_mass_factor=2.0)), GAIN)
 
     def response(car: Car) -> np.ndarray:
         return np.array([speed.accel_rms_per_root_gd.slope for speed in car])
@@ -119,7 +121,7 @@ def window_lengths() -> None:
     """Fig 6.12 to 6.15 are about 100 ft and 25 ft; 6.3 calls the relation independent of length. The line nearly is."""
     print("RAV4, lines over windows: IRI per r.m.s. / spread / R2 over roads of IRI 1 to 10")
     for feet in (25, 100, 300):
-        car = calibrate(RAV4, GAIN, Settings(window_m=feet * FOOT_M))
+        car = calibrate(known_vehicle(RAV4), GAIN, Settings(window_m=feet * FOOT_M))
         lines = [speed.window_iri_per_accel_rms for speed in car]
         print(f"  {feet:3d} ft " + "  ".join(f"{line.slope:5.2f}/{line.spread:4.0%}/{line.r2:.2f}" for line in lines))
     lines = [speed.iri_per_accel_rms for speed in car]

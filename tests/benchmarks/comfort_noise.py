@@ -38,9 +38,10 @@ from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.service import wiring
 from logger.service.signal_chain import GRID_STEP_US
 from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 from logger.units import MPH_MPS, US_PER_S, WINDOW_M
 from logger.vehicle import half_car
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.structure import body_point
 
 from ..support.drives.measured import GRID_HZ, Drive, Receiver, block_of, iso_road, steady_drive
@@ -115,7 +116,7 @@ def driven(drive: Drive, chip: Chip, believed: Sensor, before: NoiseBelief | Non
     rng = np.random.default_rng([FIRST_SEED, seed])
     config = config_for(chip, WINDOW_M, LATENCY_S)
     instrument = replace(wiring.instrument(config.accelerometer), sensor=believed, noise=before)
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(vehicle_file("rav4-2009")))
+    pipeline = wiring.pipeline(config, instrument, read_model(vehicle_file("rav4-2009")))
     readings, clipped = chip.read(drive.accel_mps2, rng)
     t_us = START_US + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US
     fixes = Receiver().fixes(drive, START_US, rng)
@@ -183,7 +184,7 @@ def cost(mph: int, windows: int) -> tuple[float, float]:
     usable, nowhere = np.ones(len(readings), dtype=np.bool_), np.zeros(len(readings))
     taken = []
     for response in (None, WEIGHTING.response):
-        estimator = RoadEstimator(structure, body_point(structure), Sensor(GRANTED_MPS2, step), WINDOW_M,
+        estimator = RoadEstimator(LinearCar(structure, body_point(structure)), Sensor(GRANTED_MPS2, step), WINDOW_M,
                                   ride_response=response)
         begun_s = time.process_time()
         estimator.push(readings, usable, nowhere, drive.place_m - drive.place_m[0])

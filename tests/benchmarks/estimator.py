@@ -52,9 +52,11 @@ from logger.service import wiring
 from logger.service.config import AccelerometerConfig, Config, GpsConfig, PipelineConfig
 from logger.service.signal_chain import GRAVITY_CORNER_HZ, GRID_STEP_US, recorder_gain
 from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model, read_vehicle
 from logger.units import FOOT_M, MPH_MPS, US_PER_S, WINDOW_M
 from logger.vehicle import half_car
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import Axle, Vehicle, with_load
 
@@ -214,7 +216,7 @@ def rav4() -> Vehicle:
 @cache
 def relation() -> RmsRelation:
     """The dissertation's relation for it."""
-    return rms_relation(rav4(), recorder_gain(None))
+    return rms_relation(known_vehicle(rav4()), recorder_gain(None))
 
 
 @cache
@@ -256,7 +258,7 @@ def estimates(
     """The estimator fed as the service feeds it: IRI and its standard error [m/km] by number of the window."""
     structure = half_car.structure(rav4())
     started_s = time.process_time()
-    estimator = RoadEstimator(structure, body_point(structure), sensor, window_m)
+    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), sensor, window_m)
     found = []
     usable = np.ones(len(readings), dtype=np.bool_)
     at_end = np.where(clipped, np.sign(readings - np.median(readings)), 0.0)
@@ -435,7 +437,7 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
 def told_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
     """The product's own limit at each speed, over the levels driven."""
     structure = half_car.structure(rav4())
-    limits = Limits(structure, body_point(structure), told(sensor), WINDOW_M)
+    limits = Limits(LinearCar(structure, body_point(structure)), told(sensor), WINDOW_M)
     return [pooled_r2([limits.at(mph * MPH_MPS, RoadSpectrum.of_iri(level)) for level in extent.levels])
             for mph in extent.mph]
 
@@ -546,7 +548,7 @@ def logged_drive(
     config = config_for(sensor, window_m, told_latency_s)
     instrument = wiring.instrument(config.accelerometer)
     instrument = replace(instrument, sensor=believed or instrument.sensor, noise=noise)
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle))
+    pipeline = wiring.pipeline(config, instrument, read_model(config.vehicle))
     start_us = 50_000_000
     readings, clipped = sensor.read(drive.accel_mps2, rng)
     t_us = start_us + np.arange(len(readings), dtype=np.int64) * GRID_STEP_US // sensor.oversample

@@ -15,6 +15,7 @@ from logger.estimation.rms_calibration import SPEEDS_MPS
 from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linearise import known_vehicle
 
 CONTRACT = ["speed_mps", "iri_per_accel_rms", "spread"]
 TEXT = vehicle_file("rav4-2009").read_text(encoding="utf-8")
@@ -57,7 +58,7 @@ def test_json_is_the_contract_and_the_service_s_relation(car: Path, capsys: pyte
     assert list(result)[:2] == ["vehicle", "speeds"]
     assert result["vehicle"] == "my car"
     assert [speed["speed_mps"] for speed in result["speeds"]] == list(SPEEDS_MPS)
-    on_board = rms_relation(read_vehicle(car), recorder_gain(None), SPEEDS_MPS).iri_per_accel_rms
+    on_board = rms_relation(known_vehicle(read_vehicle(car)), recorder_gain(None), SPEEDS_MPS).iri_per_accel_rms
     for speed, ratio in zip(result["speeds"], on_board, strict=True):
         assert list(speed)[:3] == CONTRACT
         assert speed["iri_per_accel_rms"] == pytest.approx(ratio, rel=0.02)

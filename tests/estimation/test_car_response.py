@@ -15,6 +15,7 @@ from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace
@@ -26,7 +27,7 @@ def test_power_is_that_of_the_car_at_a_steady_speed(name: str, speed_mps: float)
     """Within what rounding the speed to 5 % leaves: of all power, not of each wave near a notch."""
     car = structure_of(read_vehicle(vehicle_file(name)))
     ahead_m = 0.0 if name == "golden-car" else 0.7
-    found = CarResponse(car, body_point(car, ahead_m)).power(speed_mps)
+    found = CarResponse(LinearCar(car, body_point(car, ahead_m))).power(speed_mps)
     seen = WAVE_NUMBERS_CPM * speed_mps <= HIGHEST_HZ
     exact = np.abs(body_acceleration_response(car, WAVE_NUMBERS_CPM * speed_mps, speed_mps, SensorPlace(ahead_m))) ** 2
     road = WAVE_NUMBERS_CPM**-2.0 * WAVE_NUMBERS_CPM
@@ -36,7 +37,7 @@ def test_power_is_that_of_the_car_at_a_steady_speed(name: str, speed_mps: float)
 
 def test_a_full_car_has_one_response_per_axle() -> None:
     full = structure_of(read_vehicle(vehicle_file("rav4-2009-full")))
-    car = CarResponse(full, body_point(full))
+    car = CarResponse(LinearCar(full, body_point(full)))
     assert car.behind_m.tolist() == [0.0, full.behind_m.max()]
     f_hz = np.array([0.0, 1.0, 5.0, 41.0, 43.0])
     by_axle = car.by_axle(f_hz)

@@ -13,6 +13,7 @@ from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -27,7 +28,7 @@ LEVELS = (1.0, 2.5, 7.0)
 
 
 def limits(sensor: Sensor, window_m: float = WINDOW_M) -> Limits:
-    return Limits(STRUCTURE, body_point(STRUCTURE), sensor, window_m)
+    return Limits(LinearCar(STRUCTURE, body_point(STRUCTURE)), sensor, window_m)
 
 
 def golden_car(n: np.ndarray) -> np.ndarray:

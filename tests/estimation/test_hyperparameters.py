@@ -14,6 +14,7 @@ from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM, Road
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -23,7 +24,7 @@ RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 
 @cache
 def time_grid(count: int) -> TimeGrid:
-    return TimeGrid(CarResponse(RAV4, body_point(RAV4)), count, 100.0)
+    return TimeGrid(CarResponse(LinearCar(RAV4, body_point(RAV4))), count, 100.0)
 
 
 def a_block(count: int, speed_mps: float) -> Block:

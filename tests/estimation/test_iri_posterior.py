@@ -19,6 +19,7 @@ from logger.roads.golden_car import TIRE_BASE_M, sections
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -26,7 +27,7 @@ SPACING_M, POINTS, COUNT = 0.1524, 50, 50 * 2560
 WINDOW_M = SPACING_M * POINTS
 RATE_HZ = 100.0
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
-CAR = CarResponse(RAV4, body_point(RAV4))
+CAR = CarResponse(LinearCar(RAV4, body_point(RAV4)))
 WAVES = np.fft.rfftfreq(COUNT, SPACING_M)
 
 

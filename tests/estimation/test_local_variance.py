@@ -12,6 +12,7 @@ from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
@@ -22,7 +23,7 @@ RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 
 @cache
 def a_grid() -> TimeGrid:
-    return TimeGrid(CarResponse(RAV4, body_point(RAV4)), COUNT, 100.0)
+    return TimeGrid(CarResponse(LinearCar(RAV4, body_point(RAV4))), COUNT, 100.0)
 
 
 @cache

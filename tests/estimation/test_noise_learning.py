@@ -17,6 +17,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
@@ -240,11 +241,11 @@ def test_the_noise_of_a_drive_is_found(noise: float, guess: float, step: float) 
         reading = step * np.round(reading / step)
     car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
     before = NoiseBelief.guessed(guess)
-    estimator = RoadEstimator(car, body_point(car), Sensor(guess, step), 7.62, noise=before)
+    estimator = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62, noise=before)
     estimator.push(reading, np.ones(len(way), dtype=bool), np.zeros(len(way)), way)
     found = estimator.noise
     assert found is not None
     assert found.log_std < 0.15
     assert abs(found.log_mean - np.log(noise)) < 2.5 * found.log_std
-    taken = RoadEstimator(car, body_point(car), Sensor(guess, step), 7.62)
+    taken = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62)
     assert taken.noise is None

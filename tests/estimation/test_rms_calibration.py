@@ -16,6 +16,7 @@ from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import WINDOW_M
 from logger.vehicle import half_car
+from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.quarter_car import GOLDEN_CAR
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
@@ -35,10 +36,10 @@ def butterworth_15_hz(f_hz: np.ndarray) -> np.ndarray:
 ])
 def test_it_agrees_with_the_computed_relation_within_its_standard_error(vehicle: Vehicle, gain: object) -> None:
     """The integral takes IRI from Eq 4.39; on exact IRI that constant is 0.8 % low (``gd_iri``), which is known."""
-    computed = rms_relation(vehicle, gain, SPEEDS_MPS).iri_per_accel_rms
+    computed = rms_relation(known_vehicle(vehicle), gain, SPEEDS_MPS).iri_per_accel_rms
     exact = computed * iri_per_root_gd() / iso8608.IRI_PER_ROOT_GD
     per_root_gd = iso8608.IRI_PER_ROOT_GD / computed
-    found = calibrate(vehicle, gain)
+    found = calibrate(known_vehicle(vehicle), gain)
     for line_of, truth in (("iri_per_accel_rms", exact), ("accel_rms_per_root_gd", per_root_gd)):
         lines = [getattr(speed, line_of) for speed in found]
         off = np.array([(line.slope - true) / line.standard_error for line, true in zip(lines, truth, strict=True)])
@@ -49,7 +50,7 @@ def test_it_agrees_with_the_computed_relation_within_its_standard_error(vehicle:
 
 
 def test_the_standard_error_is_that_of_other_roads() -> None:
-    runs = [calibrate(RAV4, None, Settings((15.0,), roads=16, seed=seed))[0] for seed in range(60)]
+    runs = [calibrate(known_vehicle(RAV4), None, Settings((15.0,), roads=16, seed=seed))[0] for seed in range(60)]
     for name in ("iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri"):
         lines = [getattr(run, name) for run in runs]
         scatter = np.std([line.slope for line in lines])
@@ -60,7 +61,7 @@ def test_the_standard_error_is_that_of_other_roads() -> None:
 @pytest.mark.parametrize("speed_mps", [4.5, 17.9, 31.3])
 def test_lines_and_spread_agree_with_drives_in_the_time_domain(speed_mps: float) -> None:
     """scipy's simulation, the exact IRI of the profile and the weighting of a record, over 16 km of another road."""
-    found = calibrate(RAV4, None, Settings((speed_mps,)))[0]
+    found = calibrate(known_vehicle(RAV4), None, Settings((speed_mps,)))[0]
     elevation = iso8608.generate(100.0, 16_000, SPACING_M, 77)
     accel = drive(elevation, speed_mps)
     weighted = WEIGHTING.weigh(accel, speed_mps / SPACING_M)
@@ -94,16 +95,16 @@ def drive(elevation_m: np.ndarray, speed_mps: float) -> np.ndarray:
 
 def test_one_road_scatters_as_long_and_short_stretches_do() -> None:
     """Scatter falls with the root of the length, as independent pieces do once they are long."""
-    short = calibrate(RAV4, None, Settings((17.9,), window_m=50.0))[0].window_iri_per_accel_rms
-    long = calibrate(RAV4, None, Settings((17.9,), window_m=200.0))[0].window_iri_per_accel_rms
+    short = calibrate(known_vehicle(RAV4), None, Settings((17.9,), window_m=50.0))[0].window_iri_per_accel_rms
+    long = calibrate(known_vehicle(RAV4), None, Settings((17.9,), window_m=200.0))[0].window_iri_per_accel_rms
     assert short.spread / long.spread == pytest.approx(2, rel=0.2)
     assert short.r2 < long.r2 < 1
 
 
 def test_a_recorder_that_hears_half_doubles_the_iri_per_rms() -> None:
     settings = Settings((10.0, 20.0), roads=8)
-    heard = calibrate(RAV4, None, settings)
-    half = calibrate(RAV4, lambda f_hz: np.full(f_hz.shape, 0.5), settings)
+    heard = calibrate(known_vehicle(RAV4), None, settings)
+    half = calibrate(known_vehicle(RAV4), lambda f_hz: np.full(f_hz.shape, 0.5), settings)
     for one, other in zip(heard, half, strict=True):
         assert other.iri_per_accel_rms.slope == pytest.approx(2 * one.iri_per_accel_rms.slope)
         assert other.accel_rms_per_root_gd.slope == pytest.approx(one.accel_rms_per_root_gd.slope / 2)
@@ -114,7 +115,7 @@ def test_a_recorder_that_hears_half_doubles_the_iri_per_rms() -> None:
 def test_mass_calms_the_body_at_every_speed() -> None:
     """What the dissertation reads off Fig 6.7 and 6.8; and rougher roads shake more at higher speed (Fig 6.4)."""
     empty, people, double = (
-        calibrate(vehicle, None, Settings(roads=30))
+        calibrate(known_vehicle(vehicle), None, Settings(roads=30))
         for vehicle in (RAV4, loaded(RAV4, passengers=2), loaded(RAV4, sprung_mass_factor=2.0)))
 
     def responses(car: tuple[SpeedCalibration, ...]) -> np.ndarray:

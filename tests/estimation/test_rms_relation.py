@@ -11,6 +11,7 @@ from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import half_car
+from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.quarter_car import GOLDEN_CAR
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -44,7 +45,8 @@ def test_relation_agrees_with_drives_in_the_time_domain(speed_mps: float) -> Non
     filtered = np.fft.irfft(spectrum * butterworth_15_hz(np.fft.rfftfreq(len(settled), step_s)), len(settled))
     speeds = [speed_mps, speed_mps + 1]
     for signal_mps2, relation in (
-        (settled, rms_relation(RAV4, None, speeds)), (filtered, rms_relation(RAV4, butterworth_15_hz, speeds)),
+        (settled, rms_relation(known_vehicle(RAV4), None, speeds)),
+        (filtered, rms_relation(known_vehicle(RAV4), butterworth_15_hz, speeds)),
     ):
         rms = float(np.sqrt(np.mean(signal_mps2**2)))
         assert relation.iri(rms, speed_mps) == pytest.approx(iso8608.iri_from_gd_n0(gd_n0_cm3), rel=0.03)
@@ -61,12 +63,12 @@ def test_relation_is_quick_and_covers_3_to_45_mps() -> None:
     took_s = []
     for _ in range(3):
         begin = time.perf_counter()
-        relation = rms_relation(RAV4)
+        relation = rms_relation(known_vehicle(RAV4))
         took_s.append(time.perf_counter() - begin)
     assert min(took_s) < 0.1
     assert (relation.speeds_mps[0], relation.speeds_mps[-1]) == (3.0, 45.0)
     assert (np.diff(relation.iri_per_accel_rms) < 0).all()
-    fine = rms_relation(RAV4, None, np.arange(3, 45, 0.1))
+    fine = rms_relation(known_vehicle(RAV4), None, np.arange(3, 45, 0.1))
     coarse = relation.iri(np.ones(len(fine.speeds_mps)), fine.speeds_mps)
     assert coarse == pytest.approx(fine.iri_per_accel_rms, rel=0.012)
-    assert rms_relation(GOLDEN_CAR).iri(1.0, 20.0) > 0
+    assert rms_relation(known_vehicle(GOLDEN_CAR)).iri(1.0, 20.0) > 0

@@ -13,6 +13,7 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.frequency_response import body_acceleration_response
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure, body_point
 
@@ -27,7 +28,7 @@ def car(name: str) -> Structure:
 @cache
 def time_grid(name: str, count: int, ahead_m: float = 0.0) -> TimeGrid:
     structure = car(name)
-    return TimeGrid(CarResponse(structure, body_point(structure, ahead_m)), count, RATE_HZ)
+    return TimeGrid(CarResponse(LinearCar(structure, body_point(structure, ahead_m))), count, RATE_HZ)
 
 
 def way(count: int, speeds_mps: list[float], rate_hz: float = RATE_HZ) -> np.ndarray:

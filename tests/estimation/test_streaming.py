@@ -19,6 +19,7 @@ from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import Structure, body_point
@@ -75,7 +76,7 @@ def steady(speed_mps: float, seconds: float = 40.0) -> tuple[tuple[float, float]
 
 def an_estimator(sensor: Sensor = FINE, name: str = "rav4-2009", ahead_m: float = 0.0, window_m: float = WINDOW_M
                  ) -> RoadEstimator:
-    return RoadEstimator(car(name), body_point(car(name), ahead_m), sensor, window_m)
+    return RoadEstimator(LinearCar(car(name), body_point(car(name), ahead_m)), sensor, window_m)
 
 
 def estimated(
@@ -357,7 +358,7 @@ def test_pieces_of_road_join_and_have_the_roads_shape() -> None:
     one = driven(steady(18.0), 4.0, 5, window_m=30.48)
     pieces: list[RoadPiece] = []
     structure = car("rav4-2009")
-    estimator = RoadEstimator(structure, body_point(structure), FINE, 30.48, on_road=pieces.append)
+    estimator = RoadEstimator(LinearCar(structure, body_point(structure)), FINE, 30.48, on_road=pieces.append)
     estimated(estimator, one.read(FINE), one.distance_m)
     starts = np.array([piece.start_m for piece in pieces])
     lengths = np.array([piece.spacing_m * (len(piece.elevation_m) - 1) for piece in pieces])

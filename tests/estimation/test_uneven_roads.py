@@ -13,6 +13,7 @@ from logger.roads.bumps import speed_bump
 from logger.roads.iri import rectified_slope, window_iri
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import drive
 from logger.vehicle.structure import body_point
@@ -45,7 +46,7 @@ def read(accel_mps2: np.ndarray, sensor: Sensor, seed: int) -> np.ndarray:
 def estimated(
     sensor: Sensor, reading: np.ndarray, distance_m: np.ndarray, window_m: float = WINDOW_M, place_std_m: float = 0.0
 ) -> list[WindowEstimate]:
-    estimator = RoadEstimator(RAV4, body_point(RAV4), sensor, window_m, place_std_m, vehicle_error=0.0)
+    estimator = RoadEstimator(LinearCar(RAV4, body_point(RAV4)), sensor, window_m, place_std_m, vehicle_error=0.0)
     found = estimator.push(reading, np.ones(len(reading), dtype=bool), np.zeros(len(reading)), distance_m)
     return found + estimator.finish()
 
@@ -54,7 +55,7 @@ def test_a_delay_that_is_not_known_counts_by_the_speed() -> None:
     """0.1 s are 1.5 m at 15 m/s."""
     _, accel, distance_m = bumpy(1.0, 0.05, 1.0, 15.0)
     reading = read(accel, FINE, 1)
-    late = RoadEstimator(RAV4, body_point(RAV4), FINE, WINDOW_M, vehicle_error=0.0, late_std_s=0.1)
+    late = RoadEstimator(LinearCar(RAV4, body_point(RAV4)), FINE, WINDOW_M, vehicle_error=0.0, late_std_s=0.1)
     everywhere = np.ones(len(reading), dtype=bool)
     found = late.push(reading, everywhere, np.zeros(len(reading)), distance_m) + late.finish()
     off = {one.number: one for one in estimated(FINE, reading, distance_m, place_std_m=1.5)}

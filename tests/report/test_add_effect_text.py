@@ -9,6 +9,7 @@ from logger.lab.selection.add_effect import AddedEffects, Number
 from logger.report.add_effect_text import MOVED_HEADS, as_json, bias, errors, judgement, moved_rows
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
+from logger.vehicle.uncertain import NumberErrors
 
 from ..support.lab.runs_with_residual import CAR
 
@@ -24,7 +25,8 @@ FOUND = AddedEffects(
           chosen(EFFECTS["dry_friction"], EFFECTS["dry_friction"].usual | {"friction_force_n": 84.7}, standard_errors={
               "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")})),
     ("dry_friction",), (STILL, MASS, TIRE), error_before=0.47, error_refitted=0.43, error_after=0.153,
-    error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, distance_error_m=0.0)
+    error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, distance_error_m=0.0,
+    errors=NumberErrors({"sprung_mass_kg": 7.5}))
 
 
 def test_the_errors_are_told_from_the_file_as_it_was_to_the_noise() -> None:

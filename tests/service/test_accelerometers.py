@@ -28,7 +28,7 @@ from logger.service.event_core import EventCore
 from logger.service.status import SensorStatus, ServiceStatus
 from logger.service.status_reporter import Progress
 from logger.service.supervisor import Supervisor
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 
 from ..support.accelerometer_fakes import fakes
 from ..support.accelerometer_fakes.fake import Clock, Fake, Vector
@@ -87,7 +87,7 @@ class Ride:
         """A service with these settings."""
         rows = Rows()
         sensor = wiring.instrument(self.config.accelerometer)
-        pipeline = wiring.pipeline(self.config, sensor, read_vehicle(self.config.vehicle))
+        pipeline = wiring.pipeline(self.config, sensor, read_model(self.config.vehicle))
         return EventCore(sensor.decoder, wiring.gps_decoder(self.config), pipeline, rows), rows
 
     def rows(self) -> Rows:
@@ -331,7 +331,7 @@ def test_bytes_that_are_none_of_its_own_do_no_harm(name: str) -> None:
 def test_its_facts_and_settings_stand_beside_the_log(name: str, ride: Callable[[str], Ride]) -> None:
     driven = ride(name)
     sensor = wiring.instrument(driven.config.accelerometer)
-    facts = wiring.sidecar(driven.config, sensor, read_vehicle(driven.config.vehicle))
+    facts = wiring.sidecar(driven.config, sensor, read_model(driven.config.vehicle))
     assert facts["sensor"]["driver"] == name
     section = json.loads(json.dumps(facts["settings"]["accelerometer"]))
     assert section["driver"] == name

@@ -25,7 +25,7 @@ from logger.service.noise_learning import (
     read_learnt,
 )
 from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 
 from ..support.drives.replay import parts_for, rows_of
 
@@ -118,7 +118,7 @@ def test_a_recording_and_a_sidecar_carry_what_their_drive_began_with() -> None:
     assert found is not None and found.drives == 3
     assert found.belief.noise_rms_mps2 == pytest.approx(0.15) and found.belief.log_std == pytest.approx(0.06)
     assert wiring.noise_for_dump(header, Config()) is None  # settings that do not want it learnt
-    car = read_vehicle(vehicle_file("rav4-2009"))
+    car = read_model(vehicle_file("rav4-2009"))
     facts = wiring.sidecar(config, wiring.instrument(LEARNS, KNOWN), car, noise=KNOWN)
     assert from_fields(facts["noise"]) == from_fields(header_fields(KNOWN))
     assert "noise" not in wiring.sidecar(Config(), wiring.instrument(AccelerometerConfig()), car)

@@ -26,7 +26,7 @@ from logger.service.receiver_learning import (
     read_learnt,
 )
 from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 
 from ..support.drives.replay import rows_of
 
@@ -156,7 +156,7 @@ def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> No
 
 def test_a_sidecar_says_what_its_rows_went_by() -> None:
     config = Config()
-    car = read_vehicle(vehicle_file("rav4-2009"))
+    car = read_model(vehicle_file("rav4-2009"))
     known = Belief(0.17, 0.02, 3)
     facts = wiring.sidecar(config, wiring.instrument(config.accelerometer), car, known)
     assert from_fields(facts["receiver"]) == known

@@ -15,7 +15,9 @@ import numpy.typing as npt
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.vehicle.effect import Chosen
-from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of
+from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of, slope_of
+from logger.vehicle.named_parameters import read
+from logger.vehicle.uncertain import NumberErrors
 
 Array = npt.NDArray[np.float64]
 
@@ -26,14 +28,38 @@ def standard_errors(found: LinearModel) -> tuple[tuple[Chosen, ...], Array]:
     Both hold the priors: a number that the runs say nothing of is as uncertain as it was.
     """
     linear, state = found.without_wall(), found.state
-    moves, slopes = moves_of(state.effects), own_slopes(linear)
+    covariance = _covariance(linear)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return (with_errors(state.effects, moves_of(state.effects), deviations[linear.count:]),
+            deviations[: linear.count])
+
+
+def number_errors(found: LinearModel) -> NumberErrors:
+    """How far the numbers of the car and of its effects may be off together, in their own units; as
+    ``standard_errors``."""
+    linear, state = found.without_wall(), found.state
+    prior, moves = linear.posterior.prior, moves_of(state.effects)
+    vehicle = prior.vehicle(linear.posterior.vehicle, state.logs)
+    names, units = list(prior.names), [read(vehicle, name) for name in prior.names]
+    for move in moves:
+        one = state.effects[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        names.append(f"{one.effect.name}.{parameter.name}")
+        units.append(1 / slope_of(parameter, one.values[parameter.name]))
+    return NumberErrors.of_covariance(names, _covariance(linear) * np.outer(units, units))
+
+
+def _covariance(linear: LinearModel) -> Array:
+    """Of the logarithms of the car's numbers, then of those of the effects on their scales; infinite where nothing is
+    known."""
+    slopes, state = own_slopes(linear), linear.state
     information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
     scale = np.where(seen, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    deviations = np.where(seen, np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale, np.inf)
-    return with_errors(state.effects, moves, deviations[linear.count:]), deviations[: linear.count]
+    return np.asarray(np.where(np.outer(seen, seen), inverse / np.outer(scale, scale),
+                               np.diag(np.where(seen, 0.0, np.inf))))
 
 
 def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,

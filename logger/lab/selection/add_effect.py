@@ -21,10 +21,11 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.noise_floor import floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
+from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -76,6 +77,7 @@ class AddedEffects:
     noise_floor_error   the error that the sensor's noise makes
     p_value             how often, at most, noise alone would gain as much
     distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
+    errors              of the numbers of vehicle and effects together
     """
 
     vehicle: Vehicle
@@ -89,6 +91,7 @@ class AddedEffects:
     noise_floor_error: float
     p_value: float
     distance_error_m: float
+    errors: NumberErrors
 
     @property
     def helps(self) -> bool:
@@ -141,7 +144,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, noise_of(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
-        distance_error_m=unusual_m(posterior.record_errors, state.record))
+        distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after))
 
 
 def _with(posterior: Posterior, before: LinearModel, beside: tuple[Chosen, ...],

@@ -37,7 +37,7 @@ from logger.service.event_merger import EventMerger
 from logger.service.noise_learning import KnownNoise
 from logger.service.receiver_learning import at_start
 from logger.service.signal_chain import Axis
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_on_board
 from logger.store.log.log_writer import ClockMap
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
@@ -150,7 +150,7 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Belief
     rows = _Rows()
     # As the service began, not as the recording: the header's delay is that of another drive.
     belief = at_start(config.gps, receiver)
-    pipeline = wiring.pipeline(config, instrument, read_vehicle(config.vehicle), belief)
+    pipeline = wiring.pipeline(config, instrument, read_on_board(config.vehicle), belief)
     core = EventCore(instrument.decoder, wiring.gps_decoder(config), pipeline, rows)
     for event in recording.events:
         core.feed(event)

@@ -26,6 +26,7 @@ from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalib
 from logger.files import read_bounded, replace_bytes
 from logger.shipped import shipped
 from logger.store.formats.checksum import json_sha256
+from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -46,15 +47,19 @@ class Found:
     path: Path
 
 
-def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: Settings) -> str:
-    """64 hex digits that change with any number of the vehicle, the recorder's response, the settings or the method.
+def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: Settings,
+                effects: Sequence[Chosen] = ()) -> str:
+    """64 hex digits that change with any number of the vehicle, its effects, the recorder's response, the settings or
+    the method.
 
     Not with the vehicle's name. The recorder's gain is told by its values at 0.01 to 100 Hz.
     """
     numbers = asdict(vehicle)
     del numbers["name"]
     gain = recorder_gain(_GAIN_PROBES_HZ).round(_GAIN_DIGITS).tolist() if recorder_gain else None
-    return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain})
+    with_effects = {"effects": {one.effect.name: dict(one.values) for one in effects}} if effects else {}
+    return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain,
+                        **with_effects})
 
 
 def places(vehicle_path: Path) -> tuple[Path, ...]:

@@ -1,13 +1,13 @@
 """Vehicle files (YAML) to vehicles and back, with complaints that name the line.
 
-Most commands know the plain car only, and must not take a car with effects for one without: ``read_vehicle`` refuses
-it. Those that know effects read a ``Model``: the car, its effects, and how it came to them. A user's own effect is
-Python that reading it runs, which the service on board never does.
+What knows the plain car only must not take a car with effects for one without: ``read_vehicle`` refuses it. Commands
+read a ``Model``: the car, its effects, how certain its numbers are, and how it came to them. A user's own effect is
+Python that reading it runs, which the service on board never does: ``read_on_board`` refuses it unread.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,8 @@ import yaml
 from logger.errors import BadInput
 from logger.files import write_text
 from logger.store.formats.yaml_nodes import Node, load_mapping
-from logger.vehicle.named_parameters import changed, read, sized
+from logger.vehicle.named_parameters import changed, names, read, sized
+from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, Axle, SensorPlace, Vehicle
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ _LIMITS_PER_KG: Mapping[str, tuple[float, float]] = {
 _MAY_BE_MISSING = ("suspension_damping_n_s_per_m", _ANTI_ROLL_KEY)  # 0 stands for none
 _SHORTEST_WHEELBASE_M = 0.1
 _ROUNDING = 1e-12
-KNOW_EFFECTS = "simulate, compare, diagnose, add-effect, identify and lab"
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,14 @@ class Model:
     """A vehicle with its effects, and the steps that led to them, the first one first.
 
     given    the vehicle as it was before any of its numbers was refitted; None: none was
+    errors   of the numbers of vehicle and effects that were fitted; None: none are known
     """
 
     vehicle: Vehicle
     effects: tuple[Chosen, ...] = ()
     history: tuple[Step, ...] = ()
     given: Vehicle | None = None
+    errors: NumberErrors | None = None
 
 
 def read_vehicle(path: Path | str) -> Vehicle:
@@ -89,7 +91,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
     """
     vehicle, keys = _read(path)
     if "effects" in keys and keys["effects"].items():
-        raise keys["effects"].wrong(f"no effects: this command knows the plain car only ({KNOW_EFFECTS} know effects)")
+        raise keys["effects"].wrong("no effects: this is for a plain car only")
     return vehicle
 
 
@@ -102,12 +104,36 @@ def read_model(path: Path | str) -> Model:
     from logger.store.formats.effect_file import read_effects
 
     vehicle, keys = _read(path)
+    effects = read_effects(keys["effects"], vehicle) if "effects" in keys else ()
     return Model(
         vehicle,
-        read_effects(keys["effects"], vehicle) if "effects" in keys else (),
+        effects,
         tuple(map(_read_step, keys["history"].items())) if "history" in keys else (),
         _read_given(keys["given"], vehicle) if "given" in keys else None,
+        _read_errors(keys, vehicle, effects) if "standard_errors" in keys else None,
     )
+
+
+def read_on_board(path: Path | str) -> Model:
+    """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput).
+    """
+    _, keys = _read(path)
+    for item in keys["effects"].items() if "effects" in keys else ():
+        if "file" in (said := item.mapping()):
+            raise said["file"].wrong("an effect that comes with ridelog: the service runs no Python of others")
+    return read_model(path)
+
+
+def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[Chosen]) -> NumberErrors:
+    """Standard errors of numbers, and how they hang together."""
+    known = [*names(vehicle), *(f"{one.effect.name}.{name}" for one in effects for name in one.values)]
+    said = keys["standard_errors"].mapping(optional=known)
+    errors = {name: node.number(above=0.0) for name, node in said.items()}
+    rows = [[node.number(low=-1.0, high=1.0) for node in row.items()] for row in keys["correlations"].items()
+            ] if "correlations" in keys else []
+    if rows and [len(row) for row in rows] != list(range(len(errors))):
+        raise keys["correlations"].wrong(f"a row for each of {len(errors)} standard errors, of those before it")
+    return NumberErrors(errors, tuple(map(tuple, rows)))
 
 
 def _read_given(node: Node, vehicle: Vehicle) -> Vehicle:
@@ -129,7 +155,8 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node]]:
     if model_node is None:
         raise BadInput(f"{top.file}:{top.line}: expected the key 'model' here, it is missing")
     model = model_node.choice(*_MODEL_KEYS)
-    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=("sensor", "effects", "given", "history"))
+    keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=(
+        "sensor", "effects", "standard_errors", "correlations", "given", "history"))
     mass_kg = _number_of(keys, "sprung_mass_kg", 1.0)
     front = _read_axle(keys["front"], model, mass_kg)
     rear = _read_axle(keys["rear"], model, mass_kg) if "rear" in keys else None
@@ -207,6 +234,10 @@ def write_model(path: Path | str, model: Model) -> None:
 
     keys = _vehicle_keys(model.vehicle)
     keys["effects"] = [_OneLine(effect_keys(one, Path(path).parent)) for one in model.effects]
+    if model.errors is not None and model.errors.standard_errors:
+        keys["standard_errors"] = {name: float(error) for name, error in model.errors.standard_errors.items()}
+        if model.errors.correlations:
+            keys["correlations"] = [_OneLineList(map(float, row)) for row in model.errors.correlations]
     if model.given is not None:
         keys["given"] = {name: float(read(model.given, name)) for name in sized(model.given)
                          if read(model.given, name) != read(model.vehicle, name)}
@@ -225,12 +256,21 @@ class _OneLine(dict[str, object]):
     """A mapping that is written on one line."""
 
 
+class _OneLineList(list[float]):
+    """A list that is written on one line."""
+
+
 class _Dumper(yaml.SafeDumper):
     """Writes plain values, as YAML's safe dumper does."""
 
 
 _Dumper.add_representer(
     _OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(), flow_style=True)
+)
+
+
+_Dumper.add_representer(
+    _OneLineList, lambda dumper, row: dumper.represent_sequence("tag:yaml.org,2002:seq", row, flow_style=True)
 )
 
 

@@ -8,6 +8,7 @@ from logger.estimation.rms_relation import rms_relation
 from logger.studies.drives import rav4
 from logger.studies.study import Column, Effort, Result, Study, Table
 from logger.units import MPH_MPS
+from logger.vehicle.linearise import known_vehicle
 
 SPEEDS_MPH = tuple(range(10, 71, 10))
 _LEVELS_MPS2 = np.array([0.0, 2.0])
@@ -18,9 +19,9 @@ def run(effort: Effort) -> Result:
     """As ``Study.run``."""
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
     cars = (rav4(), loaded(rav4(), passengers=2), loaded(rav4(), sprung_mass_factor=2.0))
-    own, two, heavy = (rms_relation(car, None, speeds).iri_per_accel_rms for car in cars)
-    (drives,) = (calibrate(rav4(), None, Settings(tuple(speeds.tolist()), roads=effort.count(_ROADS, 10)))
-                 for _ in effort.each(range(1)))
+    own, two, heavy = (rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
+    settings = Settings(tuple(speeds.tolist()), roads=effort.count(_ROADS, 10))
+    (drives,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in
                  zip(SPEEDS_MPH, own.tolist(), drives, 100 * (two / own - 1), 100 * (heavy / own - 1), strict=True))

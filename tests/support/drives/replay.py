@@ -10,7 +10,7 @@ from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.pipeline import Pipeline
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 from logger.store.log.log_writer import ClockMap
 from logger.store.log.row_format import format_row
 
@@ -44,7 +44,7 @@ def core_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCor
 def parts_for(header: DumpHeader, config: Config | None = None) -> tuple[EventCore, Rows, Pipeline]:
     config = wiring.config_for_dump(header, config, None)
     sensor = wiring.instrument(config.accelerometer, wiring.noise_for_dump(header, config))
-    vehicle = read_vehicle(config.vehicle)
+    vehicle = read_model(config.vehicle)
     rows = Rows()
     pipeline = wiring.pipeline(config, sensor, vehicle, wiring.receiver_for_dump(header, config))
     return EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, rows), rows, pipeline

@@ -39,7 +39,7 @@ from logger.service.status_reporter import StatusReporter
 from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import OTHER_DATE_US
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 from logger.store.log.disk_quota import Limits
 from logger.store.log.row_format import read_log
 
@@ -138,7 +138,7 @@ class Car:
                 sections=AccelerometerConfig().sections | {"bma220": Bma220Config(range_g=settings.range_g)}))
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = wiring.instrument(self.config.accelerometer)
-        vehicle = read_vehicle(self.config.vehicle)
+        vehicle = read_model(self.config.vehicle)
         self.storage = Storage(folder, {}, 4_000_000, None, Limits(), self.clock)
         self.decoder = wiring.gps_decoder(self.config)
         self.pipeline = wiring.pipeline(self.config, sensor, vehicle)

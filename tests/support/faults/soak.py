@@ -23,7 +23,7 @@ from logger.service.config import AccelerometerConfig, Config, LogConfig
 from logger.service.dump_player import Player
 from logger.service.event_core import EventCore
 from logger.service.storage import Storage
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import read_model
 from logger.store.integrity import FileCheck, verify
 from logger.store.log.disk_quota import Limits
 from logger.store.log.row_format import read_log
@@ -94,7 +94,7 @@ class _Service:
 
     def __init__(self, directory: Path, quota_bytes: int) -> None:
         config = wiring.config_for_dump(HEADER, Config(log=LogConfig(directory, MAX_FILE_BYTES)), None)
-        sensor, vehicle = wiring.instrument(config.accelerometer), read_vehicle(config.vehicle)
+        sensor, vehicle = wiring.instrument(config.accelerometer), read_model(config.vehicle)
         self._directory = directory
         self._sync_us = config.log.sync_s * 1e6
         self.t_us = START_US

@@ -1,0 +1,109 @@
+"""What a car's own laws answer beyond the linear ones that stand in for them, along the motion that was found.
+
+Problem: a linear car is right on the average of a road (``vehicle.linearise``), but a damper that resists rebound more
+than bump has no linear stand-in at all, and friction pushes the more evenly the harder a stretch shakes. Solution: once
+a block's road is known, so is how the suspensions moved; what the laws answer to that, less what the linear ones do, is
+a force, and what a force does to the reading is linear again. Its share is taken off the readings, and the road is
+found anew. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds off
+the corners that would keep the two from coming to rest.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM
+from logger.vehicle.laws import CornerLaws
+from logger.vehicle.linear_car import CornerSlopes, LinearCar
+from logger.vehicle.linearise import MovedCar
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_AT, _SHARE = np.polynomial.hermite_e.hermegauss(9)
+_SHARE = _SHARE / _SHARE.sum()
+# Laws are rounded off over at least so much of how far a corner moves: the slope of friction at rest stays within three
+# times that of its stand-in, so that half a step towards what is found leads there.
+_LEAST_ROUNDING = 1 / 3
+_AT_REST_MPS = 1e-9
+_EVERY = 4  # of the samples that the variance is asked at: it is a mean over the block
+
+
+class BentForces:
+    """For blocks of ``count`` samples at ``rate_hz``.
+
+    moved     the car
+    linear    what stands in for it on this road, at ``speed_mps``
+    """
+
+    def __init__(self, moved: MovedCar, linear: LinearCar, speed_mps: float, count: int, rate_hz: float) -> None:
+        self._laws, self._slopes = moved.car.laws, linear.corners
+        f_hz = np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+        seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
+        asked = np.where(seen, f_hz, 1.0)
+        axle = np.unique(linear.structure.behind_m, return_inverse=True)[1]
+        by_wheel = linear.travel_by_wheel(asked)
+        travel = np.stack([by_wheel[..., axle == one].sum(axis=-1) for one in range(axle.max() + 1)])
+        self._travel = np.where(seen, np.moveaxis(travel, 1, -1), 0.0)  # (axles, corners, f)
+        self._by_force = np.where(seen, linear.by_force(asked).T, 0.0)
+        s = np.asarray(2j * np.pi * f_hz, dtype=np.complex128)
+        self._rate = s * self._travel
+        self._own_rate = np.stack([one.passed(s) for one in self._slopes]) * self._rate
+        waves = linear.waves(WAVE_NUMBERS_CPM, speed_mps)
+        self._powers = [np.abs(one) ** 2 * WAVE_NUMBER_STEPS_CPM[:, None]
+                        for one in (waves.travel, waves.rate, waves.own_rate)]
+        self._count = count
+
+    def reading(self, under: ComplexArray, psd_m3: Array, resolved: Array) -> tuple[Array, float]:
+        """What the forces beyond the linear ones do to the reading (count,) [m/s2], and the variance of what they may
+        do besides, because the motion is not known exactly [(m/s2)2].
+
+        under       (axles, f) rfft of the elevations under the axles [m]
+        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
+        """
+        motions = np.array([np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
+                            for gain in (self._travel, self._rate, self._own_rate)])
+        left = np.sqrt(np.array([(psd_m3 * (1 - resolved)) @ power for power in self._powers]))
+        rounded = np.maximum(left, _LEAST_ROUNDING * np.sqrt(np.array([psd_m3 @ power for power in self._powers])))
+        found = [(_beyond(laws, slopes, motions[:, i], rounded[:, i]),
+                  _variance(laws, slopes, motions[:, i, ::_EVERY], left[:, i]))
+                 for i, (laws, slopes) in enumerate(zip(self._laws, self._slopes, strict=True))]
+        forces, variances = np.array([force for force, _ in found]), np.array([variance for _, variance in found])
+        return (np.fft.irfft((np.fft.rfft(forces) * self._by_force).sum(axis=0), self._count),
+                float(variances @ (np.abs(self._by_force) ** 2).mean(axis=1)))
+
+
+def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> Array:
+    """The mean force (t,) [N] of a corner's laws, less that of their stand-ins, over what its motion may have been:
+    travel, rate and the damper's own rate (3, t) within standard errors (3,)."""
+    springs, dampers, beside = _parts(laws, slopes, motion, std)
+    force = np.asarray(_SHARE @ (springs + dampers + beside))
+    if laws.dry_friction_n:
+        share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
+        # nearly its mean over a normal distribution, which is an erf
+        force += laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share + 0.044715 * share**3))
+    return force
+
+
+def _variance(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> float:
+    """The variance [N2] of that force, over what its motion may have been, on the average."""
+    springs, dampers, beside = _parts(laws, slopes, motion, std)
+    if laws.dry_friction_n:
+        beside = beside + laws.dry_friction_n * np.sign(motion[1] + std[1] * _AT[:, None])
+    return sum(float((_SHARE @ one**2 - (_SHARE @ one) ** 2).mean()) for one in (springs, dampers, beside))
+
+
+def _parts(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -> tuple[Array, Array, Array]:
+    """Forces (p, t) of springs, dampers and what lies beside them, less those of their stand-ins, without dry friction,
+    at the points of a normal distribution."""
+    travel, rate, own_rate = motion[:, None] + std[:, None, None] * _AT[:, None]
+    at = slopes.rest_m + travel
+    springs = sum((law(at) for law in laws.springs), -slopes.spring_n_per_m * travel)
+    dampers = laws.damper(own_rate) - slopes.damper_n_s_per_m * own_rate
+    # travel and rate of one instant are not correlated: what asks for both is asked at the mean travel
+    middle = np.broadcast_to(slopes.rest_m + motion[0], rate.shape)
+    beside = sum((law(middle, rate) for law in laws.others), -slopes.beside_n_s_per_m * rate)
+    return springs, dampers, beside

@@ -1,0 +1,168 @@
+"""What a sensor on a linear car reads of a road, wave by wave, with effects that are linear or have stand-ins.
+
+A car whose laws are linear answers each wave of the road with a factor, exactly: springs, dampers and tires are
+impedances there, a mount in series with a damper too, and what lies between the body and the recorder is a factor of
+its own. Laws that are not linear come with slopes that stand in for them (``linearise``). With D(s) = s2 M + s C + K,
+what the laws add at the suspensions Z(s) and at the tires Y(s), the travel J and the wheels W:
+
+    (D + J' Z J + W' Y W) q = (R + W' Y) z
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Chosen, SensorEffect
+from logger.vehicle.frequency_response import at_steady_speed, dynamic_stiffness, frequency_response
+from logger.vehicle.structure import Output, Structure
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class CornerSlopes:
+    """The laws of one corner as numbers, each beside what the car's matrices hold of it, but for the damper's.
+
+    spring_n_per_m            of the suspension, beyond its linear spring
+    damper_n_s_per_m          of the whole damper by its own rate
+    mount_n_per_m             in series with the damper; infinite: none
+    beside_n_s_per_m          by the suspension's rate, beside damper and mount
+    tire_n_per_m              beyond the linear tire
+    tire_damping_n_s_per_m    of the tire
+    contact                   share of its force that the tire gives, 1 while it never lifts
+    rest_m                    mean travel of the suspension, where its laws push it one way
+    """
+
+    spring_n_per_m: float
+    damper_n_s_per_m: float
+    mount_n_per_m: float
+    beside_n_s_per_m: float
+    tire_n_per_m: float
+    tire_damping_n_s_per_m: float
+    contact: float = 1.0
+    rest_m: float = 0.0
+
+    def passed(self, s: Complex) -> Complex:
+        """Share (f,) of the suspension's rate that reaches the damper, at s (f,) [1/s]."""
+        return 1 / (1 + self.damper_n_s_per_m * s / self.mount_n_per_m)
+
+    def suspension(self, s: Complex, damper_n_s_per_m: float) -> Complex:
+        """Force per travel (f,) [N/m] beyond a linear spring and a damper that is in the matrices."""
+        damped = self.damper_n_s_per_m * self.passed(s) + self.beside_n_s_per_m - damper_n_s_per_m
+        return np.asarray(self.spring_n_per_m + s * damped)
+
+    def tire(self, s: Complex, tire_n_per_m: float) -> Complex:
+        """Force per deflection (f,) [N/m] beyond a linear tire that is in the matrices."""
+        whole = tire_n_per_m + self.tire_n_per_m + s * self.tire_damping_n_s_per_m
+        return np.asarray(self.contact * whole - tire_n_per_m)
+
+
+@dataclass(frozen=True)
+class Waves:
+    """What the corners do per elevation of the road under the front wheel, at steady speed: (f, w) each.
+
+    travel        of the suspensions
+    rate          of that [1/s], ``own_rate`` what the dampers feel of it
+    deflection    of the tires; ``force`` what they answer as long as they hold [N/m]
+    """
+
+    travel: Complex
+    rate: Complex
+    own_rate: Complex
+    deflection: Complex
+    force: Complex
+
+
+@dataclass(frozen=True, eq=False)
+class LinearCar:
+    """A linear car and what is read of it.
+
+    output     the motion of it that the sensor feels
+    corners    one per wheel; empty where the matrices hold all
+    sensors    effects between that motion and the record, in order
+    """
+
+    structure: Structure
+    output: Output
+    corners: tuple[CornerSlopes, ...] = ()
+    sensors: tuple[Chosen, ...] = ()
+
+    @property
+    def depends_on_motion(self) -> bool:
+        """Whether it is another car where the road or the speed is another one: never."""
+        return False
+
+    def at(self, speed_mps: float, wave_number_cpm: Array, psd_m3: Array) -> LinearCar:
+        """This car at a speed on a road of some spectrum: itself."""
+        return self
+
+    def by_wheel(self, f_hz: Array) -> Complex:
+        """The reading per elevation under each wheel separately (..., w) [1/s2] for waves exp(2 pi i f t), f (...)
+        [Hz]; no delay between the wheels, no contact patch."""
+        s, output = np.asarray(2j * np.pi * np.asarray(f_hz, float)), self.output
+        if self.corners:
+            read = s[..., None] ** output.order * (output.row @ self._coordinates(s)) + output.road_row
+        else:
+            read = frequency_response(self.structure, [output], f_hz)[..., 0, :]
+        return self._through_sensors(s, read)
+
+    def response(self, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike) -> Complex:
+        """The reading per elevation under the front wheel [1/s2], at constant speed.
+
+        ``f_hz`` [Hz] and ``speed_mps`` [m/s], greater than 0, are broadcast against each other. Left and right wheels
+        see the same road.
+        """
+        f, speed = np.broadcast_arrays(np.asarray(f_hz, float), np.asarray(speed_mps, float))
+        return at_steady_speed(self.structure, self.by_wheel(f), f / speed)
+
+    def waves(self, wave_number_cpm: Array, speed_mps: float) -> Waves:
+        """What the corners do on waves (f,) [cycle/m] of the road at a steady speed [m/s]."""
+        structure = self.structure
+        s = np.asarray(2j * np.pi * wave_number_cpm * speed_mps)
+        averaged = np.sinc(wave_number_cpm * structure.contact_patch_m)[:, None]
+        road = np.exp(-2j * np.pi * wave_number_cpm[:, None] * structure.behind_m) * averaged
+        q = (self._coordinates(s) @ road[..., None])[..., 0]
+        travel, deflection = q @ structure.travel.T, q @ structure.wheels.T - road
+        passed = np.stack([one.passed(s) for one in self.corners], axis=1)
+        whole = np.stack([tire + one.tire_n_per_m + s * one.tire_damping_n_s_per_m
+                          for one, tire in zip(self.corners, structure.tires, strict=True)], axis=1)
+        rate = s[:, None] * travel
+        return Waves(travel, rate, passed * rate, deflection, whole * deflection)
+
+    def travel_by_wheel(self, f_hz: Array) -> Complex:
+        """Travel of each suspension per elevation under each wheel separately (f, w, w), of a car with laws of its own;
+        waves and delays as ``by_wheel``."""
+        return np.asarray(self.structure.travel @ self._coordinates(np.asarray(2j * np.pi * f_hz)))
+
+    def by_force(self, f_hz: Array) -> Complex:
+        """The reading per force in each suspension (f, w) [1/kg], of a car with laws of its own; a force pulls body and
+        wheel together."""
+        s, structure = np.asarray(2j * np.pi * f_hz), self.structure
+        moved = np.linalg.solve(self._dynamic(s)[0], -structure.travel.T.astype(complex))
+        return self._through_sensors(s, s[..., None] ** self.output.order * (self.output.row @ moved))
+
+    def _through_sensors(self, s: Complex, read: Complex) -> Complex:
+        for one in self.sensors:
+            assert isinstance(one.effect, SensorEffect)
+            read = read * one.effect.factor(one.p, s)[..., None]
+        return np.asarray(read)
+
+    def _coordinates(self, s: Complex) -> Complex:
+        """Of the car with laws of its own, per elevation under each wheel (..., n, w), at s (...) [1/s]."""
+        dynamic, pressed = self._dynamic(s)
+        return np.asarray(np.linalg.solve(dynamic, self.structure.road + pressed))
+
+    def _dynamic(self, s: Complex) -> tuple[Complex, Complex]:
+        """What q is multiplied by (..., n, n), and what the laws of the tires add to the road's force (..., n, w)."""
+        structure = self.structure
+        suspension = np.stack(
+            [one.suspension(s, own) for one, own in zip(self.corners, structure.dampers, strict=True)], axis=-1)
+        tire = np.stack([one.tire(s, own) for one, own in zip(self.corners, structure.tires, strict=True)], axis=-1)
+        dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
+        dynamic = dynamic + (structure.travel.T * suspension[..., None, :]) @ structure.travel
+        pressed = structure.wheels.T * tire[..., None, :]
+        return np.asarray(dynamic + pressed @ structure.wheels), np.asarray(pressed)
