@@ -57,7 +57,7 @@ def main() -> int:
     goal = GOALS[options.sensor]
     print(f"named of those above {STANDS_OUT:g} deviations: {named} of {strong} (goal {goal:.0%})")
     print(f"wrong names: {wrong} of {options.cases} (goal 5 %)")
-    print(f"places off, r.m.s. of runs: median {np.median(off):.3f} m, largest {max(off):.3f} m (goal {PLACE_GOAL_M:g})")
+    print(f"places off, r.m.s.: median {np.median(off):.3f} m, largest {max(off):.3f} m (goal {PLACE_GOAL_M:g})")
     return int(share < goal or wrong > 0.05 * options.cases or max(off) > PLACE_GOAL_M)
 
 
