@@ -171,7 +171,7 @@ CHANGES = {
     "a leap": ({"distance": lambda d: d + 20.0 * (np.arange(len(d)) > 300)}, "drive.csv:303: .* that grow steadily"),
     "km/h": ({"speed": lambda v: 3.6 * v}, "drive.csv: expected speed_mps .* to agree"),
     "no speed": ({"speed": lambda v: 0.0}, "drive.csv: expected speed_mps .* to agree"),
-    "standing": ({"speed": lambda v: 0.0, "distance": lambda d: 20.0}, "a drive over a road that moves the car"),
+    "standing": ({"speed": lambda v: 0.0, "distance": lambda d: 20.0}, "5 s with readings at 0.5 m/s or faster"),
 }
 
 

@@ -69,7 +69,7 @@ def spoilt(line: int, row: str) -> str:
 
 
 @pytest.mark.parametrize(("text", "complaint"), [
-    ("", ":1: expected a header with t_s,accel_z_mps2,speed_mps,distance_m[,lat_deg,lon_deg], each once, found noth"),
+    ("", ":1: expected a header with t_s,accel_z_mps2,speed_mps,distance_m[,lat_deg,lon_deg][,usable], each once, f"),
     ("t_s,accel_z_mps2,speed_mps\n0,0,0", ":1: expected a header with t_s"),
     (HEADER + ",lat_deg\n0,0,0,0,1", ":1: expected a header with t_s"),
     (HEADER + ",speed_mps\n0,0,0,0,1", ":1: expected a header with t_s"),
