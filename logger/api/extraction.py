@@ -278,7 +278,7 @@ def _along(recorded: _Recorded, fixes: _Fixes, measured: MeasuredProfile | None)
     speeds = _speeds(fixes, recorded.config)
     motion = motion_of(speeds)
     if measured is None:
-        return [_drive(recorded, fixes, motion, None)]
+        return [_drive(_readings(recorded, fixes), fixes, motion, recorded.config.gps.antenna_behind_front_axle_m)]
     driven_m = motion.state[:, 0]
     along_m, aside_m = measured.line.passed(fixes.lat_deg, fixes.lon_deg)
     found = passes(driven_m, along_m, aside_m)
@@ -306,13 +306,13 @@ def _on_profile(recorded: _Recorded, fixes: _Fixes, along_m: Array, one: Pass, m
     fixes, along_m = fixes.part(part), along_m[part]
     ahead_m = recorded.config.gps.antenna_behind_front_axle_m
     places = Observations(fixes.time_s, along_m + ahead_m, np.full(len(along_m), GPS_PLACE_M))
-    readings, accel, usable = _readings(recorded, fixes)
-    if len(readings) < 2:
+    readings = time_s, accel, usable = _readings(recorded, fixes)
+    if len(time_s) < 2:
         return None
     track = drive_file.track_of(measured.profile)
-    found = registered(_speeds(fixes, recorded.config), places, readings, np.where(usable > 0, accel, 0.0), RATE_HZ,
-                       track, _predictor(recorded, readings, track))
-    drive = _drive(recorded, fixes, found.motion, found)
+    found = registered(_speeds(fixes, recorded.config), places, time_s, np.where(usable > 0, accel, 0.0), RATE_HZ,
+                       track, _predictor(recorded, time_s, track))
+    drive = _drive(readings, fixes, found.motion, registered=found)
     inside = (drive.distance_m >= track.start_m) & (drive.distance_m <= track.end_m)
     names = ("time_s", "accel_mps2", "usable", "speed_mps", "distance_m", "lat_deg", "lon_deg")
     return replace(drive, **{name: getattr(drive, name)[inside] for name in names})
@@ -333,12 +333,13 @@ def _predictor(recorded: _Recorded, time_s: Array, track: Any) -> Predict:
     return predict
 
 
-def _drive(recorded: _Recorded, fixes: _Fixes, motion: Motion, found: Registered | None) -> _Drive:
-    time_s, accel, usable = _readings(recorded, fixes)
-    ahead_m = recorded.config.gps.antenna_behind_front_axle_m if found is None else 0.0
+def _drive(readings: tuple[Array, Array, Array], fixes: _Fixes, motion: Motion, ahead_m: float = 0.0,
+           registered: Registered | None = None) -> _Drive:
+    """Readings as ``_readings`` gives them, with their motion; the front tires are so far ahead of it [m]."""
+    time_s, accel, usable = readings
     lon_deg = np.interp(time_s, fixes.time_s, np.unwrap(fixes.lon_deg, period=360.0))
     return _Drive(time_s, accel, usable, motion.speed_mps(time_s), motion.distance_m(time_s) + ahead_m,
-                  np.interp(time_s, fixes.time_s, fixes.lat_deg), (lon_deg + 180.0) % 360.0 - 180.0, found)
+                  np.interp(time_s, fixes.time_s, fixes.lat_deg), (lon_deg + 180.0) % 360.0 - 180.0, registered)
 
 
 def _readings(recorded: _Recorded, fixes: _Fixes) -> tuple[Array, Array, Array]:

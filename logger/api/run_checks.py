@@ -68,10 +68,10 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     from logger.runs import Run
     from logger.store.formats.drive_file import NO_READING
 
-    told = drive.speed_mps >= SLOWEST_MPS
+    usable = drive.speed_mps >= SLOWEST_MPS
     if drive.usable is not None:
-        told = told & (drive.usable != NO_READING)
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], told.astype(int), [0]])))
+        usable &= drive.usable != NO_READING
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(int), [0]])))
     parts = [slice(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
              if last - first >= LEAST_S * drive.rate_hz]
     if not parts:

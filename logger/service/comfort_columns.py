@@ -20,7 +20,7 @@ from logger.estimation.sensor_noise import Sensor
 from logger.estimation.streaming import WindowEstimate
 
 LEAST_WORD = "not_uncomfortable"
-TOLD_FROM_STDS = 2.0
+REPORTED_FROM_STDS = 2.0
 """A ride of fewer standard errors hides in the noise."""
 
 
@@ -64,7 +64,7 @@ def word_of(a_w: Uncertain, most_hidden_mps2: float) -> tuple[str, bool]:
     """The comfort word of a weighted r.m.s. [m/s2], and whether the ride hides in the noise. A ride that does has the
     mildest word if its upper bound allows that, else none; ``most_hidden_mps2`` can hide between two steps."""
     is_known = isfinite(a_w.value)
-    if is_known and a_w.value >= TOLD_FROM_STDS * a_w.std:
+    if is_known and a_w.value >= REPORTED_FROM_STDS * a_w.std:
         return comfort_word(a_w.value), False
-    bound_mps2 = max(a_w.value + TOLD_FROM_STDS * a_w.std if is_known else 0.0, most_hidden_mps2)
+    bound_mps2 = max(a_w.value + REPORTED_FROM_STDS * a_w.std if is_known else 0.0, most_hidden_mps2)
     return LEAST_WORD if comfort_word(bound_mps2) == LEAST_WORD else "", True
