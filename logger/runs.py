@@ -17,6 +17,36 @@ SKIP_S = 2.0
 _EVEN = 1e-3
 
 
+@dataclass(frozen=True)
+class RecordFacts:
+    """What is known of a record; None: it is not.
+
+    step_mps2, range_mps2    what readings are rounded to, and the greatest there can be [m/s2]
+    noise_mps2               r.m.s. of the sensor's noise, before rounding [m/s2]
+    place_std_m              standard error of a place on the profile [m]
+    delay_s, delay_std_s     of the receiver, and its standard error; taken out [s]
+    pass_band_hz             frequencies, the lowest and the highest, between which the record is to be believed [Hz]
+    places_by                "road": places were found by the road as this vehicle's model feels it; "receiver"
+    vehicle                  that vehicle
+    source                   the name of the file that it was made of
+    """
+
+    step_mps2: float | None = None
+    range_mps2: float | None = None
+    noise_mps2: float | None = None
+    place_std_m: float | None = None
+    delay_s: float | None = None
+    delay_std_s: float | None = None
+    pass_band_hz: tuple[float, float] | None = None
+    places_by: str | None = None
+    vehicle: str | None = None
+    source: str | None = None
+
+
+UNKNOWN = RecordFacts()
+"""Nothing is known of the record."""
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """One drive over one road, evenly sampled: arrays (n,).
@@ -28,6 +58,7 @@ class Run:
     speed_mps        [m/s]
     track            the road
     skip_s           how much of the beginning is left out [s]
+    facts            what is known of the record
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -39,6 +70,7 @@ class Run:
     speed_mps: Array
     track: Track
     skip_s: float = SKIP_S
+    facts: RecordFacts = UNKNOWN
 
     def __post_init__(self) -> None:
         if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:

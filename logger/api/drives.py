@@ -40,6 +40,7 @@ class Run(drive_file.Drive, Shown):
     distance_m     where the front tires stand on the profile [m]
     lat_deg, lon_deg    None where they were not recorded
     usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
+    facts          what is known of the record
     profile        the road that was driven; None: not known
     """
 

@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from drivers.dump import open_dump
 from logger.errors import BadInput
+from logger.runs import RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
 from logger.store.formats.profile_file import Profile, read_places, read_profile
-from logger.store.formats.run_file import RUN, RecordFacts, source_of, write_run_facts
+from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
 
 def _make_room(folders: list[Path], dump: Path, out: Path) -> None:
     """Take away the runs that were made of a dump of this name before; BadInput where a folder holds anything else."""
-    earlier = [one.parent for one in out.glob(f"*/{RUN}") if source_of(one.parent) == dump.name]
+    earlier = [one.parent for one in out.glob(f"*/{RUN}") if read_run_facts(one.parent).source == dump.name]
     for folder in folders:
         if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise BadInput(f"{folder}: expected an empty folder for a run of {dump}, found the run of something else")
@@ -370,9 +371,10 @@ def _written(folder: Path, drive: _Drive, recorded: _Recorded, measured: Measure
     range_g = sensor.description.get("range_g")
     by_road = None if found is None else found.by_road
     write_run_facts(folder, RecordFacts(
-        sensor.sensor.step_mps2, range_g and range_g * STANDARD_GRAVITY_MPS2, _noise_mps2(recorded), place_std_m,
-        receiver.delay_s, receiver.std_s, {None: None, True: "road", False: "receiver"}[by_road],
-        recorded.model.vehicle.name if by_road else None, source))
+        step_mps2=sensor.sensor.step_mps2, range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2,
+        noise_mps2=_noise_mps2(recorded), place_std_m=place_std_m, delay_s=receiver.delay_s, delay_std_s=receiver.std_s,
+        places_by={None: None, True: "road", False: "receiver"}[by_road],
+        vehicle=recorded.model.vehicle.name if by_road else None, source=source))
     metres = float(np.ptp(drive.distance_m))
     gaps = int(np.count_nonzero(np.diff((drive.usable == drive_file.NO_READING).astype(int)) == 1))
     return ExtractedRun(folder, len(drive.time_s) / RATE_HZ, metres, None if found is None else metres, place_std_m,

@@ -80,7 +80,8 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
-                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track)
+                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track,
+                facts=drive.facts)
             for part in parts]
 
 

@@ -17,10 +17,12 @@ import numpy.typing as npt
 from logger.errors import BadInput
 from logger.files import naming, read_bounded
 from logger.profiles.track import Track
+from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats.csv_table import parse_columns
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import Profile, read_profile
 from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, check_times, even_rate_hz
+from logger.store.formats.run_file import read_run_facts
 
 Array = npt.NDArray[np.float64]
 
@@ -49,6 +51,7 @@ class Drive:
     distance_m     where the front tires stand on the track [m]
     lat_deg, lon_deg    None where they were not recorded
     usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
+    facts          what is known of the record
     """
 
     path: Path
@@ -60,6 +63,7 @@ class Drive:
     lat_deg: Array | None
     lon_deg: Array | None
     usable: Array | None = field(default=None, kw_only=True)
+    facts: RecordFacts = field(default=UNKNOWN, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,7 @@ class DriveOnRoad(Drive):
 
 
 def read_run(folder: Path | str) -> DriveOnRoad:
-    """Read a folder with ``drive.csv`` and ``profile.csv``.
+    """Read a folder with ``drive.csv`` and ``profile.csv``, and ``run.yaml`` if there is one.
 
     Times come back on the even grid that their digits are a rounding of.
 
@@ -79,7 +83,7 @@ def read_run(folder: Path | str) -> DriveOnRoad:
     path = Path(folder)
     if not path.is_dir():
         raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE}")
-    drive = replace(read_drive(path / DRIVE), path=path)
+    drive = replace(read_drive(path / DRIVE), path=path, facts=read_run_facts(path))
     return DriveOnRoad(**vars(drive), track=track_of(read_profile(path / PROFILE)))
 
 
