@@ -101,6 +101,7 @@ def as_recorded(accel: np.ndarray) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(accel) * gain, len(accel))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WEIGHTINGS)
 def test_sections_at_100_hz_keep_magnitude_and_phase(
     name: str, body_acceleration: Callable[[float, int], np.ndarray]

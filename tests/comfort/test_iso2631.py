@@ -97,6 +97,7 @@ def per_window(weighted: np.ndarray, running: np.ndarray, speed_mps: float) -> n
     )
 
 
+@pytest.mark.slow
 def test_the_stream_agrees_with_the_exact_weighting_window_by_window(
     body_acceleration: Callable[[float, int], np.ndarray]
 ) -> None:

@@ -25,6 +25,7 @@ def correlation() -> np.ndarray:
     return np.exp(-lag_s / 0.04) * np.cos(2 * np.pi * 8.0 * lag_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "level"), [(0.3, 0.1), (0.1, 0.3), (0.0, 0.2)])
 def test_sums_are_those_of_drawn_paths(scale: float, level: float) -> None:
     std = level * np.linspace(0.7, 1.3, COUNT)
@@ -47,6 +48,7 @@ def test_a_ride_known_exactly_has_the_plain_figures_and_no_error() -> None:
     assert found.a_w.std == found.vdv.std == found.mtvv.std == 0.0
 
 
+@pytest.mark.slow
 @given(mean=st.floats(1e-4, 10.0), relative=st.floats(0.01, 3.0), degree=st.sampled_from([2, 4]))
 @settings(max_examples=60)
 def test_root_of_a_gamma_variable(mean: float, relative: float, degree: int) -> None:

@@ -75,6 +75,7 @@ def rows_of(ridelog: Path, dump: Path, out: Path, car: Path) -> list[dict[str, s
     return [row for path in sorted(out.glob("*.csv")) for row in csv.DictReader(path.read_text("utf-8").splitlines())]
 
 
+@pytest.mark.slow
 def test_the_service_takes_them_too(ridelog: Path, short_dump: Path, tmp_path: Path) -> None:
     """A gain is taken off; a speed that is recorded too high makes the windows shorter, not others."""
     plain = rows_of(ridelog, short_dump, tmp_path / "a", file_of(tmp_path, "[]"))

@@ -84,6 +84,7 @@ def test_a_dump_becomes_a_run_on_the_line_s_own_distance(place: Path, drive: Dri
     assert "noise_mps2" not in facts["sensor"]  # nobody measured it
 
 
+@pytest.mark.slow
 def test_the_lab_reads_what_was_extracted(place: Path, tmp_path: Path) -> None:
     assert call(place / "town.dump", "--out", tmp_path, "--profile", place / "line.csv").returncode == 0
     done = subprocess.run(["ridelog", "compare", "--json", "--vehicle", "rav4-2009", str(tmp_path / "town")],
@@ -138,6 +139,7 @@ def changed(place: Path, folder: Path, keep: object) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, tmp_path: Path) -> None:
     (tmp_path / "mirrored.csv").write_text(line(drive, mirrored=True))
     header, *rows = line(drive).splitlines()
@@ -164,6 +166,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: Drive, t
     assert call(dump, "--out", tmp_path / "file").returncode == 2
 
 
+@pytest.mark.slow
 def test_a_serial_sensor_and_a_car_that_halts_for_long(tmp_path: Path) -> None:
     plan = replace(PLAN, sensor="lines", noise_mps2=0.02, speed_knots=(
         (0, 0), (3, 0), (12, 12), (35, 12), (45, 0), (380, 0), (390, 12), (420, 12), (425, 12)))

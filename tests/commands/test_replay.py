@@ -37,6 +37,7 @@ def replayed(ridelog: Path, short_dump: Path, tmp_path_factory: pytest.TempPathF
     return folder, done.stdout
 
 
+@pytest.mark.slow
 def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path) -> None:
     done = call(ridelog, "demo", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr

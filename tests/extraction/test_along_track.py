@@ -35,6 +35,7 @@ def test_motion_is_nearer_to_the_truth_than_the_fixes_and_knows_their_noise(rate
     assert np.std(motion.state[:, 1] - speed) < 0.95 * NOISE_MPS
 
 
+@pytest.mark.slow
 def test_errors_of_the_distance_are_as_large_as_they_are_said_to_be() -> None:
     off = []
     for seed in range(12):

@@ -77,6 +77,7 @@ def test_the_drive_makes_rows(expected: list[str]) -> None:
     assert expected[-1] == "close"
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 1000))
 def test_cutting_serial_chunks_anywhere_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
@@ -91,6 +92,7 @@ def test_cutting_the_chunks_of_a_serial_sensor_changes_nothing(
     assert rows_of(lines_drive.header, cut_anywhere(lines_drive.events, seed)).rows == lines_rows.rows
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 1000))
 def test_waking_at_any_time_changes_nothing(short_drive: Drive, expected: list[str], seed: int) -> None:
@@ -215,6 +217,7 @@ def with_outages(events: list[Event], seed: int) -> list[Event]:
     return kept
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(st.integers(0, 1000), st.sampled_from(["all", "nmea", "bma220"]), st.sampled_from([0, 10, 60]))
 def test_time_in_which_nothing_is_heard_may_pass_in_one_step_or_in_many(

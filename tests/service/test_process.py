@@ -131,6 +131,7 @@ def rows_in(folder: Path, pattern: str) -> list[str]:
     return [line for path in sorted(folder.glob(pattern)) for line in path.read_text().splitlines()[1:]]
 
 
+@pytest.mark.slow
 def test_recorded_live_and_replayed_gives_the_same_bytes(
     ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
@@ -149,6 +150,7 @@ def test_recorded_live_and_replayed_gives_the_same_bytes(
     subprocess.run([ridelog, "verify", service.log], check=True, capture_output=True)
 
 
+@pytest.mark.slow
 def test_kill_loses_no_finished_row_and_the_next_start_repairs(
     ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
@@ -186,6 +188,7 @@ def test_gps_pulled_and_put_back(
     assert service.terminate() == 0
 
 
+@pytest.mark.slow
 def test_accelerometer_missing_at_start_while_the_rest_goes_on(
     gps: SerialDevice, start: Callable[[], Service], tmp_path: Path
 ) -> None:
@@ -213,6 +216,7 @@ def test_a_sensor_beside_the_middle_line_is_told_of(start: Callable[[], Service]
     assert service.errors.read_text().count(notice) == 1
 
 
+@pytest.mark.slow
 def test_status_for_a_person_and_for_a_program(
     ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
@@ -249,6 +253,7 @@ def test_wrong_settings_are_refused_with_their_line(
     assert word in done.stderr
 
 
+@pytest.mark.slow
 def test_an_axis_that_does_not_feel_the_earth_is_noticed(
     gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:
@@ -261,6 +266,7 @@ def test_an_axis_that_does_not_feel_the_earth_is_noticed(
     assert service.terminate() == 0
 
 
+@pytest.mark.slow
 def test_a_second_service_on_the_same_folder_is_refused(
     ridelog: Path, gps: SerialDevice, start: Callable[[], Service], short_dump: Path, tmp_path: Path
 ) -> None:

@@ -51,6 +51,7 @@ def test_rows_with_many_lost_lines_are_right_or_flagged(rate_hz: int, share: flo
     assert found == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [200, 250])
 def test_single_lines_lost_by_a_fast_sensor_are_seen(rate_hz: int) -> None:
     """A step of 5 ms or less: seen where the arrivals jitter less. Beside it, chance leaves 0.6 % of error."""
