@@ -13,24 +13,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.api.model_checks import check_model, predicted
 from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
-from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.compare import Comparison
     from logger.lab.diagnosis import Diagnosis
     from logger.lab.likelihood.posterior import Posterior
     from logger.lab.selection.add_effect import AddedEffects
-    from logger.runs import Array
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
 
 _BAND_DEVIATIONS = 1.6  # a band of 4 % either way is taken for a deviation of 2.5 %
-_LEAST_MPS2 = 1e-4
-_ALIKE, _NEAR = 0.8, 0.3
-_UNITS_MPS2 = {"g": STANDARD_GRAVITY_MPS2, "thousandths of g": STANDARD_GRAVITY_MPS2 / 1000, "mm/s2": 0.001}
 _SLOW = "expect ten minutes or more for each minute driven"
 _SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is told is computed with the usual ones
 
@@ -78,7 +74,7 @@ class Bench:
 
         check_on(self.model.vehicle, one, self.two_tracks)
         if one.file is not None and not slow([one.effect]):
-            _predicted(one.file, self.model, self.runs, [one])
+            predicted(one.file, self.model, self.runs, [one])
 
     @property
     def files_read(self) -> list[Path]:
@@ -196,19 +192,21 @@ class Bench:
 
 
 def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str], numbers: float,
-             searches: str | None = None, warn: Tell = unsaid) -> Bench:
+             searches: str | None = None, warn: Tell = unsaid, anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them.
 
     word        by which the user knows the vehicle
     numbers     as ``deviation_of``
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
-    warn        told where it will take long
+    warn        told where it will take long, and what was wrong where the user goes on ``anyway``
     """
     effects, files = known_effects(model, effect_files)
     if searches is not None:
         require_compiler(searches, effects.values())
     found = Bench(word, model, runs, effects, files, numbers)
-    check_model(word, model, runs, warn)
+    if words := slow_words([one.effect for one in model.effects]):
+        warn(words)
+    check_model(word, model, runs, warn, anyway)
     _try_own(found, effect_files)
     return found
 
@@ -244,63 +242,6 @@ def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[
     if unknown := set(names) - set(effects):
         raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
     return {name: effects[name] for name in sorted(names)}
-
-
-def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Tell = unsaid) -> None:
-    """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
-    the road moves no car, or the sensor was upside down or reads in another unit.
-
-    word    by which the user knows the vehicle
-    warn    told first where it takes long
-    """
-    for run in runs.runs:
-        for one in model.effects:
-            why = one.effect.obstacle(model.vehicle, run.two_tracks)
-            if why is not None:
-                raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
-    if words := slow_words([one.effect for one in model.effects]):
-        warn(words)
-    _check_sensor(runs, _predicted(word, model, runs, model.effects))
-
-
-def _check_sensor(runs: SimulatedRuns, predictions: Sequence[Array]) -> None:
-    """Raise BadInput where no road moves the car, or what was measured is the model upside down or in another unit."""
-    import numpy as np
-
-    moves = False
-    for run, prediction in zip(runs.runs, predictions, strict=True):
-        measured, model = run.measured_mps2[run.first:], prediction[run.first:]
-        power = float(model @ model)
-        if power < _LEAST_MPS2**2 * len(model):
-            continue
-        moves = True
-        both = float(measured @ model)
-        alike = both / float(np.sqrt((measured @ measured) * power))
-        if alike < -_ALIKE:
-            raise BadInput(f"{run.name}: expected accelerations up positive, found them upside down: turned over, they "
-                           f"go with the model (correlation {-alike:.2f})")
-        if alike > _ALIKE:
-            unit = next((unit for unit, size in _UNITS_MPS2.items() if abs(both / power * size - 1) < _NEAR), None)
-            if unit is not None:
-                raise BadInput(f"{run.name}: expected accelerations in m/s2, found {both / power:.3g} times what the "
-                               f"model says: they seem to be in {unit}")
-    if not moves:
-        raise BadInput(f"{runs.runs[0].name}: expected a drive over a road that moves the car; where it was the "
-                       "profile is flat, or it stood still")
-
-
-def _predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
-    """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
-    from logger.vehicle.compose import bounded, compose
-
-    try:
-        predictions = runs.predict(compose(model.vehicle, effects))
-    except ValueError as error:
-        raise BadInput(f"{word}: {error}") from None
-    if not bounded(predictions):
-        names = " and ".join(one.effect.name for one in effects)
-        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
-    return predictions
 
 
 def slow(effects: Iterable[Effect]) -> list[str]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from logger.api.bench import slow_words, unsaid
 from logger.api.drives import Run, read_run
+from logger.api.model_checks import check_roads
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
@@ -52,6 +53,7 @@ class Question:
     robust          single wild readings count less
     tries           further starts
     waviness        of roads that were not measured
+    anyway          go on where a run does not seem to be of its road
     said            how an option is written in a complaint
     """
 
@@ -64,6 +66,7 @@ class Question:
     robust: bool = False
     tries: int = 0
     waviness: float = USUAL_WAVINESS
+    anyway: bool = False
     said: str = "{}"
 
     def wrong(self, option: str, words: str) -> BadInput:
@@ -107,7 +110,7 @@ def identify(
     start: Mapping[str, float] | None = None, bounds: Mapping[str, tuple[float, float]] | None = None,
     obstacles: Mapping[str, Mapping[str, float]] | None = None, noise: str = "auto", low_pass_hz: float | None = None,
     robust: bool = False, tries: int = 0, skip_s: float = SKIP_S, road: str = "measured",
-    waviness: float = USUAL_WAVINESS,
+    waviness: float = USUAL_WAVINESS, anyway: bool = False,
 ) -> Identification:
     """Find numbers of a vehicle, of its effects, and of what is not known of the road, each with its standard error.
 
@@ -124,6 +127,7 @@ def identify(
     low_pass_hz   what lies above is left out [Hz]; ``skip_s`` the beginning of each run [s]
     robust        let single wild readings count less (Huber's loss); ``tries`` so many further starts
     road          "measured"; "unmeasured": each run has a road of its own, of ``waviness``; or "same": all are over one
+    anyway        go on where a run does not seem to be of its road
 
     Raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not tell. Source:
     L. Ljung, System Identification (1999), chapters 7 and 9.
@@ -145,7 +149,8 @@ def identify(
     drives = [one if isinstance(one, Run) else read_run(one) for one in given]
     if not drives:
         raise BadInput("identify: expected a run, found none")
-    question = Question(free, start or {}, bounds or {}, obstacles or {}, noise, low_pass_hz, robust, tries, waviness)
+    question = Question(free, start or {}, bounds or {}, obstacles or {}, noise, low_pass_hz, robust, tries, waviness,
+                        anyway)
     flat_will_do = bool(obstacles) or road != "measured"
     if bare := [drive for drive in drives if drive.profile is None and not flat_will_do]:
         raise BadInput(f"{bare[0].path}: expected a run with the profile that it was driven on")
@@ -197,8 +202,11 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     from logger.identification.session import UnusableRun, error_before, upright_fit
     from logger.identification.shared_road_covariance import with_common_roughness
     from logger.report.identification_text import as_json, common_words, lines, tests
+    from logger.simulation.simulated_runs import SimulatedRuns
 
     _check_effects(given, word, records, question, warn)
+    if not question.obstacles:
+        check_roads(word, given, SimulatedRuns(records), warn, question.anyway)
     road, unplaced = _road(question)
 
     def model_of_records(of: list[Record]) -> DriveModel:

@@ -81,12 +81,12 @@ class LabStory(CommandResult):
 def lab(
     vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
+    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid, anyway: bool = False,
 ) -> LabStory:
     """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is, six effects at
     most. It takes minutes, and the compiler of the ``lab`` extra.
 
-    vehicle, runs, tolerance    as in ``compare``
+    vehicle, runs, tolerance, anyway    as in ``compare``
     out             folder for a vehicle file of each step (``vehicle-1.yaml``) and the page ``story.html``
     ask             given the name of an effect that was found missing, gives that of the one to be added, or None for
                     none; without it all that is missing is added
@@ -104,7 +104,8 @@ def lab(
     from logger.report.session_text import as_json, ending, steps
 
     place = Path(out)
-    bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab")
+    bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab",
+                       anyway=anyway)
     bench = replace(bench, effects=among(bench.effects, candidates))
     make_ready(bench, place)
     story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress))

@@ -40,6 +40,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
+from logger.commands.lab_model import add_anyway
 from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
@@ -87,6 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robust", action="store_true", help="let single wild readings count less (Huber's loss)")
     parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
                         help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
+    add_anyway(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the vehicle with the fitted values")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
@@ -154,7 +156,7 @@ def _question(args: argparse.Namespace) -> Question:
         {name: values[0] for name, values in (_numbers(text, "--start", 1) for text in args.start)},
         {name: (values[0], values[1]) for name, values in (_numbers(text, "--bounds", 2) for text in args.bounds)},
         obstacles, args.noise, args.low_pass, args.robust, args.tries,
-        USUAL_WAVINESS if args.waviness is None else args.waviness, "--{}")
+        USUAL_WAVINESS if args.waviness is None else args.waviness, args.anyway, "--{}")
 
 
 def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:

@@ -19,14 +19,21 @@ if TYPE_CHECKING:
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
-    """RUN..., --vehicle, --tolerance, --effect-file and --json."""
+    """RUN..., --vehicle, --tolerance, --effect-file, --anyway and --json."""
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
                         help="an effect of your own to be tried as well; may repeat")
+    add_anyway(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+
+
+def add_anyway(parser: argparse.ArgumentParser) -> None:
+    """--anyway."""
+    parser.add_argument("--anyway", action="store_true",
+                        help="go on where a run does not seem to be of this road, or in these units")
 
 
 def add_tolerance(parser: argparse.ArgumentParser) -> None:
@@ -38,11 +45,11 @@ def add_tolerance(parser: argparse.ArgumentParser) -> None:
 
 def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
     """The model, runs and effects of a command line, as ``bench_of``."""
-    return bench_from(args.vehicle, args.runs, args.effect_file, args.tolerance, searches)
+    return bench_from(args.vehicle, args.runs, args.effect_file, args.tolerance, searches, args.anyway)
 
 
 def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str] = (),
-               tolerance: float = USUAL_TOLERANCE, searches: str | None = None) -> Bench:
+               tolerance: float = USUAL_TOLERANCE, searches: str | None = None, anyway: bool = False) -> Bench:
     """The same, where they are not of a command line."""
     from logger.api.bench import bench_of, deviation_of
     from logger.api.run_checks import lab_runs
@@ -50,7 +57,7 @@ def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str
     from logger.store.formats.vehicle_file import read_model
 
     numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
-    return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned)
+    return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned, anyway)
 
 
 def warned(words: str) -> None:

@@ -1,0 +1,163 @@
+"""Whether a model and runs belong together, before anything is concluded from them: wrong input is no physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import log
+from typing import TYPE_CHECKING
+
+from logger.errors import BadInput
+from logger.units import STANDARD_GRAVITY_MPS2
+
+if TYPE_CHECKING:
+    from logger.lab.road_match import RoadMatch
+    from logger.runs import Array, Run
+    from logger.simulation.simulated_runs import SimulatedRuns
+    from logger.store.formats.vehicle_file import Model
+    from logger.vehicle.compose import Car
+    from logger.vehicle.effect import Chosen
+
+_LEAST_MPS2 = 1e-4
+_NEAR = 0.3
+_FOOT_M = 0.3048
+_RECORD, _PROFILE = "the record seems to be", "the profile seems to be"
+# Measured / model, where one of them is in another unit.
+_UNITS = (
+    (_RECORD, "g", 1 / STANDARD_GRAVITY_MPS2), (_RECORD, "thousandths of g", 1000 / STANDARD_GRAVITY_MPS2),
+    (_RECORD, "mm/s2", 1000.0), (_RECORD, "ft/s2", 1 / _FOOT_M),
+    (_PROFILE, "mm", 0.001), (_PROFILE, "cm", 0.01), (_PROFILE, "inches", _FOOT_M / 12), (_PROFILE, "feet", _FOOT_M),
+)
+_SENSOR_GAIN = (0.2, 5.0)
+"""Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
+ANYWAY = "--anyway goes on"
+
+
+def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None],
+                anyway: bool = False) -> None:
+    """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
+    or the road moves no car; and where the sensor was upside down, a run or its profile is in another unit, or the road
+    is another one, unless the user wants to go on ``anyway`` (then it is a warning).
+
+    word    by which the user knows the vehicle
+    """
+    from logger.vehicle.compose import compose
+
+    for run in runs.runs:
+        for one in model.effects:
+            why = one.effect.obstacle(model.vehicle, run.two_tracks)
+            if why is not None:
+                raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
+    predictions = predicted(word, model, runs, model.effects)
+    if not any(map(_moves, runs.runs, predictions)):
+        raise BadInput(f"{runs.runs[0].name}: expected a drive over a road that moves the car; where it was the "
+                       "profile is flat, or it stood still")
+    car = compose(model.vehicle, model.effects)
+    matches, band_hz = _matches(runs, predictions, car)
+    _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
+         warn, anyway)
+
+
+def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
+    """Raise BadInput where a run was driven over another road than that of its profile, as ``check_model``: all that
+    can be asked where the vehicle's numbers may be far off."""
+    from logger.vehicle.compose import compose
+
+    car = compose(model.vehicle, model.effects)
+    matches, band_hz = _matches(runs, predicted(word, model, runs, model.effects), car)
+    _say(_other_roads(runs, matches, car, band_hz), warn, anyway)
+
+
+def predicted(word: str, model: Model, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
+    """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
+    from logger.vehicle.compose import bounded, compose
+
+    try:
+        predictions = runs.predict(compose(model.vehicle, effects))
+    except ValueError as error:
+        raise BadInput(f"{word}: {error}") from None
+    if not bounded(predictions):
+        names = " and ".join(one.effect.name for one in effects)
+        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+    return predictions
+
+
+def _say(complaints: Iterable[str], warn: Callable[[str], None], anyway: bool) -> None:
+    """The first complaint as BadInput, or all of them as warnings."""
+    for complaint in complaints:
+        if not anyway:
+            raise BadInput(f"{complaint} ({ANYWAY})")
+        warn(complaint)
+
+
+def _matches(runs: SimulatedRuns, predictions: Sequence[Array],
+             car: Car) -> tuple[list[RoadMatch], tuple[float, float]]:
+    """How well each run goes with its road, and in which band [Hz]."""
+    from logger.lab.road_match import bounce_band_hz, road_match
+    from logger.vehicle.models import structure_of
+    from logger.vehicle.modes import undamped_frequencies_hz
+
+    structure = structure_of(car.vehicle)
+    band_hz = bounce_band_hz(undamped_frequencies_hz(structure)[: -len(structure.wheels)])
+    return [road_match(run, one, band_hz) for run, one in zip(runs.runs, predictions, strict=True)], band_hz
+
+
+def _moves(run: Run, prediction: Array) -> bool:
+    model = prediction[run.first:]
+    return float(model @ model) >= _LEAST_MPS2**2 * len(model)
+
+
+def _other_ways_up(runs: SimulatedRuns, matches: Sequence[RoadMatch]) -> Iterator[str]:
+    """Which runs are upside down."""
+    for run, match in zip(runs.runs, matches, strict=True):
+        if match.is_upside_down:
+            yield (f"{run.name}: expected accelerations up positive, found them upside down: turned over, they go with "
+                   f"the model (correlation {match.turned:.2f})")
+
+
+def _other_units(runs: SimulatedRuns, matches: Sequence[RoadMatch]) -> Iterator[str]:
+    """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be is a unit only
+    if it is one, and all runs agree."""
+    clear = [(run.name, one.gain) for run, one in zip(runs.runs, matches, strict=True) if one.is_clear]
+    for name, gain in clear:
+        what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
+        of_a_sensor = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
+        if not of_a_sensor or all(abs(one / size - 1) < _NEAR for _, one in clear):
+            yield (f"{name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the model "
+                   f"says: {what} in {unit}")
+
+
+def _other_roads(runs: SimulatedRuns, matches: Sequence[RoadMatch], car: Car,
+                 band_hz: tuple[float, float]) -> Iterator[str]:
+    """Which runs do not follow their road, and where they would fit."""
+    from logger.lab.road_match import pooled
+
+    strangers = [k for k, one in enumerate(matches) if one.is_refuted]
+    if not strangers and pooled(matches).is_refuted:
+        strangers = list(range(len(matches)))
+    for k in strangers:
+        found = matches[k]
+        yield (f"{runs.runs[k].name}: expected a drive over the road of its profile, found one that does not follow "
+               f"it (correlation {found.correlation:.2f} around the body's bounce, by chance up to "
+               f"{found.chance:.2f}): {_advice(runs.runs[k], car, band_hz)}")
+
+
+def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
+    """Where a run that does not follow its road would fit."""
+    from logger.lab.road_match import better_placement
+    from logger.profiles.track import Track
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    track = run.track
+    reverse = Track(track.spacing_m, track.elevation_m[::-1].copy(), track.start_m)
+    both = {False: SimulatedRuns([run]), True: SimulatedRuns([replace(run, track=reverse)])}
+
+    def predict(farther_m: Array, backwards: bool) -> Array:
+        return both[backwards].predict(car, [farther_m], rough=True)[0]
+
+    found = better_placement(run, predict, band_hz, (track.start_m, track.end_m))
+    if found is None:
+        return "it fits nowhere on it. Is it the profile of another road, or another drive's record?"
+    if found.backwards:
+        return "it follows the profile read backwards. Was it driven in the other direction?"
+    return f"it fits about {found.farther_m:+.0f} m farther along. Do distances begin where the profile does?"

@@ -1,0 +1,61 @@
+"""A drive over another road is refused before anything is concluded from it, by every command that needs the road."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.profiles.track import Track
+from logger.store.formats.drive_file import read_run, write_profile
+
+from ..support.lab.runs_with_effects import write_runs
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Runs of half a minute, of a car whose model has all, each on a road of its own."""
+    return list(write_runs(tmp_path_factory.mktemp("runs"), [], lasts_s=30.0))
+
+
+COMMANDS = {
+    "compare": ["compare"], "diagnose": ["diagnose"], "lab": ["lab", "--out", "lab"],
+    "add-effect": ["add-effect", "sensor_gain", "--out", "new.yaml"],
+    "identify": ["identify", "--free", "sprung_mass_kg"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_another_road(command: str, runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    wrong = with_track(runs[0], tmp_path, read_run(runs[1]).track)
+    with pytest.raises(BadInput, match=r"found one that does not follow it .* it fits nowhere on it"):
+        main([*COMMANDS[command], "--vehicle", "rav4-2009", wrong])
+    assert not (tmp_path / "new.yaml").exists() and not (tmp_path / "lab").exists()
+
+
+def test_the_other_direction_and_another_beginning(runs: list[str], tmp_path: Path) -> None:
+    own = read_run(runs[0]).track
+    for track, words in (
+        (Track(own.spacing_m, own.elevation_m[::-1].copy(), own.start_m), "read backwards"),
+        (Track(own.spacing_m, own.elevation_m, own.start_m - 60.0), r"-\d+ m farther along"),
+        (Track(own.spacing_m, 1000 * own.elevation_m, own.start_m), "the profile seems to be in mm"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            main(["compare", "--vehicle", "rav4-2009", with_track(runs[0], tmp_path, track)])
+
+
+def test_who_wants_to_go_on_is_warned(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = read_run(runs[0]).track
+    wrong = with_track(runs[0], tmp_path, Track(own.spacing_m, np.roll(own.elevation_m, 900), own.start_m))
+    assert main(["compare", "--vehicle", "rav4-2009", wrong, "--anyway"]) == 0
+    said = capsys.readouterr()
+    assert "does not follow it" in said.err and "error" in said.out
+
+
+def with_track(run: str, folder: Path, track: Track) -> str:
+    """A copy of a run on another track."""
+    (folder / "drive.csv").write_bytes((Path(run) / "drive.csv").read_bytes())
+    write_profile(folder / "profile.csv", track)
+    return str(folder)

@@ -1,0 +1,108 @@
+"""Wrong input is refused before any effect is sought, and right input never is.
+
+    python -m tests.validation.wrong_input --cases 50
+
+Each case is one to four runs of the examination's simulator, with nothing, one effect, two, or one that is off the list
+missing, or with distances that wander. As it is it must pass; with the profile of another case, with its own read
+backwards or beginning 50 m later, with elevations in mm or feet, and with accelerations in g or upside down, it must
+not. Printed are the shares beside the goals. Seeds as in ``examine``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from logger.api.bench import unsaid
+from logger.api.model_checks import check_model
+from logger.api.run_checks import lab_runs
+from logger.errors import BadInput
+from logger.profiles.track import Track
+from logger.runs import Run
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.store.formats.vehicle_file import Model, read_model
+from logger.units import STANDARD_GRAVITY_MPS2
+
+from .cases.case_files import write_case
+from .cases.random_case import case
+from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
+
+KINDS = ("none", "one", "two", "outsider", "wandering")
+Change = Callable[[Run, Track], Run]
+"""A run made wrong, by the road of another case."""
+
+
+def _with_track(change: Callable[[Track, Track], Track]) -> Change:
+    return lambda run, other: replace(run, track=change(run.track, other))
+
+
+def _scaled(factor: float) -> Change:
+    return _with_track(lambda own, _: Track(own.spacing_m, own.elevation_m * factor, own.start_m))
+
+
+WRONG: dict[str, Change] = {
+    "another road": _with_track(lambda own, other: Track(other.spacing_m, other.elevation_m, own.start_m)),
+    "read backwards": _with_track(lambda own, _: Track(own.spacing_m, own.elevation_m[::-1].copy(), own.start_m)),
+    "50 m later": _with_track(lambda own, _: Track(own.spacing_m, own.elevation_m, own.start_m + 50.0)),
+    "in mm": _scaled(1000.0), "in feet": _scaled(1 / 0.3048),
+    "in g": lambda run, _: replace(run, measured_mps2=run.measured_mps2 / STANDARD_GRAVITY_MPS2),
+    "upside down": lambda run, _: replace(run, measured_mps2=-run.measured_mps2),
+}
+
+
+def main() -> int:
+    """Print the figures; exit 1 when a goal is missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=50)
+    parser.add_argument("--first-seed", type=int)
+    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+    options = parser.parse_args()
+    first = options.first_seed or (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
+    passed: Counter[str] = Counter()
+    refused: Counter[str] = Counter()
+    others: Track | None = None
+    for number, seed in enumerate(seeds(first, options.cases, options.release)):
+        kind = KINDS[number % len(KINDS)]
+        runs, model = made(kind, seed)
+        for words, change in ({"right": None} | (WRONG if others is not None else {})).items():
+            wrong = runs if change is None or others is None else [change(run, others) for run in runs]
+            complaint = refusal(wrong, model)
+            (refused if complaint else passed)[words] += 1
+            if (complaint is None) != (change is None):
+                print(f"{kind} {seed}, {words}: {complaint or 'not refused'}", flush=True)
+        others = runs[0].track
+    return max(list(_told(refused, passed)))
+
+
+def made(kind: str, seed: int) -> tuple[list[Run], Model]:
+    """Runs and the vehicle of a case, as the lab reads them."""
+    with tempfile.TemporaryDirectory() as name:
+        write_case(case(kind, seed), Path(name))
+        folders = sorted(path.parent for path in Path(name).glob("*/drive.csv"))
+        return list(lab_runs(folders).runs), read_model(Path(name) / "vehicle.yaml")
+
+
+def refusal(runs: list[Run], model: Model) -> str | None:
+    """Why a model and runs are refused; None: they are not."""
+    try:
+        check_model("vehicle.yaml", model, SimulatedRuns(runs), unsaid)
+    except BadInput as error:
+        return str(error)
+    return None
+
+
+def _told(refused: Counter[str], passed: Counter[str]) -> Iterator[int]:
+    """Print the figures; 1 for each goal that is missed."""
+    print(f"right: {refused['right']} of {refused['right'] + passed['right']} refused (goal 0)")
+    yield int(refused["right"] > 0)
+    for words in WRONG:
+        print(f"{words}: {refused[words]} of {refused[words] + passed[words]} refused (goal all)")
+        yield int(passed[words] > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
