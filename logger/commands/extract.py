@@ -1,4 +1,4 @@
-"""Make runs for the lab out of what the box in the car recorded.
+"""Make runs for the lab out of what the box in the car recorded, or a phone.
 
 Each continuous drive of a dump becomes a folder DIR/NAME, DIR/NAME-2, ... with drive.csv and run.yaml. With --profile,
 a measured line with lat_deg,lon_deg, only what was driven on it is kept, laid on the line's own distance: first by the
@@ -7,7 +7,15 @@ positions, then by the road as the car felt it; profile.csv lies beside it then.
   ridelog extract drive.dump.gz --out runs --profile line.csv
   ridelog diagnose --vehicle mycar.yaml runs/*
 
-Exit status 1: one of several dumps could not be used; it is named, and the others are done.
+With --csv, recordings of phones and other loggers: a CSV file, or the folder of one recording with several. Exports of
+phyphox, Sensor Logger, SensorLog, AndroSensor and Physics Toolbox are recognised; name the columns of others. The phone
+may lie at any angle: gravity tells up. Uneven and repeated samples are repaired.
+
+  ridelog extract --csv phyphox-export/ --out runs
+  ridelog extract --csv ride.csv --location gps.csv --out runs
+  ridelog extract --csv log.csv --out runs --columns "t=time:ms,x=ax:g,y=ay:g,z=az:g,lat=lat,lon=lon,speed=v:km/h"
+
+Exit status 1: one of several recordings could not be used; it is named, and the others are done.
 """
 
 from __future__ import annotations
@@ -18,60 +26,124 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from logger.commands.numbers import add_number
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.printable import printable
 
 if TYPE_CHECKING:
-    from logger.api.extraction import Extracted
+    from collections.abc import Callable
+
+    from logger.api.extracted_runs import Extracted
+
+CSV_OPTIONS = ("columns", "location", "up", "sign", "range", "speed")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog extract``."""
-    parser.add_argument("dumps", nargs="+", type=Path, metavar="DUMP", help="recorded drive (.dump or .dump.gz)")
+    parser.add_argument("dumps", nargs="*", type=Path, metavar="DUMP", help="recorded drive (.dump or .dump.gz)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the runs")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings of those drives")
     parser.add_argument("--profile", type=Path, metavar="PROFILE.csv",
                         help="the measured line that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,"
                              "lon_deg; places may be empty in most rows")
+    parser.add_argument("--vehicle", metavar="NAME|FILE",
+                        help="the car by whose model the road is recognised, instead of the one that the settings or "
+                             "the recording name")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    group = parser.add_argument_group("recordings of phones and other loggers")
+    group.add_argument("--csv", nargs="+", type=Path, default=[], metavar="FILE|FOLDER",
+                       help="recordings, in place of DUMP; a folder holds the files of one recording")
+    group.add_argument("--location", type=Path, metavar="FILE.csv",
+                       help="the file with speed or place of the one recording, by the same clock")
+    group.add_argument("--columns", metavar="ROLE=COLUMN[:UNIT],...",
+                       help="which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, "
+                            "mg), gx gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at "
+                            "the end of the column's name, or what gravity and the clock tell")
+    group.add_argument("--up", choices=("x", "y", "z", "-x", "-y", "-z"),
+                       help="the axis that points up, of a record from which gravity was taken out (write --up=-z)")
+    group.add_argument("--sign", choices=("+", "-"),
+                       help="-: turn the acceleration upside down, for a program that counts gravity and "
+                            "accelerations in opposite ways (write --sign=-)")
+    add_number(group, "--range", 0.5, 1000, "g", metavar="G",
+               help="range of the sensor: what reaches it is marked as clipped (default: where it is plain to see)")
+    add_number(group, "--speed", 0.5, 100, "m/s", metavar="MPS", help="the speed all the way, if none was recorded")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog extract``."""
     from drivers.errors import DriverError
-    from logger.api.extraction import extract_dump, name_of, read_measured_profile
-    from logger.commands.lab_model import on_screen, wipe
-    from logger.service.config import load_config
+    from logger.commands.lab_model import wipe
 
-    names = [name_of(one) for one in args.dumps]
-    if again := next((one for number, one in enumerate(args.dumps) if names[number] in names[:number]), None):
-        raise BadInput(f"{again}: expected dumps of different names, so that each has a folder of its own")
-    config = load_config(args.config) if args.config else None
-    measured = read_measured_profile(args.profile) if args.profile else None
+    extract_one = _of_csv(args) if args.csv else _of_dumps(args)
+    sources = args.csv or args.dumps
     done: list[Extracted] = []
-    for dump in args.dumps:
+    for source in sources:
         try:
-            found = extract_dump(dump, args.out, config, measured, on_screen())
+            found = extract_one(source)
         except (BadInput, DriverError) as error:
             wipe()
-            if len(args.dumps) == 1:
+            if len(sources) == 1:
                 raise
             print(f"ridelog: {printable(str(error))}", file=sys.stderr)
             continue
         wipe()
         done.append(found)
         if not args.json:
-            _show(dump, found)
+            _show(source, found)
     if not done:
-        raise BadInput(f"expected a dump that can be used, found none among {len(args.dumps)}")
+        raise BadInput(f"expected a {'recording' if args.csv else 'dump'} that can be used, found none among "
+                       f"{len(sources)}")
     if args.json:
+        notes = {"notes": [note for each in done for note in each.notes]} if args.csv else {}
         print(json.dumps({"runs": [one.as_json() for each in done for one in each.runs],
                           "left_out_s": sum(each.left_out_s for each in done),
-                          "torn_tail": any(each.torn_tail for each in done)}))
-    return EXIT_DONE if len(done) == len(args.dumps) else EXIT_CHECK_FAILED
+                          "torn_tail": any(each.torn_tail for each in done), **notes}))
+    return EXIT_DONE if len(done) == len(sources) else EXIT_CHECK_FAILED
 
 
-def _show(dump: Path, found: Extracted) -> None:
+def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
+    from logger.api.extracted_runs import read_measured_profile
+    from logger.api.extraction import extract_dump, name_of
+    from logger.commands.lab_model import on_screen
+    from logger.service.config import load_config
+
+    if not args.dumps:
+        raise BadInput("extract: expected a DUMP, or --csv with a recording of a phone or another logger")
+    if given := next((one for one in CSV_OPTIONS if getattr(args, one) is not None), None):
+        raise BadInput(f"extract: expected --{given} together with --csv")
+    _refuse_again(args.dumps, [name_of(one) for one in args.dumps], "dumps")
+    config = load_config(args.config) if args.config else None
+    measured = read_measured_profile(args.profile) if args.profile else None
+    return lambda dump: extract_dump(dump, args.out, config, measured, on_screen(), args.vehicle)
+
+
+def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
+    from logger.api.csv_extraction import Asked, extract_csv, run_name
+    from logger.api.extracted_runs import read_measured_profile
+    from logger.commands.lab_model import on_screen
+    from logger.service.config import load_config
+    from logger.store.formats.logger_columns import named_columns
+
+    if args.dumps:
+        raise BadInput(f"extract: expected dumps or --csv, found both ({args.dumps[0]})")
+    if args.location is not None and len(args.csv) > 1:
+        raise BadInput(f"extract: expected one recording with --location, found {len(args.csv)}")
+    _refuse_again(args.csv, [run_name(one) for one in args.csv], "recordings")
+    asked = Asked(named_columns(args.columns) if args.columns is not None else None, args.location, args.up,
+                  -1.0 if args.sign == "-" else 1.0, args.range, args.speed, args.vehicle)
+    config = load_config(args.config) if args.config else None
+    measured = read_measured_profile(args.profile) if args.profile else None
+    return lambda source: extract_csv(source, args.out, asked, config, measured, on_screen())
+
+
+def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
+    if again := next((one for number, one in enumerate(sources) if names[number] in names[:number]), None):
+        raise BadInput(f"{again}: expected {what} of different names, so that each has a folder of its own")
+
+
+def _show(source: Path, found: Extracted) -> None:
+    for note in found.notes:
+        print(f"{source}: {note}")
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
@@ -81,6 +153,6 @@ def _show(dump: Path, found: Extracted) -> None:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         print(f"{words}; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s")
     if found.left_out_s >= 1:
-        print(f"{dump}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
+        print(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:
-        print(f"{dump}: the recording was cut short; everything before the cut was used")
+        print(f"{source}: the recording was cut short; everything before the cut was used")

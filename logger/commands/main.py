@@ -28,7 +28,7 @@ VERBS = {
     "report": "make one web page of logs: map, plots, table",
     "iri": "exact IRI of a measured profile",
     "comfort": "ISO 2631 comfort and health values of an acceleration record",
-    "extract": "runs for the lab out of recorded dumps, laid on a measured line",
+    "extract": "runs for the lab out of recorded dumps, or of a phone's CSV, laid on a measured line",
     "calibrate": "what roughness a vehicle's acceleration stands for, per speed",
     "road": "make a random road, or tell the class of a measured one",
     "simulate": "what a vehicle's accelerometer would record on a road",

@@ -1,0 +1,429 @@
+"""CSV recordings of phones and other loggers into runs, as the lab reads them.
+
+Problem: such a recording has its own names, units and axes, an uneven clock, and was made by a phone that lay anyhow.
+Solution: columns are recognised or named (``store.formats.logger_columns``), the time is repaired
+(``extraction.even_samples``), gravity tells up and the unit (``extraction.levelling``); what is left is cut, laid on
+a profile and written as a dump is (``api.extracted_runs``). What cannot be known is refused, with the option that says
+it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.extracted_runs import RATE_HZ, Extracted, Fixes, MeasuredProfile, Recorded, Tell, apart, write_runs
+from logger.errors import BadInput
+from logger.runs import RecordFacts
+from logger.service.config import Config
+from logger.service.drive_readings import GridReadings
+from logger.store.formats.logger_columns import Named, Recognised, advice
+from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
+from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, PLACE, SPEED_UNITS, units_of
+from logger.units import STANDARD_GRAVITY_MPS2
+
+if TYPE_CHECKING:
+    from logger.estimation.receiver_delay import Belief
+    from logger.extraction.even_samples import EvenSamples
+
+Array = npt.NDArray[np.float64]
+
+_FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
+_CUT_S = 1.0  # to either side of a turn in the mount
+_LATEST_S = 1e5  # of later times the ten digits of a drive do not tell samples apart
+_DISORDER_S = 0.5
+_FEED_S = 10.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is said of recordings.
+
+    columns      by role; None: known layouts are recognised
+    location     the file with speed and place, where it is another one
+    up           the axis that points up, "z" or "-z", where gravity is not in the record
+    sign         -1: what comes out is turned upside down
+    range_g      of the sensor [g]; None: not known
+    speed_mps    all the way, where none was recorded [m/s]
+    vehicle      name or file, instead of the one of the settings
+    """
+
+    columns: Named | None = None
+    location: Path | None = None
+    up: str | None = None
+    sign: float = 1.0
+    range_g: float | None = None
+    speed_mps: float | None = None
+    vehicle: str | None = None
+
+
+def run_name(source: Path) -> str:
+    """What the first run of a recording is called."""
+    return source.resolve().name if source.is_dir() else source.stem
+
+
+def extract_csv(source: Path, out: Path, asked: Asked, given: Config | None = None,
+                measured: MeasuredProfile | None = None, tell: Tell = lambda words: None) -> Extracted:
+    """Write the runs of a recording, a CSV file or a folder of such files of one recording, as ``extract_dump``.
+
+    given       settings: the car, the receiver's delay and antenna; None: the defaults
+    measured    the profile that was driven on; None: the runs have no profile
+
+    Raises BadInput with the reason, and with what to give, for a recording of which nothing can be used.
+    """
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"{out}: expected a folder")
+    recorded = _recorded(source, asked, given or Config(), tell)
+    if measured is not None and not recorded.fixes.have_places:
+        raise BadInput(f"{source}: expected latitude and longitude, which --profile needs, found a speed alone")
+    return write_runs(recorded, source, run_name(source), out, measured, tell)
+
+
+def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorded:
+    from logger.extraction.even_samples import SEEN, even_samples
+    from logger.shipped import vehicle_path
+    from logger.store.formats.vehicle_file import read_model
+
+    if asked.vehicle is not None:
+        config = replace(config, vehicle=vehicle_path(asked.vehicle))
+    model = read_model(config.vehicle)
+    tell(f"reading {source.name}")
+    tables = _tables(source, asked)
+    notes = [f"{one.header.path.name}: {one.known.name} ({_listed(one)})" for one in tables.all()]
+    time_s, samples, has_gravity = _accelerations(tables, asked, notes)
+    origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
+    tell("laying it on an even grid")
+    range_end = None if asked.range_g is None else asked.range_g * STANDARD_GRAVITY_MPS2
+    try:
+        even = even_samples(time_s - origin_s, samples, RATE_HZ, range_end)
+    except ValueError as error:
+        raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
+    notes += _repairs(even)
+    raw = _fixes(tables, asked, config, origin_s, even)
+    receiver = _receiver(config, even, raw, learns=has_gravity and samples.shape[1] == 3 and asked.speed_mps is None)
+    if asked.speed_mps is not None:
+        receiver = replace(receiver, delay_s=0.0, std_s=0.0)
+    fixes = replace(raw, time_s=raw.time_s - receiver.delay_s)
+    readings = _levelled(even, asked, has_gravity, notes)
+    seen_hz = SEEN * even.own_hz
+    facts = RecordFacts(step_mps2=_step_mps2(samples), range_mps2=range_end,
+                        pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
+    return Recorded(readings, fixes, config, model, facts, receiver, notes=tuple(notes))
+
+
+# --- files ---
+
+
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    acceleration: LoggerTable
+    gravity: LoggerTable | None
+    location: LoggerTable | None
+
+    def all(self) -> list[LoggerTable]:
+        """Those that there are, each once."""
+        found = [self.acceleration]
+        return found + [one for one in (self.gravity, self.location) if one is not None and one not in found]
+
+
+def _tables(source: Path, asked: Asked) -> _Tables:
+    files = sorted(one for one in source.iterdir() if one.suffix.lower() == ".csv") if source.is_dir() else [source]
+    if not files:
+        raise BadInput(f"{source}: expected a folder with CSV files, found none")
+    known = [(header, found) for header in map(read_header, files)
+             if (found := recognised(header, asked.columns)) is not None]
+    header, felt = _acceleration(source, files, known)
+    acceleration = read_table(header, felt)
+    apart = [one for one in known if one[1].has_gravity and not one[1].has_acceleration]
+    gravity = read_table(*apart[0]) if len(apart) == 1 and felt.is_linear else None
+    return _Tables(acceleration, gravity, _location(asked, acceleration, known))
+
+
+def _acceleration(source: Path, files: list[Path], known: list[tuple[Header, Recognised]]) -> tuple[Header, Recognised]:
+    able = [one for one in known if one[1].has_acceleration and "t" in one[1].columns]
+    whole = [one for one in able if not one[1].is_linear] or able
+    if len(whole) > 1:
+        raise BadInput(f"{source}: expected one file with accelerations, found "
+                       f"{' and '.join(one[0].path.name for one in whole)}: give one of them and --location FILE")
+    if not whole:
+        names = read_header(files[0]).names if len(files) == 1 else ()
+        found = ",".join(names)[:160] if names else f"{len(files)} files without any that is known"
+        raise BadInput(f"{files[0] if names else source}: expected columns of a known program, or named ones, with "
+                       f"time and three axes (or up), found {found}: give {advice(names)}")
+    return whole[0]
+
+
+def _location(asked: Asked, acceleration: LoggerTable, known: list[tuple[Header, Recognised]]) -> LoggerTable | None:
+    if asked.location is not None:
+        header = read_header(asked.location)
+        found = recognised(header, asked.columns)
+        if found is None or not found.has_location or "t" not in found.columns:
+            raise BadInput(f"{asked.location}:{header.line}: expected columns with time and a speed, or latitude and "
+                           f"longitude, found {','.join(header.names)[:160]}: give {advice(header.names)}")
+        return read_table(header, found)
+    if acceleration.known.has_location:
+        return acceleration
+    able = [one for one in known if one[1].has_location and "t" in one[1].columns]
+    if len(able) > 1:
+        raise BadInput(f"{able[0][0].path.parent}: expected one file with speed and place, found "
+                       f"{' and '.join(one[0].path.name for one in able)}: give one of them as --location")
+    return read_table(*able[0]) if able else None
+
+
+def _listed(table: LoggerTable) -> str:
+    words = (f"{role}={column.header}" + (f":{column.unit}" if column.unit else "")
+             for role, column in table.known.columns.items())
+    return ", ".join(words)
+
+
+# --- accelerations ---
+
+
+def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Array, Array, bool]:
+    """Times (n,) [s], samples (n, axes) [m/s2], and whether gravity is in them."""
+    from logger.extraction.levelling import felt
+
+    table = tables.acceleration
+    roles = AXES if "x" in table.columns else ("up",)
+    time_s, samples = _ordered(table, seconds(table), roles, notes)
+    if len(time_s) < 2:
+        raise BadInput(f"{table.header.path}: expected rows with a time and an acceleration, found {len(time_s)}")
+    unit = _one_unit(table, roles)
+    if unit is not None:
+        samples = samples * ACCELERATION_UNITS[unit]
+    if tables.gravity is not None:
+        told_s, told = _ordered(tables.gravity, seconds(tables.gravity), GRAVITY, notes)
+        scale = ACCELERATION_UNITS[_one_unit(tables.gravity, GRAVITY) or "m/s2"]
+        samples = samples + scale * np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
+    elif "gx" in table.columns and (unit is None or felt(time_s, samples).unit_mps2 is None):
+        told_s, told = _ordered(table, seconds(table), GRAVITY, [])
+        scale = ACCELERATION_UNITS[_one_unit(table, GRAVITY) or unit or "m/s2"]
+        samples = samples + scale * np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
+    return time_s, *_in_si(table, time_s, samples, unit, roles, asked, notes)
+
+
+def _one_unit(table: LoggerTable, roles: tuple[str, ...]) -> str | None:
+    units = sorted({unit for role in roles if (unit := table.unit(role)) is not None})
+    if len(units) > 1:
+        raise BadInput(f"{table.header.path}:{table.header.line}: expected one unit for {', '.join(roles)}, found "
+                       f"{' and '.join(units)}")
+    return units[0] if units else None
+
+
+def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, roles: tuple[str, ...], asked: Asked,
+           notes: list[str]) -> tuple[Array, bool]:
+    """Samples in m/s2, by the size of gravity where no unit is said, and whether gravity is in them."""
+    from logger.extraction.levelling import NO_GRAVITY_MPS2, felt
+
+    found, path = felt(time_s, samples), table.header.path
+    if found.unit_mps2 is not None:
+        if unit is not None and found.unit_mps2 != 1.0:
+            raise BadInput(f"{path}: expected gravity of {STANDARD_GRAVITY_MPS2:.2f} m/s2 among accelerations in "
+                           f"{unit}, found {found.size:.3g} m/s2: they are in another unit; name it in --columns, "
+                           f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT")
+        if unit is None:
+            word = next(one for one, scale in ACCELERATION_UNITS.items() if scale == found.unit_mps2)
+            notes.append(f"unit by the size of gravity: {word}")
+        if asked.up is not None:
+            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of "
+                           f"{found.size * found.unit_mps2:.2f} m/s2, which tells up: leave out --up")
+        return samples * found.unit_mps2, True
+    if unit is None:
+        raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to tell the unit, found a mean of "
+                       f"{found.size:.3g}: name the unit in --columns, {roles[0]}="
+                       f"{table.known.columns[roles[0]].header}:UNIT, one of {', '.join(units_of(roles[0]))}")
+    if found.size >= NO_GRAVITY_MPS2:
+        raise BadInput(f"{path}: expected a mean of 9.8 m/s2 (gravity) or near 0 (gravity taken out), found "
+                       f"{found.size:.3g} m/s2: is the unit {unit} right, and did the phone lie still in its mount?")
+    if roles == AXES and asked.up is None:
+        raise BadInput(f"{path}: expected gravity in the accelerations, by which to level them, found a mean of "
+                       f"{found.size:.2g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
+                       "gravity as well, or name the axis that points up: --up z (or -z, x, ...)")
+    return samples, False
+
+
+def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: list[str]) -> tuple[Array, Array]:
+    """Times (n,) that do not decrease and the columns (n, r) of the rows in which all are there."""
+    values = np.stack([table.columns[role] for role in roles], axis=1)
+    rows = np.flatnonzero(np.isfinite(times_s) & np.isfinite(values).all(axis=1))
+    time_s, values = times_s[rows], values[rows]
+    back_s = np.maximum.accumulate(time_s) - time_s if len(time_s) else time_s
+    if (back_s > _DISORDER_S).any():
+        row = int(np.argmax(back_s > _DISORDER_S))
+        raise table.wrong(int(rows[row]), f"expected times that grow, found one {back_s[row]:.3g} s before an earlier "
+                          "one: the clock was set back; cut the file there")
+    if back_s.any():
+        notes.append(f"{table.header.path.name}: {np.count_nonzero(back_s)} rows were out of order; sorted by time")
+        order = np.argsort(time_s, kind="stable")
+        time_s, values = time_s[order], values[order]
+    twice = np.append(False, (np.diff(time_s) == 0) & (np.diff(values, axis=0) == 0).all(axis=1)) if len(
+        time_s) else np.zeros(0, dtype=np.bool_)
+    if twice.any():
+        notes.append(f"{table.header.path.name}: {np.count_nonzero(twice)} rows were there twice; dropped")
+    return time_s[~twice], values[~twice]
+
+
+def _repairs(even: EvenSamples) -> list[str]:
+    from logger.extraction.even_samples import SEEN
+
+    notes = []
+    if even.repeats > 0:
+        notes.append(f"{even.repeats:.0%} of the samples only repeated the one before and were dropped: "
+                     f"{even.own_hz:.4g} Hz were taken")
+    if not even.as_read:
+        notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
+    if SEEN * even.own_hz < _FLAT_TO_HZ:
+        notes.append(f"shows nothing above {SEEN * even.own_hz:.0f} Hz: the lab may take that for a slow sensor "
+                     "(sensor_bandwidth)")
+    if even.clipped.any():
+        notes.append(f"{np.count_nonzero(even.clipped)} samples stand at an end of the sensor's range, and are marked")
+    if not even.present.all():
+        notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s lie in holes between samples, and are marked")
+    return notes
+
+
+def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[str]) -> GridReadings:
+    """What points up, part by part where the recorder turned in its mount."""
+    from logger.extraction.levelling import turns, upwards
+
+    time_s, present = even.time_s, even.present.copy()
+    accel = np.zeros(len(time_s))
+    if not has_gravity:
+        column = 0 if asked.up is None or even.samples.shape[1] == 1 else "xyz".index(asked.up[-1])
+        accel = even.samples[:, column] * (-1.0 if (asked.up or "").startswith("-") else 1.0)
+        return GridReadings(time_s, asked.sign * accel, present, even.clipped)
+    heard = np.flatnonzero(present)
+    turned = turns(time_s[heard], even.samples[heard]) if even.samples.shape[1] == 3 else []
+    for at_s, words in turned:
+        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled anew")
+        present &= np.abs(time_s - at_s) > _CUT_S
+    ends_s = [-np.inf, *(at_s for at_s, _ in turned), np.inf]
+    tilts = []
+    for begin_s, end_s in pairwise(ends_s):
+        part = (time_s > begin_s) & (time_s <= end_s)
+        known = part & present
+        if not known.any():
+            continue
+        level, tilt_rad = upwards(time_s[known], even.samples[known])
+        accel[part] = np.interp(time_s[part], time_s[known], level)
+        tilts.append(f"{degrees(tilt_rad):.0f}")
+    if even.samples.shape[1] == 3:
+        notes.append(f"levelled by gravity, which is {' and '.join(tilts)} degrees off the nearest axis")
+    return GridReadings(time_s, asked.sign * accel, present, even.clipped)
+
+
+def _step_mps2(samples: Array) -> float | None:
+    """What readings (n, axes) are rounded to, by the axis along which gravity is felt most; None: they are not."""
+    from logger.dsp.repeated_samples import resolution
+
+    axis = samples[:, int(np.argmax(np.abs(samples.mean(axis=0))))]
+    return resolution(axis) or None if len(np.unique(axis)) < 0.5 * len(axis) else None
+
+
+# --- speed and place ---
+
+
+def _fixes(tables: _Tables, asked: Asked, config: Config, origin_s: float, even: EvenSamples) -> Fixes:
+    """Fixes as they are written, late as the receiver was."""
+    path = tables.acceleration.header.path
+    if asked.speed_mps is not None:
+        time_s = np.arange(even.time_s[0], even.time_s[-1], 1.0)
+        nowhere = np.full(len(time_s), np.nan)
+        return Fixes(time_s, np.full(len(time_s), asked.speed_mps), nowhere, nowhere)
+    table = tables.location
+    if table is None:
+        raise BadInput(f"{path}: expected a speed, or latitude and longitude, found neither: give the file that has "
+                       "them as --location FILE, name their columns in --columns, or give --speed M/S if it was steady")
+    found = _columns_of_fixes(table, origin_s, tables.acceleration, config)
+    span_s = (even.time_s[0], even.time_s[-1])
+    inside = (found.time_s >= span_s[0] - 1.0) & (found.time_s <= span_s[1] + 1.0)
+    if np.count_nonzero(inside) < 2:
+        said = "none" if not len(found.time_s) else (
+            f"those from {found.time_s[0]:.6g} to {found.time_s[-1]:.6g} s beside accelerations from {span_s[0]:.6g} "
+            f"to {span_s[1]:.6g} s")
+        raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, at the same time, found "
+                       f"{said}")
+    found = found.part(inside)
+    _check_speed(table, found)
+    return found.part(apart(found.time_s))
+
+
+def _columns_of_fixes(table: LoggerTable, origin_s: float, beside: LoggerTable, config: Config) -> Fixes:
+    from logger.extraction.held_fixes import new_rows, speeds_of_places
+
+    has_places = set(PLACE) <= set(table.columns)
+    has_speed = "speed" in table.columns
+    roles = (*(PLACE if has_places else ()), *(("speed",) if has_speed else ()))
+    needed = PLACE if has_places else ("speed",)
+    times_s = seconds(table, None if table is beside else beside) - origin_s
+    there = np.isfinite(times_s) & np.all([np.isfinite(table.columns[role]) for role in needed], axis=0)
+    order = np.flatnonzero(there)[np.argsort(times_s[there], kind="stable")]
+    order = order[np.append(True, np.diff(times_s[order]) > 0)] if len(order) else order
+    time_s = times_s[order]
+    nowhere = np.full(len(order), np.nan)
+    lat, lon = (table.columns[role][order] if has_places else nowhere for role in PLACE)
+    if (wild := (np.abs(lat) > 90) | (np.abs(lon) > 360)).any():
+        row = int(np.argmax(wild))
+        raise table.wrong(int(order[row]), f"expected a latitude and a longitude in degrees, found {lat[row]:g} and "
+                          f"{lon[row]:g}")
+    speed = table.columns["speed"][order] * _speed_scale(table) if has_speed else nowhere
+    speed = np.where(speed < 0, np.nan, speed)  # programs write -1 where it is not known
+    standing_mps = config.pipeline.stationary_mps
+    rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)),
+                    np.nan_to_num(speed), standing_mps if has_speed else np.inf)
+    found = Fixes(time_s, speed, lat, lon).part(rows)
+    if len(rows) > 1 and has_places and not np.isfinite(found.speed_mps).all():
+        by_places = speeds_of_places(found.time_s, found.lat_deg, found.lon_deg)
+        found = replace(found, speed_mps=np.where(np.isfinite(found.speed_mps), found.speed_mps, by_places))
+    return found.part(np.isfinite(found.speed_mps))
+
+
+def _speed_scale(table: LoggerTable) -> float:
+    unit = table.unit("speed")
+    if unit is None:
+        column = table.known.columns["speed"].header
+        raise BadInput(f"{table.header.path}:{table.header.line}: expected to know the unit of the speed {column}: "
+                       f"give speed={column}:UNIT in --columns, one of {', '.join(SPEED_UNITS)}")
+    return SPEED_UNITS[unit]
+
+
+def _check_speed(table: LoggerTable, fixes: Fixes) -> None:
+    from logger.extraction.held_fixes import way_over_speed
+
+    if "speed" not in table.columns or not fixes.have_places:
+        return
+    ratio = way_over_speed(fixes.time_s, fixes.lat_deg, fixes.lon_deg, fixes.speed_mps)
+    if ratio is not None:
+        raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the places, "
+                       f"found places {ratio:.2g} times as far apart: name its unit in --columns, speed="
+                       f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}")
+
+
+def _receiver(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> Belief:
+    """How late fixes are: by the settings, else what is usual and what braking tells."""
+    from logger.estimation.drive_alignment import DriveAlignment
+    from logger.estimation.receiver_delay import combined
+    from logger.service.receiver_learning import at_start
+
+    known = at_start(config.gps, None)
+    if not learns or known.std_s == 0.0:
+        return known
+    alignment = DriveAlignment(2, 1.0)
+    heard = even.present
+    time_s, samples = even.time_s[heard], even.samples[heard]
+    ends_s = np.arange(time_s[0] + _FEED_S, time_s[-1] + _FEED_S, _FEED_S)
+    parts = np.split(np.arange(len(time_s)), np.searchsorted(time_s, ends_s))
+    fix = 0
+    for end_s, part in zip([*ends_s, np.inf], parts, strict=True):
+        while fix < len(fixes.time_s) and fixes.time_s[fix] < end_s:
+            alignment.take_fix(float(fixes.time_s[fix]), float(fixes.speed_mps[fix]))
+            fix += 1
+        alignment.take_readings(time_s[part], samples[part])
+    found = combined(known, alignment.estimate())
+    return replace(found, delay_s=max(0.0, found.delay_s))

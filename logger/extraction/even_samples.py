@@ -1,0 +1,117 @@
+"""Samples of a recorder that keeps no even time, on the grid of a run.
+
+Problem: a phone samples at 51, 104 or 417 Hz, unevenly, writes each reading several times, gives times in bursts, and
+stops for a while. Solution: repeats are dropped (``dsp.repeated_samples``), bursts spread (``dsp.bursts``), and what
+lies between two long silences is laid on an even grid through an anti-alias filter (``dsp.uneven``); where a few
+samples are missing, or were clipped, the grid says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.dsp.bursts import burst_ends, spread
+from logger.dsp.range_ends import range_ends
+from logger.dsp.repeated_samples import find_repeats, fresh_times, resolution
+from logger.dsp.uneven import mean_rate_hz, on_even_grid
+from logger.extraction.stretches import LONGEST_HOLE_S
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+LEAST_RATE_HZ = 40.0
+"""Wheels hop at 10 to 15 Hz; a record shows what lies below 0.45 of its rate (``dsp.uneven``)."""
+SEEN = 0.45
+_FEWEST = 20  # samples of a piece: the filter's ends are continued by guesses
+_FEW_STEPS = 3.5
+_INSTANT_S = 1e-6
+_EVEN = 0.2  # of a step, as records are read (``store.formats.record_file``)
+
+
+@dataclass(frozen=True, eq=False)
+class EvenSamples:
+    """Samples on a grid, but where ``time_s`` jumps, since nothing was heard for half a second or more.
+
+    time_s (n,), samples (n, axes), present (n,), clipped (n,)
+    own_hz       the recorder's own rate
+    repeats      share of the samples that only repeated the one before; these were dropped
+    as_read      nothing had to be laid on the grid: the samples stood on it
+    """
+
+    time_s: Array
+    samples: Array
+    present: Bools
+    clipped: Bools
+    own_hz: float
+    repeats: float
+    as_read: bool
+
+
+def clipped_samples(samples: Array, range_end: float | None) -> Bools:
+    """Which samples (n, axes) stand at an end of the range on some axis (n,): of the one that is known, or of one that
+    is plain to see (``dsp.range_ends``)."""
+    found = np.zeros(len(samples), dtype=np.bool_)
+    for axis in samples.T:
+        half = 0.5 * resolution(axis)
+        if range_end is not None:
+            found |= np.abs(axis) >= range_end - half
+        for one in range_ends(axis):
+            found |= np.sign(one.at) * axis >= abs(one.at) - half
+    return found
+
+
+def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float | None = None) -> EvenSamples:
+    """Lay samples (n, axes) at times (n,), not decreasing [s], on a grid. ValueError where that cannot be."""
+    clipped = clipped_samples(samples, range_end)
+    ends = np.flatnonzero(np.diff(time_s) > LONGEST_HOLE_S) + 1
+    pieces = [part for part in np.split(np.arange(len(time_s)), ends) if len(part) >= _FEWEST]
+    if not pieces:
+        raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
+    taken = [_taken(time_s[part], samples[part], clipped[part]) for part in pieces]
+    own_hz = mean_rate_hz(max(taken, key=lambda one: len(one[0]))[0])
+    dropped = 1.0 - sum(len(one[0]) for one in taken) / sum(len(part) for part in pieces)
+    if own_hz < LEAST_RATE_HZ:
+        also = f" written at {len(time_s) / (time_s[-1] - time_s[0]):.3g} Hz" if dropped > 0 else ""
+        raise ValueError(f"expected {LEAST_RATE_HZ:g} samples a second or more that were taken, found {own_hz:.3g}"
+                         f"{also}: set the program to a higher rate")
+    laid = [_laid(*one, own_hz, rate_hz) for one in taken if len(one[0]) >= _FEWEST]
+    if not laid:
+        raise ValueError(f"expected {_FEWEST} samples or more that were taken, found fewer")
+    times_s, values, present, ends_met = (np.concatenate(part) for part in list(zip(*laid, strict=True))[:4])
+    return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid))
+
+
+def _taken(time_s: Array, samples: Array, clipped: Bools) -> tuple[Array, Array, Bools]:
+    """What was taken, and when: without repeats, at times that grow."""
+    if (ends := burst_ends(time_s)) is not None:
+        time_s = spread(time_s, ends)
+    grows = np.append(True, np.diff(time_s) > 0)
+    time_s, samples, clipped = time_s[grows], samples[grows], clipped[grows]
+    repeats = find_repeats(samples)
+    if repeats is None:
+        return time_s, samples, clipped
+    times_s = fresh_times(repeats, time_s)
+    return times_s, samples[repeats.fresh], clipped[repeats.fresh]
+
+
+def _laid(time_s: Array, samples: Array, clipped: Bools, own_hz: float, rate_hz: float
+          ) -> tuple[Array, Array, Bools, Bools, bool]:
+    """On the grid, and whether it stood there."""
+    grid_s = time_s[0] + np.arange(int((time_s[-1] - time_s[0]) * rate_hz + 0.5) + 1) / rate_hz
+    if len(grid_s) == len(time_s) and np.abs(time_s - grid_s).max() < _EVEN / rate_hz:
+        return grid_s, samples, np.ones(len(grid_s), dtype=np.bool_), clipped, True
+    laid = on_even_grid(time_s, samples, own_hz, rate_hz)
+    grid_s = time_s[0] + np.arange(len(laid)) / rate_hz
+    hole_s = _FEW_STEPS / min(own_hz, rate_hz)
+    inside = np.zeros(len(grid_s) + 1)
+    wide = np.flatnonzero(np.diff(time_s) > hole_s)
+    np.add.at(inside, np.searchsorted(grid_s, time_s[wide] + _INSTANT_S), 1)
+    np.add.at(inside, np.searchsorted(grid_s, time_s[wide + 1] - _INSTANT_S), -1)
+    near = np.zeros(len(grid_s), dtype=np.bool_)
+    apart_s = max(1.0 / own_hz, 1.0 / rate_hz)
+    for at_s in time_s[clipped]:
+        near[slice(*np.searchsorted(grid_s, [at_s - apart_s, at_s + apart_s]))] = True
+    return grid_s, laid, np.cumsum(inside)[:-1] == 0, near, False

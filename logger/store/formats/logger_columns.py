@@ -1,0 +1,151 @@
+"""Which column of a logger's CSV file is what: recognised by a known layout, or named by the user.
+
+Problem: a column that is taken for another one, or a unit for another, gives runs that look like any others. Solution:
+only layouts that are known (``logger_layouts``) are recognised, and only if one fits; all else has to be named, and the
+complaint shows how.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from logger.errors import BadInput
+from logger.store.formats.csv_table import shown
+from logger.store.formats.logger_layouts import AXES, GRAVITY, LAYOUTS, PLACE, ROLES, SPELLINGS, Column, units_of
+
+Named = Mapping[str, tuple[Column, ...]]
+"""Columns by role as a user names them: the header of each file has one of them at most."""
+
+_ENTRY = re.compile(rf"\s*({'|'.join(ROLES)})\s*=")
+_AT_THE_END = re.compile(r"(?:[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*:?|_([a-z0-9]+))\s*$", re.IGNORECASE)
+"""A unit in brackets, or after an underscore as in ``speed_mps``."""
+_LIKELY = {
+    "t": r"t|time.*|timestamp.*|seconds.*|.*\btime", "x": r".*acc.*[_ ]?x\b.*|x|ax", "y": r".*acc.*[_ ]?y\b.*|y|ay",
+    "z": r".*acc.*[_ ]?z\b.*|z|az", "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
+    "speed": r".*(speed|velocity).*",
+}
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """The columns of a file by role, and what they are called together."""
+
+    name: str
+    columns: Mapping[str, Column]
+    is_linear: bool = False  # gravity was taken out
+
+    @property
+    def has_acceleration(self) -> bool:
+        """Time and three axes, or one that points up."""
+        return set(AXES) <= set(self.columns) or "up" in self.columns
+
+    @property
+    def has_location(self) -> bool:
+        """Speed, or latitude and longitude."""
+        return "speed" in self.columns or set(PLACE) <= set(self.columns)
+
+    @property
+    def has_gravity(self) -> bool:
+        """Three axes of gravity alone."""
+        return set(GRAVITY) <= set(self.columns)
+
+
+def plain(header: str) -> str:
+    """A column's name without what differs between versions of a program: case, spaces, the sign for a square."""
+    text = header.strip().strip('"').replace("²", "^2").replace("\ufffd", "^2").lower()
+    return " ".join(text.split())
+
+
+def named_columns(text: str) -> Named:
+    """The columns of ``--columns "t=time:ms,x=ax:g,..."``. Raises BadInput for a role or a unit that is not known."""
+    starts = [found.start() for found in re.finditer(rf"(?:^|(?<=,))(?={_ENTRY.pattern})", text)]
+    if not starts or starts[0] != 0:
+        raise BadInput(f"--columns: expected {_form()}, found {shown(text)}")
+    named: dict[str, tuple[Column, ...]] = {}
+    for start, end in zip(starts, [*starts[1:], len(text) + 1], strict=True):
+        role, _, rest = text[start : end - 1].partition("=")
+        column = _column(role.strip(), rest)
+        named[role.strip()] = (*named.get(role.strip(), ()), column)
+    return named
+
+
+def _column(role: str, text: str) -> Column:
+    header, colon, word = text.rpartition(":")
+    unit = _unit(word)
+    if colon and unit in units_of(role):
+        return Column(header.strip(), unit)
+    if colon and re.fullmatch(r"[\w/^²°µ]{1,6}", word.strip()) and header.strip():
+        raise BadInput(f"--columns: expected {role}={header.strip()}:UNIT with one of {', '.join(units_of(role))}, "
+                       f"found {shown(word.strip())}")
+    if not text.strip():
+        raise BadInput(f"--columns: expected the name of a column after {role}=, found nothing")
+    return Column(text.strip())
+
+
+def _unit(word: str) -> str:
+    word = word.strip().replace("²", "2").replace("\ufffd", "2")
+    word = word if word in SPELLINGS else word.lower()
+    return SPELLINGS.get(word, word)
+
+
+def unit_in(header: str, role: str) -> str | None:
+    """The unit at the end of a column's name, if it is one of the role's."""
+    found = _AT_THE_END.search(header)
+    unit = _unit(found[1] or found[2]) if found else None
+    return unit if unit in units_of(role) else None
+
+
+def recognise(names: Sequence[str], stem: str, named: Named | None) -> Recognised | None:
+    """What is in a file with this header and name; None: nothing that is known. BadInput for a column that is there
+    twice or named twice."""
+    there = [plain(one) for one in names]
+    if named is not None:
+        return _by_name(there, named)
+    fitting = []
+    for layout in LAYOUTS:
+        wanted = {role: plain(column.header) for role, column in layout.columns.items()}
+        if all(there.count(one) == 1 for one in wanted.values()) and (
+                layout.stem in ("", stem.lower())):
+            fitting.append(layout)
+    if not fitting:
+        return None
+    if len({plain(layout.columns["t"].header) for layout in fitting}) > 1:
+        return None
+    columns: dict[str, Column] = {}
+    names_of: list[str] = []
+    for layout in fitting:
+        new = {role: column for role, column in layout.columns.items()
+               if role not in columns and not (role == "up" and "z" in columns)}
+        names_of += [layout.name] if new else []
+        columns |= new
+    return Recognised(" and ".join(names_of), columns, any("linear" in one for one in names_of))
+
+
+def _by_name(there: list[str], named: Named) -> Recognised | None:
+    columns = {}
+    for role, choices in named.items():
+        found = [one for one in choices if plain(one.header) in there]
+        if len(found) > 1 or any(there.count(plain(one.header)) > 1 for one in found):
+            raise BadInput(f"--columns: expected one column for {role} in a file, found "
+                           f"{' and '.join(one.header for one in found)} once or more")
+        if found:
+            unit = found[0].unit or unit_in(found[0].header, role)
+            columns[role] = Column(found[0].header, unit)
+    return Recognised("columns as named", columns) if columns else None
+
+
+def advice(names: Sequence[str]) -> str:
+    """What to give for a header that is not known: the option, filled in as well as names allow."""
+    chosen = []
+    for role, likely in _LIKELY.items():
+        fits = [name for name in names if re.fullmatch(likely, plain(name))]
+        if fits:
+            chosen.append(f"{role}={fits[0].strip()}" + ("" if unit_in(fits[0], role) or role in PLACE else ":UNIT"))
+    example = ",".join(chosen) if len(chosen) > 1 else "t=TIME:ms,x=X:g,y=Y:g,z=Z:g,lat=LAT,lon=LON,speed=SPEED:km/h"
+    return f'--columns "{example}"'
+
+
+def _form() -> str:
+    return f"ROLE=COLUMN[:UNIT],... with roles {', '.join(ROLES)}"
