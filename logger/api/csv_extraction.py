@@ -195,16 +195,16 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
     if len(time_s) < 2:
         raise BadInput(f"{table.header.path}: expected rows with a time and an acceleration, found {len(time_s)}")
     unit = _one_unit(table, roles)
-    if unit is not None:
-        samples = samples * ACCELERATION_UNITS[unit]
-    if tables.gravity is not None:
-        told_s, told = _ordered(tables.gravity, seconds(tables.gravity), GRAVITY, notes)
-        scale = ACCELERATION_UNITS[_one_unit(tables.gravity, GRAVITY) or "m/s2"]
-        samples = samples + scale * np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
-    elif "gx" in table.columns and (unit is None or felt(time_s, samples).unit_mps2 is None):
-        told_s, told = _ordered(table, seconds(table), GRAVITY, [])
-        scale = ACCELERATION_UNITS[_one_unit(table, GRAVITY) or unit or "m/s2"]
-        samples = samples + scale * np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
+    apart = tables.gravity or (table if "gx" in table.columns else None)
+    if apart is not None and (unit is None or felt(time_s, samples).unit_mps2 is None):
+        told_s, told = _ordered(apart, seconds(apart, table), GRAVITY, [])
+        told_unit = _one_unit(apart, GRAVITY) or unit
+        if unit is None or told_unit is None:
+            raise BadInput(f"{table.header.path}: expected to know the unit of accelerations and gravity, which are to be "
+                           "added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
+        gravity = np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
+        samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[told_unit] * gravity
+        unit = "m/s2"
     return time_s, *_in_si(table, time_s, samples, unit, roles, asked, notes)
 
 
@@ -222,28 +222,30 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
     from logger.extraction.levelling import NO_GRAVITY_MPS2, felt
 
     found, path = felt(time_s, samples), table.header.path
+    named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
     if found.unit_mps2 is not None:
-        if unit is not None and found.unit_mps2 != 1.0:
-            raise BadInput(f"{path}: expected gravity of {STANDARD_GRAVITY_MPS2:.2f} m/s2 among accelerations in "
-                           f"{unit}, found {found.size:.3g} m/s2: they are in another unit; name it in --columns, "
-                           f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT")
+        word = next(one for one, scale in ACCELERATION_UNITS.items() if np.isclose(scale, found.unit_mps2))
+        if unit not in (None, word):
+            raise BadInput(f"{path}: expected accelerations in {unit}, found gravity of {found.size:.4g}, as it is in "
+                           f"{word}: name the unit in --columns, {named}")
         if unit is None:
-            word = next(one for one, scale in ACCELERATION_UNITS.items() if scale == found.unit_mps2)
             notes.append(f"unit by the size of gravity: {word}")
         if asked.up is not None:
-            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of "
-                           f"{found.size * found.unit_mps2:.2f} m/s2, which tells up: leave out --up")
+            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {found.size:.4g} {word},"
+                           " which tells up: leave out --up")
         return samples * found.unit_mps2, True
     if unit is None:
         raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to tell the unit, found a mean of "
-                       f"{found.size:.3g}: name the unit in --columns, {roles[0]}="
-                       f"{table.known.columns[roles[0]].header}:UNIT, one of {', '.join(units_of(roles[0]))}")
-    if found.size >= NO_GRAVITY_MPS2:
+                       f"{found.size:.3g}: name the unit in --columns, {named}, one of "
+                       f"{', '.join(units_of(roles[0]))}")
+    samples = samples * ACCELERATION_UNITS[unit]
+    size_mps2 = found.size * ACCELERATION_UNITS[unit]
+    if size_mps2 >= NO_GRAVITY_MPS2:
         raise BadInput(f"{path}: expected a mean of 9.8 m/s2 (gravity) or near 0 (gravity taken out), found "
-                       f"{found.size:.3g} m/s2: is the unit {unit} right, and did the phone lie still in its mount?")
+                       f"{size_mps2:.3g} m/s2: is the unit {unit} right, and did the phone lie still in its mount?")
     if roles == AXES and asked.up is None:
         raise BadInput(f"{path}: expected gravity in the accelerations, by which to level them, found a mean of "
-                       f"{found.size:.2g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
+                       f"{size_mps2:.2g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
                        "gravity as well, or name the axis that points up: --up z (or -z, x, ...)")
     return samples, False
 

@@ -22,8 +22,8 @@ _ENTRY = re.compile(rf"\s*({'|'.join(ROLES)})\s*=")
 _AT_THE_END = re.compile(r"(?:[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*:?|_([a-z0-9]+))\s*$", re.IGNORECASE)
 """A unit in brackets, or after an underscore as in ``speed_mps``."""
 _LIKELY = {
-    "t": r"t|time.*|timestamp.*|seconds.*|.*\btime", "x": r".*acc.*[_ ]?x\b.*|x|ax", "y": r".*acc.*[_ ]?y\b.*|y|ay",
-    "z": r".*acc.*[_ ]?z\b.*|z|az", "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
+    "t": r"t|time.*|timestamp.*|seconds.*|.*\btime",
+    **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES}, "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
     "speed": r".*(speed|velocity).*",
 }
 
@@ -37,8 +37,13 @@ class Recognised:
     is_linear: bool = False  # gravity was taken out
 
     @property
+    def is_enough(self) -> bool:
+        """Whether something can be made of it."""
+        return "t" in self.columns and (self.has_acceleration or self.has_location or self.has_gravity)
+
+    @property
     def has_acceleration(self) -> bool:
-        """Time and three axes, or one that points up."""
+        """Three axes, or one that points up."""
         return set(AXES) <= set(self.columns) or "up" in self.columns
 
     @property
@@ -98,11 +103,14 @@ def unit_in(header: str, role: str) -> str | None:
 
 
 def recognise(names: Sequence[str], stem: str, named: Named | None) -> Recognised | None:
-    """What is in a file with this header and name; None: nothing that is known. BadInput for a column that is there
-    twice or named twice."""
+    """What is in a file with this header and name: the columns that are named, if they are enough for something, else
+    those of a known layout; None: nothing that is known. BadInput for a column that is there twice or named twice."""
     there = [plain(one) for one in names]
-    if named is not None:
-        return _by_name(there, named)
+    by_name = _by_name(there, named or {})
+    return by_name if by_name is not None and by_name.is_enough else _by_layout(there, stem)
+
+
+def _by_layout(there: list[str], stem: str) -> Recognised | None:
     fitting = []
     for layout in LAYOUTS:
         wanted = {role: plain(column.header) for role, column in layout.columns.items()}

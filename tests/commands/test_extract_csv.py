@@ -1,0 +1,257 @@
+"""``ridelog extract --csv`` as a person runs it: a simulated drive whose truth is known, as phones write it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+
+from ..support.drives.phones import LAYOUTS, Phone, phone_in, phyphox, rotation, table
+
+PLAN = DrivePlan(
+    speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
+    stretches=(Stretch(1200, 90),), seed=11,
+)
+FROM_M, TO_M = 100.0, 800.0
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    return simulate_drive(PLAN, read_vehicle(vehicle_file("rav4-2009")))
+
+
+@pytest.fixture(scope="module")
+def phone(drive: Drive) -> Phone:
+    rng = np.random.default_rng(4)
+    return phone_in(drive, rng, rotation(rng))
+
+
+@pytest.fixture(scope="module")
+def line(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    at_m = SPACING_M * np.arange(len(drive.road.elevation_m)) - LEAD_M
+    inside = (at_m >= FROM_M) & (at_m <= TO_M)
+    lat, lon = (np.interp(at_m[inside], drive.motion.distance_m, one)
+                for one in (drive.motion.lat_deg, drive.motion.lon_deg))
+    return table(tmp_path_factory.mktemp("line") / "line.csv", "distance_m,elevation_m,lat_deg,lon_deg",
+                 at_m[inside] - FROM_M, drive.road.elevation_m[inside], lat, lon, form="%.8f")
+
+
+def call(*words: object) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(["ridelog", "extract", *map(str, words)], capture_output=True, text=True, timeout=300)
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def columns(run: Path) -> dict[str, np.ndarray]:
+    read = np.genfromtxt(run / "drive.csv", delimiter=",", names=True)
+    return {name: read[name] for name in read.dtype.names}
+
+
+def run_of(done: subprocess.CompletedProcess[str]) -> Path:
+    assert done.returncode == 0, done.stderr
+    (one,) = json.loads(done.stdout)["runs"]
+    return Path(one["run"])
+
+
+def truth(drive: Drive, time_s: np.ndarray) -> np.ndarray:
+    accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
+    return accel - accel.mean()
+
+
+def refused(*words: object) -> str:
+    done = call(*words)
+    assert done.returncode == 2, done.stdout
+    assert len(done.stderr.splitlines()) == 1
+    return done.stderr
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_layout_at_any_angle_gives_what_the_car_did(
+        layout: str, drive: Drive, phone: Phone, tmp_path: Path) -> None:
+    done = call("--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--json")
+    run = run_of(done)
+    found = columns(run)
+    assert set(found) == {"t_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg", "usable"}
+    time_s = found["t_s"] - (62_608 if layout == "sensor_log" else 0)
+    off = found["accel_z_mps2"] - truth(drive, time_s)
+    assert off.std() < 0.05  # noise of 0.01, and what braking leaks through a level that is 0.5 degrees off
+    true_m = np.interp(time_s, drive.motion.time_s, drive.motion.distance_m)
+    assert np.ptp(found["distance_m"] - true_m) < 3.0
+    facts = yaml.safe_load((run / "run.yaml").read_text())
+    assert facts["sensor"]["step_mps2"] == pytest.approx(0.0024, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["phyphox", "own_names"])
+def test_the_lab_finds_the_same_error_as_on_the_true_drive(
+        layout: str, drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
+    done = call("--csv", *LAYOUTS[layout](phone, tmp_path / layout), "--out", tmp_path / "runs", "--profile", line,
+                "--json")
+    run = run_of(done)
+    assert json.loads(done.stdout)["runs"][0]["by_road"]
+    found = columns(run)
+    exact = tmp_path / "exact"
+    exact.mkdir()
+    distance, speed = (np.interp(found["t_s"], drive.motion.time_s, one)
+                       for one in (drive.motion.distance_m - FROM_M, drive.motion.speed_mps))
+    table(exact / "drive.csv", "t_s,accel_z_mps2,speed_mps,distance_m", found["t_s"], truth(drive, found["t_s"]), speed,
+          distance, form="%.6f")
+    (exact / "profile.csv").write_text((run / "profile.csv").read_text())
+    moving = found["speed_mps"] > 0.5
+    assert np.sqrt(np.mean((found["distance_m"] - distance)[moving] ** 2)) < 0.1
+    for vehicle, within in (("sedan-2015", 0.02), ("rav4-2009", 0.05)):
+        errors = []
+        for one in (run, exact):
+            told = subprocess.run(["ridelog", "compare", "--json", "--vehicle", vehicle, str(one)], capture_output=True,
+                                  text=True, timeout=300)
+            assert told.returncode == 0, told.stderr
+            errors.append(json.loads(told.stdout)["error"])
+        assert abs(errors[0] - errors[1]) < within, (vehicle, errors)
+
+
+def test_a_phone_that_slips_is_cut_there_and_levelled_anew(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+    slipped = phone.time_s > 55.0
+    force = phone.force_mps2.copy()
+    angle = np.radians(40)
+    force[slipped] = force[slipped] @ np.array(
+        [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    words = phyphox(Phone(**{**vars(phone), "force_mps2": force}), tmp_path / "ride")
+    done = call("--csv", *words, "--out", tmp_path / "runs", "--json")
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert [Path(one["run"]).name for one in said["runs"]] == ["ride", "ride-2"]
+    assert any("tilted" in note and "cut there" in note for note in said["notes"])
+    for name in ("ride", "ride-2"):
+        found = columns(tmp_path / "runs" / name)
+        assert (found["accel_z_mps2"] - truth(drive, found["t_s"])).std() < 0.15
+
+
+def test_repeated_samples_are_dropped_and_the_true_rate_is_told(drive: Drive, tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    taken = phone_in(drive, rng, rotation(rng), rate_hz=102.0, jitter=0.0)
+    time_s = np.arange(taken.time_s[0], taken.time_s[-1], 1 / 200)
+    last = np.searchsorted(taken.time_s, time_s, side="right") - 1
+    held = Phone(**{**vars(taken), "time_s": time_s, "force_mps2": taken.force_mps2[last]})
+    done = call("--csv", *phyphox(held, tmp_path / "ride"), "--out", tmp_path / "runs", "--json")
+    found = columns(run_of(done))
+    assert any("102 Hz were taken" in note for note in json.loads(done.stdout)["notes"])
+    off = found["accel_z_mps2"] - truth(drive, found["t_s"] - 0.0025)  # half of a row late, on average
+    assert off.std() < 0.1 * truth(drive, found["t_s"]).std()
+
+
+def test_a_slow_phone_is_told_of_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    done = call("--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
+                "--out", tmp_path / "runs")
+    assert done.returncode == 0, done.stderr
+    assert "shows nothing above 23 Hz" in done.stdout
+    facts = yaml.safe_load((tmp_path / "runs" / "fifty" / "run.yaml").read_text())
+    assert facts["pass_band_hz"] == [0.0, pytest.approx(22.95, abs=0.2)]
+    slow = phyphox(phone_in(drive, rng, rotation(rng), rate_hz=20.0), tmp_path / "twenty")
+    assert "higher rate" in refused("--csv", *slow, "--out", tmp_path / "runs")
+
+
+def test_holes_and_clipped_samples_are_marked(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+    hole = (phone.time_s > 30.0) & (phone.time_s < 30.3)
+    kept = Phone(**{**vars(phone), "time_s": phone.time_s[~hole], "force_mps2": phone.force_mps2[~hole]})
+    up = phone.gravity_mps2[0] / np.linalg.norm(phone.gravity_mps2[0])
+    largest = np.abs(kept.force_mps2).max(axis=0)[int(np.argmax(np.abs(up)))]
+    words = phyphox(kept, tmp_path / "ride")
+    run = run_of(call("--csv", *words, "--out", tmp_path / "runs", "--json", "--range", f"{0.97 * largest / 9.80665}"))
+    found = columns(run)
+    inside = (found["t_s"] > 30.02) & (found["t_s"] < 30.28)
+    assert (found["usable"][inside] == 0).all()
+    assert (found["usable"] == 2).any()
+    assert (found["usable"] == 1).mean() > 0.98
+
+
+def test_gravity_taken_out_needs_the_axis_that_points_up(drive: Drive, phone: Phone, tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    flat = phone_in(drive, rng, np.eye(3))
+    header = '"Time (s)",' + ",".join(f'"Linear Acceleration {axis} (m/s^2)"' for axis in "xyz")
+    (tmp_path / "ride").mkdir()
+    table(tmp_path / "ride" / "Linear Accelerometer.csv", header, flat.time_s,
+          *(flat.force_mps2 - flat.gravity_mps2).T)
+    phyphox(flat, tmp_path / "other")
+    (tmp_path / "other" / "Location.csv").rename(tmp_path / "ride" / "Location.csv")
+    words = ("--csv", tmp_path / "ride", "--out", tmp_path / "runs")
+    assert "--up z" in refused(*words)
+    for up, sign in (("--up=z", 1.0), ("--up=-z", -1.0)):
+        found = columns(run_of(call(*words, up, "--json")))
+        assert (found["accel_z_mps2"] - sign * truth(drive, found["t_s"])).std() < 0.05
+    found = columns(run_of(call(*words, "--up=z", "--sign=-", "--json")))
+    assert (found["accel_z_mps2"] + truth(drive, found["t_s"])).std() < 0.05
+    assert "leave out --up" in refused("--csv", tmp_path / "other" / "Accelerometer.csv", "--location",
+                                       tmp_path / "ride" / "Location.csv", "--out", tmp_path / "runs", "--up", "z")
+
+
+def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) -> None:
+    time_s = np.arange(10, 60, 0.01)
+    accel = np.interp(time_s, drive.motion.time_s, drive.accel_mps2)
+    path = table(tmp_path / "phone.csv", "t,az", time_s, accel + 9.81)
+    found = columns(run_of(call("--csv", path, "--columns", "t=t:s,up=az:m/s2", "--speed", "4.5", "--out",
+                                tmp_path / "runs", "--json")))
+    assert set(found) == {"t_s", "accel_z_mps2", "speed_mps", "distance_m", "usable"}
+    assert np.allclose(found["speed_mps"], 4.5, atol=1e-6)
+    assert np.ptp(found["distance_m"]) == pytest.approx(4.5 * np.ptp(found["t_s"]), abs=1e-3)
+    assert np.allclose(found["accel_z_mps2"], truth(drive, found["t_s"]), atol=1e-5)  # on the grid: as it was read
+
+
+def test_what_cannot_be_used_is_refused_in_one_line(drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
+    phyphox(phone, tmp_path / "good")
+    accel, places = tmp_path / "good" / "Accelerometer.csv", tmp_path / "good" / "Location.csv"
+    rows = accel.read_text().splitlines()
+    (tmp_path / "cell.csv").write_text("\n".join([*rows[:40], rows[40].replace("E+00", "E+0o", 1), *rows[41:]]))
+    (tmp_path / "back.csv").write_text("\n".join([rows[0], *rows[3000:], *rows[1:3000]]))
+    (tmp_path / "none.csv").write_text(rows[0] + "\n")
+    (tmp_path / "text.csv").write_text("nothing of the kind\n")
+    (tmp_path / "odd.csv").write_text("when,thing,other\n1,2,3\n")
+    (tmp_path / "sum.csv").write_text("\n".join(["t;x;y;z", *rows[1:]]))
+    (tmp_path / "later").mkdir()
+    later = table(tmp_path / "later" / "Location.csv", "t_s,speed_mps", phone.fix_s + 5000, phone.speed_mps)
+    speeds = table(tmp_path / "later" / "speed.csv", "t_s,speed_mps", phone.fix_s, phone.speed_mps)
+    kmh = table(tmp_path / "later" / "kmh.csv", "t_s,lat_deg,lon_deg,speed_mps", phone.fix_s, phone.lat_deg,
+                phone.lon_deg, 3.6 * phone.speed_mps, form="%.9f")
+    table(tmp_path / "line.csv", "t,ax,ay,az", phone.time_s, *phone.force_mps2.T)
+    names = ("--columns", "t=t:s,x=x:UNIT,y=y,z=z")
+    for words, said in (
+        ((accel,), "expected a speed, or latitude and longitude, found neither"),
+        ((accel, "--location", later), "by the clock of Accelerometer.csv"),
+        ((accel, "--location", kmh), "agrees with the places"),
+        ((accel, "--location", speeds, "--profile", line), "latitude and longitude, which --profile needs"),
+        ((tmp_path / "cell.csv", "--location", places), "cell.csv:41: expected a number for"),
+        ((tmp_path / "back.csv", "--location", places), "the clock was set back"),
+        ((tmp_path / "none.csv", "--location", places), "none.csv:2: expected numbers below the header"),
+        ((tmp_path / "text.csv",), "text.csv:1: expected a header"),
+        ((tmp_path / "odd.csv",), "give --columns"),
+        ((tmp_path / "gone.csv",), "expected a readable file"),
+        ((tmp_path / "sum.csv", *names), "--columns: expected x=x:UNIT"),
+        ((tmp_path / "sum.csv", "--location", places, "--columns", "t=t,x=x:g,y=y:g,z=z:g"), "as it is in m/s2"),
+        ((tmp_path / "sum.csv", "--columns", "when=t"), "--columns: expected ROLE=COLUMN"),
+        ((tmp_path / "later",), "expected columns of a known program"),
+        ((tmp_path / "line.csv", "--location", places), "give --columns"),
+    ):
+        found = refused("--csv", *words, "--out", tmp_path / "runs")
+        assert said in found, found
+    assert "together with --csv" in refused("x.dump", "--out", tmp_path / "runs", "--speed", "4")
+    assert "found both" in refused("x.dump", "--csv", accel, "--out", tmp_path / "runs")
+    assert "expected a DUMP, or --csv" in refused("--out", tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_of_two_recordings_the_good_one_is_done(phone: Phone, tmp_path: Path) -> None:
+    phyphox(phone, tmp_path / "good")
+    (tmp_path / "bad.csv").write_text("a,b\n1,2\n")
+    done = call("--csv", tmp_path / "bad.csv", tmp_path / "good", "--out", tmp_path / "runs")
+    assert done.returncode == 1
+    assert "bad.csv" in done.stderr
+    assert (tmp_path / "runs" / "good" / "drive.csv").exists()
