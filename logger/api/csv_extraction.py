@@ -200,8 +200,8 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
         told_s, told = _ordered(apart, seconds(apart, table), GRAVITY, [])
         told_unit = _one_unit(apart, GRAVITY) or unit
         if unit is None or told_unit is None:
-            raise BadInput(f"{table.header.path}: expected to know the unit of accelerations and gravity, which are to be "
-                           "added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
+            raise BadInput(f"{table.header.path}: expected to know the unit of accelerations and gravity, which are to "
+                           "be added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
         gravity = np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
         samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[told_unit] * gravity
         unit = "m/s2"
@@ -231,8 +231,8 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
         if unit is None:
             notes.append(f"unit by the size of gravity: {word}")
         if asked.up is not None:
-            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {found.size:.4g} {word},"
-                           " which tells up: leave out --up")
+            raise BadInput(f"{path}: expected a record without gravity for --up, found gravity of {found.size:.4g} "
+                           f"{word}, which tells up: leave out --up")
         return samples * found.unit_mps2, True
     if unit is None:
         raise BadInput(f"{path}: expected gravity near 9.8 (m/s2) or 1 (g), by which to tell the unit, found a mean of "

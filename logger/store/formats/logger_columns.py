@@ -23,7 +23,8 @@ _AT_THE_END = re.compile(r"(?:[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*:?|_([a-z0-9]+))\s
 """A unit in brackets, or after an underscore as in ``speed_mps``."""
 _LIKELY = {
     "t": r"t|time.*|timestamp.*|seconds.*|.*\btime",
-    **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES}, "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
+    **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES},
+    "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*",
     "speed": r".*(speed|velocity).*",
 }
 
@@ -81,7 +82,7 @@ def _column(role: str, text: str) -> Column:
     unit = _unit(word)
     if colon and unit in units_of(role):
         return Column(header.strip(), unit)
-    if colon and re.fullmatch(r"[\w/^²°µ]{1,6}", word.strip()) and header.strip():
+    if colon and re.fullmatch(r"[\w/^²°µ]{1,12}", word.strip()) and header.strip():
         raise BadInput(f"--columns: expected {role}={header.strip()}:UNIT with one of {', '.join(units_of(role))}, "
                        f"found {shown(word.strip())}")
     if not text.strip():

@@ -21,8 +21,8 @@ def rotation(rng: np.random.Generator) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Phone:
-    """What a phone in a car feels: times (n,) from the drive's start [s], specific force (n, 3) along its own axes [m/s2]
-    and what of it is gravity (n, 3); fixes once a second: (k,) times, latitude, longitude, speed."""
+    """What a phone in a car feels: times (n,) from the drive's start [s], specific force (n, 3) along its own axes
+    [m/s2] and what of it is gravity (n, 3); fixes once a second: (k,) times, latitude, longitude, speed."""
 
     time_s: np.ndarray
     force_mps2: np.ndarray
