@@ -95,7 +95,8 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
     model = read_model(config.vehicle)
     tell(f"reading {source.name}")
     tables = _tables(source, asked)
-    notes = [f"{one.header.path.name}: {one.known.name} ({_listed(one)})" for one in tables.all()]
+    notes = [("" if one.header.path == source else f"{one.header.path.name}: ") + f"{one.known.name} ({_listed(one)})"
+             for one in tables.all()]
     time_s, samples, has_gravity = _accelerations(tables, asked, notes)
     origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
     tell("laying it on an even grid")

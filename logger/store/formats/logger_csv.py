@@ -106,17 +106,20 @@ def read_table(header: Header, known: Recognised) -> LoggerTable:
 def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
     """The times (n,) of a table [s]. A unit that is not known is told by the size of the numbers, or is that of another
     table with the same column. BadInput where neither can be."""
-    times = table.columns["t"]
-    unit = table.unit("t") or _epoch_unit(times)
-    if unit is None and same_as is not None and plain(same_as.known.columns["t"].header) == plain(
-            table.known.columns["t"].header):
-        unit = same_as.unit("t") or _epoch_unit(times) or _stepping_unit(same_as.columns["t"])
+    times, unit = table.columns["t"], table.unit("t")
     if unit is None and same_as is None:
         unit = _stepping_unit(times)
+    elif unit is None and same_as is not None and _time_of(same_as) == _time_of(table):
+        unit = same_as.unit("t") or _stepping_unit(same_as.columns["t"])
+    unit = unit or _epoch_unit(times)
     if unit is None:
         raise BadInput(f"{table.header.path}: expected to know the unit of the time {table.known.columns['t'].header}: "
                        f"give t={table.known.columns['t'].header}:UNIT in --columns, one of {', '.join(TIME_UNITS)}")
     return np.asarray(times * TIME_UNITS[unit])
+
+
+def _time_of(table: LoggerTable) -> str:
+    return plain(table.known.columns["t"].header)
 
 
 def _epoch_unit(times: Array) -> str | None:

@@ -67,8 +67,10 @@ def _axes(pattern: str, letters: str = "xyz") -> dict[str, str]:
 
 _SENSOR_LOGGER = _axes("{}|m/s2") | {"t": "seconds_elapsed|s"}
 LAYOUTS = (
-    # phyphox.org, data export of the experiments "Acceleration (with g)", "(without g)" and "Location (GPS)"
+    # phyphox.org, data export of the experiments "Acceleration (with g)", "(without g)" and "Location (GPS)", and of
+    # experiments that users put together
     _layout("phyphox acceleration", t="Time (s)|s", **_axes("Acceleration {} (m/s^2)|m/s2")),
+    _layout("phyphox acceleration", t="Time (s)|s", **_axes("{} (m/s^2)|m/s2", "XYZ")),
     _layout("phyphox linear acceleration", t="Time (s)|s", **_axes("Linear Acceleration {} (m/s^2)|m/s2")),
     *(_layout("phyphox location", t="Time (s)|s", lat="Latitude (°)|deg", lon="Longitude (°)|deg", speed=speed)
       for speed in ("Velocity (m/s)|m/s", "Speed (m/s)|m/s")),
