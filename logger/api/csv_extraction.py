@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.csv_fixes import check_speed, fixes_of, receiver_of
 from logger.api.extracted_runs import RATE_HZ, Extracted, Fixes, MeasuredProfile, Recorded, Tell, apart, write_runs
 from logger.errors import BadInput
 from logger.runs import RecordFacts
@@ -25,11 +26,11 @@ from logger.service.config import Config
 from logger.service.drive_readings import GridReadings
 from logger.store.formats.logger_columns import Named, Recognised, advice
 from logger.store.formats.logger_csv import Header, LoggerTable, read_header, read_table, recognised, seconds
-from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, PLACE, SPEED_UNITS, units_of
+from logger.store.formats.logger_layouts import ACCELERATION_UNITS, AXES, GRAVITY, units_of
+from logger.store.formats.record_file import MAX_MPS2
 from logger.units import STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
-    from logger.estimation.receiver_delay import Belief
     from logger.extraction.even_samples import EvenSamples
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,6 @@ _FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
 _CUT_S = 1.0  # to either side of a turn in the mount
 _LATEST_S = 1e5  # of later times the ten digits of a drive do not tell samples apart
 _DISORDER_S = 0.5
-_FEED_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
         raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
     notes += _repairs(even)
     raw = _fixes(tables, asked, config, origin_s, even)
-    receiver = _receiver(config, even, raw, learns=has_gravity and samples.shape[1] == 3 and asked.speed_mps is None)
+    receiver = receiver_of(config, even, raw, learns=has_gravity and samples.shape[1] == 3 and asked.speed_mps is None)
     if asked.speed_mps is not None:
         receiver = replace(receiver, delay_s=0.0, std_s=0.0)
     fixes = replace(raw, time_s=raw.time_s - receiver.delay_s)
@@ -115,7 +115,7 @@ def _recorded(source: Path, asked: Asked, config: Config, tell: Tell) -> Recorde
     seen_hz = SEEN * even.own_hz
     facts = RecordFacts(step_mps2=_step_mps2(samples), range_mps2=range_end,
                         pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
-    return Recorded(readings, fixes, config, model, facts, receiver, notes=tuple(notes))
+    return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes))
 
 
 # --- files ---
@@ -256,6 +256,10 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     values = np.stack([table.columns[role] for role in roles], axis=1)
     rows = np.flatnonzero(np.isfinite(times_s) & np.isfinite(values).all(axis=1))
     time_s, values = times_s[rows], values[rows]
+    if (wild := (np.abs(values) > MAX_MPS2).any(axis=1)).any():
+        row = int(np.argmax(wild))
+        raise table.wrong(int(rows[row]), f"expected accelerations within {MAX_MPS2:g}, found "
+                          f"{np.abs(values[row]).max():g}")
     back_s = np.maximum.accumulate(time_s) - time_s if len(time_s) else time_s
     if (back_s > _DISORDER_S).any():
         row = int(np.argmax(back_s > _DISORDER_S))
@@ -343,7 +347,7 @@ def _fixes(tables: _Tables, asked: Asked, config: Config, origin_s: float, even:
     if table is None:
         raise BadInput(f"{path}: expected a speed, or latitude and longitude, found neither: give the file that has "
                        "them as --location FILE, name their columns in --columns, or give --speed M/S if it was steady")
-    found = _columns_of_fixes(table, origin_s, tables.acceleration, config)
+    found = fixes_of(table, origin_s, tables.acceleration, config.pipeline.stationary_mps)
     span_s = (even.time_s[0], even.time_s[-1])
     inside = (found.time_s >= span_s[0] - 1.0) & (found.time_s <= span_s[1] + 1.0)
     if np.count_nonzero(inside) < 2:
@@ -353,80 +357,5 @@ def _fixes(tables: _Tables, asked: Asked, config: Config, origin_s: float, even:
         raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, at the same time, found "
                        f"{said}")
     found = found.part(inside)
-    _check_speed(table, found)
+    check_speed(table, found)
     return found.part(apart(found.time_s))
-
-
-def _columns_of_fixes(table: LoggerTable, origin_s: float, beside: LoggerTable, config: Config) -> Fixes:
-    from logger.extraction.held_fixes import new_rows, speeds_of_places
-
-    has_places = set(PLACE) <= set(table.columns)
-    has_speed = "speed" in table.columns
-    roles = (*(PLACE if has_places else ()), *(("speed",) if has_speed else ()))
-    needed = PLACE if has_places else ("speed",)
-    times_s = seconds(table, None if table is beside else beside) - origin_s
-    there = np.isfinite(times_s) & np.all([np.isfinite(table.columns[role]) for role in needed], axis=0)
-    order = np.flatnonzero(there)[np.argsort(times_s[there], kind="stable")]
-    order = order[np.append(True, np.diff(times_s[order]) > 0)] if len(order) else order
-    time_s = times_s[order]
-    nowhere = np.full(len(order), np.nan)
-    lat, lon = (table.columns[role][order] if has_places else nowhere for role in PLACE)
-    if (wild := (np.abs(lat) > 90) | (np.abs(lon) > 360)).any():
-        row = int(np.argmax(wild))
-        raise table.wrong(int(order[row]), f"expected a latitude and a longitude in degrees, found {lat[row]:g} and "
-                          f"{lon[row]:g}")
-    speed = table.columns["speed"][order] * _speed_scale(table) if has_speed else nowhere
-    speed = np.where(speed < 0, np.nan, speed)  # programs write -1 where it is not known
-    standing_mps = config.pipeline.stationary_mps
-    rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)),
-                    np.nan_to_num(speed), standing_mps if has_speed else np.inf)
-    found = Fixes(time_s, speed, lat, lon).part(rows)
-    if len(rows) > 1 and has_places and not np.isfinite(found.speed_mps).all():
-        by_places = speeds_of_places(found.time_s, found.lat_deg, found.lon_deg)
-        found = replace(found, speed_mps=np.where(np.isfinite(found.speed_mps), found.speed_mps, by_places))
-    return found.part(np.isfinite(found.speed_mps))
-
-
-def _speed_scale(table: LoggerTable) -> float:
-    unit = table.unit("speed")
-    if unit is None:
-        column = table.known.columns["speed"].header
-        raise BadInput(f"{table.header.path}:{table.header.line}: expected to know the unit of the speed {column}: "
-                       f"give speed={column}:UNIT in --columns, one of {', '.join(SPEED_UNITS)}")
-    return SPEED_UNITS[unit]
-
-
-def _check_speed(table: LoggerTable, fixes: Fixes) -> None:
-    from logger.extraction.held_fixes import way_over_speed
-
-    if "speed" not in table.columns or not fixes.have_places:
-        return
-    ratio = way_over_speed(fixes.time_s, fixes.lat_deg, fixes.lon_deg, fixes.speed_mps)
-    if ratio is not None:
-        raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the places, "
-                       f"found places {ratio:.2g} times as far apart: name its unit in --columns, speed="
-                       f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}")
-
-
-def _receiver(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> Belief:
-    """How late fixes are: by the settings, else what is usual and what braking tells."""
-    from logger.estimation.drive_alignment import DriveAlignment
-    from logger.estimation.receiver_delay import combined
-    from logger.service.receiver_learning import at_start
-
-    known = at_start(config.gps, None)
-    if not learns or known.std_s == 0.0:
-        return known
-    alignment = DriveAlignment(2, 1.0)
-    heard = even.present
-    time_s, samples = even.time_s[heard], even.samples[heard]
-    ends_s = np.arange(time_s[0] + _FEED_S, time_s[-1] + _FEED_S, _FEED_S)
-    parts = np.split(np.arange(len(time_s)), np.searchsorted(time_s, ends_s))
-    fix = 0
-    for end_s, part in zip([*ends_s, np.inf], parts, strict=True):
-        while fix < len(fixes.time_s) and fixes.time_s[fix] < end_s:
-            alignment.take_fix(float(fixes.time_s[fix]), float(fixes.speed_mps[fix]))
-            fix += 1
-        alignment.take_readings(time_s[part], samples[part])
-    found = combined(known, alignment.estimate())
-    return replace(found, delay_s=max(0.0, found.delay_s))

@@ -151,7 +151,9 @@ def _show(source: Path, found: Extracted) -> None:
             words += f" on the profile, places +- {one.place_std_m:.2g} m ({how})"
         if one.gaps:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
-        print(f"{words}; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s")
+        if one.delay_s or one.delay_std_s:
+            words += f"; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s"
+        print(words)
     if found.left_out_s >= 1:
         print(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:

@@ -70,16 +70,17 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
     pieces = [part for part in np.split(np.arange(len(time_s)), ends) if len(part) >= _FEWEST]
     if not pieces:
         raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
-    taken = [_taken(time_s[part], samples[part], clipped[part]) for part in pieces]
+    whole = [_taken(time_s[part], samples[part], clipped[part]) for part in pieces]
+    taken = [one for one in whole if len(one[0]) >= _FEWEST]
+    if not taken:
+        raise ValueError(f"expected {_FEWEST} samples or more that were taken, each at a time of its own, found fewer")
     own_hz = mean_rate_hz(max(taken, key=lambda one: len(one[0]))[0])
-    dropped = 1.0 - sum(len(one[0]) for one in taken) / sum(len(part) for part in pieces)
+    dropped = 1.0 - sum(len(one[0]) for one in whole) / sum(len(part) for part in pieces)
     if own_hz < LEAST_RATE_HZ:
         also = f" written at {len(time_s) / (time_s[-1] - time_s[0]):.3g} Hz" if dropped > 0 else ""
         raise ValueError(f"expected {LEAST_RATE_HZ:g} samples a second or more that were taken, found {own_hz:.3g}"
                          f"{also}: set the program to a higher rate")
-    laid = [_laid(*one, own_hz, rate_hz) for one in taken if len(one[0]) >= _FEWEST]
-    if not laid:
-        raise ValueError(f"expected {_FEWEST} samples or more that were taken, found fewer")
+    laid = [_laid(*one, own_hz, rate_hz) for one in taken]
     times_s, values, present, ends_met = (np.concatenate(part) for part in list(zip(*laid, strict=True))[:4])
     return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid))
 

@@ -23,7 +23,7 @@ from logger.files import read_bounded
 from logger.store.formats.csv_table import refuse_long_lines, shown
 from logger.store.formats.logger_columns import Named, Recognised, plain, recognise
 from logger.store.formats.logger_layouts import TIME_UNITS
-from logger.store.formats.record_file import MAX_BYTES
+from logger.store.formats.record_file import MAX_BYTES, MAX_TIME_S
 
 Array = npt.NDArray[np.float64]
 
@@ -49,12 +49,14 @@ class Header:
 @dataclass(frozen=True, eq=False)
 class LoggerTable:
     """The columns (n,) of a file by role, as they are written but for NaN where a cell is empty; times of the unit
-    "iso" are seconds since 1970. ``lines`` (n,) in which they stand."""
+    "iso" are seconds since 1970. ``lines`` (n,) in which they stand; ``is_torn``: the last line was cut short, and is
+    left out."""
 
     header: Header
     known: Recognised
     columns: Mapping[str, Array]
     lines: npt.NDArray[np.int64]
+    is_torn: bool = False
 
     def unit(self, role: str) -> str | None:
         """The unit of a column, where it is known."""
@@ -95,12 +97,12 @@ def read_table(header: Header, known: Recognised) -> LoggerTable:
     body = header.text.split("\n", header.line)[header.line] if header.text.count("\n") >= header.line else ""
     if not body.strip():
         raise BadInput(f"{header.path}:{header.line + 1}: expected numbers below the header, found nothing")
-    table, lines = _at_once(body, header, list(places.values())), None
-    if table is None:
-        table, lines = _by_line(body, header, places)
+    table = _at_once(body, header, list(places.values()))
+    if table is not None:
+        lines, is_torn = header.line + 1 + np.arange(len(table)), False
     else:
-        lines = header.line + 1 + np.arange(len(table))
-    return LoggerTable(header, known, dict(zip(places, table.T.copy(), strict=True)), lines)
+        table, lines, is_torn = _by_line(body, header, places)
+    return LoggerTable(header, known, dict(zip(places, table.T.copy(), strict=True)), lines, is_torn)
 
 
 def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
@@ -115,7 +117,11 @@ def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
     if unit is None:
         raise BadInput(f"{table.header.path}: expected to know the unit of the time {table.known.columns['t'].header}: "
                        f"give t={table.known.columns['t'].header}:UNIT in --columns, one of {', '.join(TIME_UNITS)}")
-    return np.asarray(times * TIME_UNITS[unit])
+    times_s = np.asarray(times * TIME_UNITS[unit])
+    if (far := np.abs(times_s) > MAX_TIME_S).any():
+        raise table.wrong(int(np.argmax(far)), f"expected times within {MAX_TIME_S:g} s, found "
+                          f"{times_s[np.argmax(far)]:.4g} s: is the unit {unit} right?")
+    return times_s
 
 
 def _time_of(table: LoggerTable) -> str:
@@ -160,14 +166,19 @@ def _at_once(body: str, header: Header, places: list[int]) -> Array | None:
     return table if same and np.isfinite(table).all() else None
 
 
-def _by_line(body: str, header: Header, places: Mapping[str, int]) -> tuple[Array, npt.NDArray[np.int64]]:
-    rows, lines = [], []
+def _by_line(body: str, header: Header, places: Mapping[str, int]) -> tuple[Array, npt.NDArray[np.int64], bool]:
+    rows, lines, is_torn = [], [], False
     for number, cells in _rows(body, header):
+        if is_torn := len(cells) < len(header.names) and number == header.line + 1 + body.count("\n"):
+            break  # without an end of its line: the recorder was stopped while it wrote
+        if len(cells) != len(header.names):
+            raise BadInput(f"{header.path}:{number}: expected {len(header.names)} fields, found "
+                           f"{shown(header.delimiter.join(cells).strip())}")
         rows.append([_number(cells[place], role, header, number) for role, place in places.items()])
         lines.append(number)
     if not rows:
         raise BadInput(f"{header.path}:{header.line + 1}: expected numbers below the header, found nothing")
-    return np.array(rows, dtype=float), np.array(lines, dtype=np.int64)
+    return np.array(rows, dtype=float), np.array(lines, dtype=np.int64), is_torn
 
 
 def _rows(body: str, header: Header) -> Iterator[tuple[int, list[str]]]:
@@ -177,8 +188,6 @@ def _rows(body: str, header: Header) -> Iterator[tuple[int, list[str]]]:
         cells = next(csv.reader([line], delimiter=header.delimiter))
         if len(cells) == len(header.names) + 1 and not cells[-1].strip():
             cells.pop()  # some programs end each line with a separator
-        if len(cells) != len(header.names):
-            raise BadInput(f"{header.path}:{number}: expected {len(header.names)} fields, found {shown(line.strip())}")
         yield number, cells
 
 

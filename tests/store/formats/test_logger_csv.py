@@ -107,6 +107,13 @@ def test_a_bad_cell_is_named_with_its_line(text: str, said: str, tmp_path: Path)
         table(tmp_path / "a.csv", text)
 
 
+def test_a_last_line_that_was_cut_short_is_left_out(tmp_path: Path) -> None:
+    found = table(tmp_path / "a.csv", "t_s,speed_mps,accel_z_mps2\n1,2,3\n2,3,4\n3,")
+    assert found.is_torn
+    assert found.columns["t"].tolist() == [1, 2]
+    assert not table(tmp_path / "b.csv", "t_s,speed_mps,accel_z_mps2\n1,2,3\n2,3,4").is_torn
+
+
 def test_named_columns() -> None:
     found = named_columns("t=Time, local:ms, x=a:b:g,y=(y) [m/s^2],z=z,speed=v:km/h")
     assert {role: (one.header, one.unit) for role, (one,) in found.items()} == {
