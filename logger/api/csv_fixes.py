@@ -50,8 +50,8 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
     speed = np.where(speed < 0, np.nan, speed)  # programs write -1 where it is not known
     if (fast := speed > MAX_SPEED_MPS).any():
         row = int(np.argmax(fast))
-        raise table.wrong(int(order[row]), f"expected a speed within {MAX_SPEED_MPS:g} m/s, found {speed[row]:.4g}; is its "
-                          "unit right?")
+        raise table.wrong(int(order[row]), f"expected a speed within {MAX_SPEED_MPS:g} m/s, found {speed[row]:.4g}: is "
+                          "its unit right?")
     rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)),
                     np.nan_to_num(speed), standing_mps if has_speed else 0.0)
     found = Fixes(time_s, speed, lat, lon).part(rows)
