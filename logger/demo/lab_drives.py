@@ -45,7 +45,7 @@ _NOISE_MPS2 = 0.05
 _WANDER_M = 0.004  # of the distance signal, after one second
 _BUMP_WIDTH_M = 3.6
 _SWING, _SWING_S = 0.12, 23.0
-_LONG_AGO = (2015, 1, 1, 0, 0, 0)
+LONG_AGO = (2015, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def main() -> None:
             write_run(Path(folder) / plan.name, plan)
             for name in (DRIVE, PROFILE):
                 # A date of its own, so that the archive is the same whenever it is made.
-                entry = ZipInfo(f"{plan.name}/{name}", _LONG_AGO)
+                entry = ZipInfo(f"{plan.name}/{name}", LONG_AGO)
                 entry.compress_type = ZIP_DEFLATED
                 archive.writestr(entry, (Path(folder) / plan.name / name).read_bytes())
 

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import resample_poly
 
+from logger.profiles.track import Track
 from logger.roads import iri, iso8608
 from logger.roads.bumps import speed_bump
 from logger.vehicle import half_car
+from logger.vehicle.compose import Car, recorded
+from logger.vehicle.passage import Passage
 from logger.vehicle.state_space import recursion, straight_step
 from logger.vehicle.vehicle import Vehicle
 
@@ -28,6 +32,9 @@ _START_LAT_DEG, _START_LON_DEG = 38.9897, -76.9378
 _START_HEADING_RAD = 0.9
 _SWINGS = ((0.7, 2600.0, 0.0), (0.25, 900.0, 1.0))
 
+# A recorder's samples a second, and steps of ``STEP_S`` from one to the next.
+_RECORDER_HZ = 100
+_FINE = round(1 / (_RECORDER_HZ * STEP_S))
 # The recorder's anti-alias filter: flat to 38 Hz, shut at 50 Hz, without delay.
 _CUTOFF_HZ, _TAPS, _KAISER = 44.0, 401, 5.0
 
@@ -149,3 +156,10 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: Motion) -> Array:
     tap = np.arange(_TAPS) - _TAPS // 2
     kernel = np.sinc(2 * _CUTOFF_HZ * STEP_S * tap) * np.kaiser(_TAPS, _KAISER)
     return np.convolve(accel, kernel / kernel.sum(), mode="same")
+
+
+def sensed_acceleration(car: Car, road: Road, motion: Motion) -> Array:
+    """The same for a car with effects: what its sensor would record [m/s2], looked up between the recorder's samples."""
+    track = Track(SPACING_M, road.elevation_m, -LEAD_M)
+    samples = recorded(car, Passage(track, _RECORDER_HZ, motion.distance_m[::_FINE]))
+    return np.asarray(resample_poly(samples, _FINE, 1)[: len(motion.time_s)])

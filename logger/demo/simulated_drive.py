@@ -26,9 +26,21 @@ from drivers.accelerometers import DEFAULT, accelerometers, line_reader
 from drivers.accelerometers.accelerometer import Accelerometer, SerialAccelerometer
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.events import GPS
-from logger.demo.motion import STEP_S, Bump, Motion, Road, Stretch, body_acceleration, build_road, drive_along
+from logger.demo.motion import (
+    STEP_S,
+    Bump,
+    Motion,
+    Road,
+    Stretch,
+    body_acceleration,
+    build_road,
+    drive_along,
+    sensed_acceleration,
+)
 from logger.demo.receiver import Reception, parse_start, transmit
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +61,7 @@ class DrivePlan:
     """Everything that makes a drive.
 
     speed_knots    (time [s], speed [m/s]) from time 0; straight lines between them, corners rounded over a second
-    stretches      roughness along the road; the last one goes on
+    stretches      roughness along the road, where it is the plan's own; the last one goes on
     bumps          speed bumps
     reception      what the GPS receiver sees
     sensor         ``DEFAULT``, the accelerometer that settings mean when they name none (a BMA220: register bytes), or
@@ -96,15 +108,22 @@ class Drive:
     road: Road
 
 
-def simulate_drive(plan: DrivePlan, vehicle: Vehicle) -> Drive:
-    """Drive a half car along the plan. ValueError for a sensor that is not known."""
+def simulate_drive(plan: DrivePlan, vehicle: Vehicle, effects: Sequence[Chosen] = (), road: Road | None = None
+                   ) -> Drive:
+    """Drive a half car along the plan. ValueError for a sensor that is not known.
+
+    effects    physical effects of the car
+    road       one that other drives share, at least as long as the drive; None: one of the plan's own
+    """
     if plan.sensor not in (DEFAULT, LINES):
         raise ValueError(f"expected the sensor {DEFAULT} or {LINES}, found {plan.sensor!r}")
     kind = line_reader() if plan.sensor == LINES else accelerometers()[plan.sensor]
     sensor_rng, wire_rng, receiver_rng = (np.random.default_rng([plan.seed, part]) for part in range(3))
     motion = drive_along(plan.speed_knots)
-    road = build_road(plan.stretches, plan.bumps, motion.distance_m[-1], plan.seed)
-    accel = body_acceleration(vehicle, road, motion)
+    if road is None:
+        road = build_road(plan.stretches, plan.bumps, motion.distance_m[-1], plan.seed)
+    accel = (sensed_acceleration(compose(vehicle, effects), road, motion) if effects else
+             body_acceleration(vehicle, road, motion))
 
     start_utc = parse_start(plan.start_utc)
     data, arrival_s = transmit(motion, start_utc, plan.reception, GPS_BAUD, receiver_rng)
