@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,6 +42,9 @@ Say = Callable[[Iterable[str]], None]
 Ask = Callable[[Bench, str], str | None]
 """Which effect to add where one was found missing: its name or another's, or None for none."""
 Progress = Callable[[], AbstractContextManager[Tell]]
+Explain = Callable[[str, str, str], str]
+"""What to tell under a heading, laid out: of compare, diagnose, add, again or end; with the effect that is added, and
+the vehicle file that is read, or written where an effect is added."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,21 +149,37 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
         check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
-         explained: Mapping[str, str] | None = None) -> tuple[Story, vehicle_format.Model]:
+def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
+    """Nothing to tell beside what is found."""
+    return ""
+
+
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain = unexplained
+         ) -> tuple[Story, vehicle_format.Model]:
     """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
 
-    tell         told what was found
-    progress     around whatever takes its time, told what is under way
-    explained    what to tell of compare, diagnose, add and again, beside what they find
+    tell        told what was found
+    progress    around whatever takes its time, told what is under way
+    explain     what to tell of each step beside what it finds
     """
-    from logger.lab.session import Story
-    from logger.report.lab_text import addition_lines, diagnosis_lines
     from logger.report.session_text import ending
     from logger.report.story_page import page
 
-    why = explained or {}
-    tell(_chapter("Compare", why.get("compare")))
+    story, model = go_through(given, out, ask, tell, progress, explain)
+    write_text(out / STORY, page(story))
+    tell(chapter("The end", explain("end", "", "")))
+    tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
+    return story, model
+
+
+def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, explain: Explain
+               ) -> tuple[Story, vehicle_format.Model]:
+    """The same without its end and its page."""
+    from logger.lab.session import Story
+    from logger.report.lab_text import addition_lines, diagnosis_lines
+
+    word = given.word
+    tell(chapter("Compare", explain("compare", "", word)))
     first = _compared(given, progress)
     tell(_comparison_lines(first))
     diagnoses: list[diagnosis.Diagnosis] = []
@@ -169,7 +188,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
     going = True
     while going and len(rounds) < MOST_ROUNDS:
         going = False
-        tell(_chapter("Diagnose", why.get("diagnose")))
+        tell(chapter("Diagnose", explain("diagnose", "", word)))
         diagnoses.append(_diagnosed(given, frozenset(refused), progress))
         tell(diagnosis_lines(diagnoses[-1], _SHOWN))
         for one in diagnoses[-1].missing:
@@ -179,23 +198,21 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
             if wanted is None:
                 refused.append(one.effect.name)
                 continue
-            tell(_chapter(f"Add {wanted}", why.get("add")))
+            file = _vehicle_file(out, len(rounds) + 1)
+            tell(chapter(f"Add {wanted}", explain("add", wanted, str(file))))
             same = wanted == one.effect.name
             start = one if same else _searched(given, wanted, progress)
-            made, model = _round(given, start, _vehicle_file(out, len(rounds) + 1), progress)
+            made, model = _round(given, start, file, progress)
             rounds.append(made)
+            word = str(file)
             tell([*addition_lines(rounds[-1].addition), "", f"Vehicle: {rounds[-1].file}"])
-            tell(_chapter("Compare again", why.get("again")))
+            tell(chapter("Compare again", explain("again", wanted, word)))
             tell(_comparison_lines(rounds[-1].comparison))
             given = replace(given, model=model)
             if not same:  # what is missing beside another effect is to be found anew
                 going = True
                 break
-    story = Story(first, tuple(diagnoses), tuple(rounds), tuple(refused))
-    write_text(out / STORY, page(story))
-    tell(_chapter("The end", why.get("end")))
-    tell([paragraphs(ending(story)), "", f"The whole story as a page: {out / STORY}"])
-    return story, given.model
+    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused)), given.model
 
 
 def _round(given: Bench, start: Chosen, file: Path, progress: Progress) -> tuple[Round, vehicle_format.Model]:
@@ -229,8 +246,9 @@ def _compared(given: Bench, progress: Progress) -> compare.Comparison:
         return given.compared()
 
 
-def _chapter(title: str, explained: str | None) -> list[str]:
-    return ["", f"=== {title} ===", *([paragraphs([explained])] if explained else []), ""]
+def chapter(title: str, explained: str = "") -> list[str]:
+    """The lines of a heading, with what is told under it."""
+    return ["", f"=== {title} ===", *([explained] if explained else []), ""]
 
 
 def _comparison_lines(found: compare.Comparison) -> list[str]:

@@ -5,6 +5,7 @@ sent. It goes through recorded buses into the real drivers and the real service.
 
   ridelog demo
   ridelog demo --lab
+  ridelog demo --field
 """
 
 from __future__ import annotations
@@ -18,28 +19,36 @@ from logger.commands.replay import replay
 from logger.errors import EXIT_DONE, BadInput
 
 REPORT_NAME = "report.html"
-DRIVE_DIR, LAB_DIR = "ridelog-demo", "ridelog-lab"
+DRIVE_DIR, LAB_DIR, FIELD_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog demo``."""
     parser.add_argument("--out", metavar="DIR", type=Path,
-                        help=f"folder for what is written (default: {DRIVE_DIR}, with --lab {LAB_DIR})")
-    parser.add_argument("--lab", action="store_true",
-                        help="show the lab instead: two drives of a car that has something its model lacks, found")
+                        help=f"folder for what is written (default: {DRIVE_DIR}, with --lab {LAB_DIR}, with --field "
+                             f"{FIELD_DIR})")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--lab", action="store_true",
+                       help="show the lab instead: two drives of a car that has something its model lacks, found")
+    shown.add_argument("--field", action="store_true",
+                       help="show the loop from a car's recordings to a better IRI: four drives, two measured lines")
     parser.add_argument("--unpack", action="store_true",
-                        help="with --lab: only write the two drives, to find it yourself")
+                        help="with --lab or --field: only write the drives, to find it yourself")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog demo``."""
-    if args.unpack and not args.lab:
-        raise BadInput("demo: expected --lab with --unpack")
+    if args.unpack and not (args.lab or args.field):
+        raise BadInput("demo: expected --lab or --field with --unpack")
     if args.lab:
         from logger.commands.demo_lab import lab
 
         lab(args.out or Path(LAB_DIR), args.unpack, args.json)
+    elif args.field:
+        from logger.commands.demo_field import field
+
+        field(args.out or Path(FIELD_DIR), args.unpack, args.json)
     else:
         _drive(args.out or Path(DRIVE_DIR), args.json)
     return EXIT_DONE

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from importlib import resources
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
-from zipfile import ZipFile
 
 from logger.commands.lab import say, take, walk
 from logger.commands.lab_model import bench_from
-from logger.errors import BadInput
-from logger.files import naming
 from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
@@ -54,46 +51,47 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     if not as_json:
         print(paragraphs([_INTRODUCTION]))
     given = bench_from(VEHICLE, folders)
-    story = walk(given, out, take, unsaid_lines if as_json else say, _EXPLAINED)
+    story = walk(given, out, take, unsaid_lines if as_json else say, _explained)
     if as_json:
         print(json.dumps(story_json(story) | {"story": str(out / STORY)}, allow_nan=False))
     else:
         print("\n".join(_answer(story)))
 
 
-def unpack(out: Path) -> list[Path]:
-    """Write the drives below ``out``, where they may be already; their folders.
+def _explained(chapter: str, _effect: str, _vehicle: str) -> str:
+    return paragraphs([_EXPLAINED[chapter]]) if chapter in _EXPLAINED else ""
 
-    Raises BadInput, and writes nothing, where something else of one of their names is there; OSError as ``open``.
-    """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out {out}: expected a folder")
-    with resources.as_file(resources.files("logger.demo") / "lab.zip") as file, ZipFile(file) as archive:
-        contents = {out / name: archive.read(name) for name in archive.namelist()}
-    for path, content in contents.items():
-        if path.parent.exists() and not path.parent.is_dir():
-            raise BadInput(f"{path.parent}: expected a folder, or nothing; choose another folder with --out")
-        if path.exists() and not (path.is_file() and path.read_bytes() == content):
-            raise BadInput(f"{path}: expected nothing there, or the demo's own file, found something else; choose "
-                           "another folder with --out")
-    for path, content in contents.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with naming(path):
-            path.write_bytes(content)
-    return sorted({path.parent for path in contents}, reverse=True)
+
+def unpack(out: Path) -> list[Path]:
+    """Write the drives below ``out``, as ``unpacked``; their folders."""
+    from logger.demo.unpacking import unpacked
+
+    return sorted({path.parent for path in unpacked("lab.zip", out)}, reverse=True)
 
 
 def _answer(story: Story) -> list[str]:
     """What the simulated car truly was, beside what was found."""
+    from logger.api.lab_loop import chapter
     from logger.demo.lab_drives import EFFECT, EFFECT_VALUES, OFF
+
+    sentence, table = truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
+    return [*chapter("The answer"), paragraphs([sentence]), "", *table]
+
+
+def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Mapping[str, float]
+                 ) -> tuple[str, list[str]]:
+    """What a simulated car truly was, beside what was found: a sentence, and the lines of a table.
+
+    effect, values    that it had
+    off               by which factor its numbers were not those of its file
+    """
     from logger.report.quantities import numbers_of
 
-    found = {one.effect.name: one for one in story.last.effects}
+    found = {one.effect.name for one in story.last.effects}
     rows = [("Number", "True", "Without", "With")]
-    rows += [(one.name, f"{OFF.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
+    rows += [(one.name, f"{off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
-    told = ", ".join(f"{name} {value:.3g}" for name, value in EFFECT_VALUES.items())
-    mine = numbers_of(story.rounds[-1].addition.new[-1]) if EFFECT in found else "nothing of the kind"
-    return ["", "=== The answer ===", "", paragraphs([
-        f"The drives were simulated. The car had {EFFECT}, {told}; found: {mine}. Its numbers differed from its "
-        "file, in per cent:"]), "", *columns(rows)]
+    told = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
+    mine = numbers_of(story.rounds[-1].addition.new[-1]) if effect in found else "nothing of the kind"
+    return (f"The drives were simulated. The car had {effect}, {told}; found: {mine}. Its numbers differed from its "
+            "file, in per cent:", columns(rows))

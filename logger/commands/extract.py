@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         wipe()
         done.append(found)
         if not args.json:
-            _show(source, found)
+            print("\n".join(lines(source, found)))
     if not done:
         raise BadInput(f"expected a {'recording' if args.csv else 'dump'} that can be used, found none among "
                        f"{len(sources)}")
@@ -141,9 +141,9 @@ def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
         raise BadInput(f"{again}: expected {what} of different names, so that each has a folder of its own")
 
 
-def _show(source: Path, found: Extracted) -> None:
-    for note in found.notes:
-        print(f"{source}: {note}")
+def lines(source: Path, found: Extracted) -> list[str]:
+    """What a person is told of a recording."""
+    told = [f"{source}: {note}" for note in found.notes]
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
@@ -153,8 +153,9 @@ def _show(source: Path, found: Extracted) -> None:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         if one.delay_s or one.delay_std_s:
             words += f"; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s"
-        print(words)
+        told.append(words)
     if found.left_out_s >= 1:
-        print(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
+        told.append(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:
-        print(f"{source}: the recording was cut short; everything before the cut was used")
+        told.append(f"{source}: the recording was cut short; everything before the cut was used")
+    return told

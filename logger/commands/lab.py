@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
     from logger.api.bench import Bench
-    from logger.api.lab_loop import Ask, Say
+    from logger.api.lab_loop import Ask, Explain, Say
     from logger.lab.session import Story
 
 
@@ -48,12 +48,12 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def walk(given: Bench, out: Path, ask: Ask, tell: Say, explained: Mapping[str, str] | None = None) -> Story:
+def walk(given: Bench, out: Path, ask: Ask, tell: Say, explain: Explain | None = None) -> Story:
     """Go through the loop, as ``lab_loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
     from logger.api import lab_loop
 
     lab_loop.make_ready(given, out, "--out")
-    return lab_loop.walk(given, out, ask, tell, progress, explained)[0]
+    return lab_loop.walk(given, out, ask, tell, progress, explain or lab_loop.unexplained)[0]
 
 
 # --- at the terminal ---

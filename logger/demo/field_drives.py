@@ -21,7 +21,7 @@ import numpy as np
 from logger.demo.lab_drives import LONG_AGO
 from logger.demo.motion import LEAD_M, SPACING_M, Road, Stretch, build_road
 from logger.demo.receiver import Reception
-from logger.demo.simulated_drive import LINES, Drive, DrivePlan, record, simulate_drive
+from logger.demo.simulated_drive import DEFAULT, LINES, Drive, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
@@ -46,12 +46,15 @@ LINE, BEYOND = "line.csv", "beyond.csv"
 LINES_M: Mapping[str, tuple[float, float]] = {LINE: (60.0, 560.0), BEYOND: (600.0, 1200.0)}
 """From where to where, as the way goes."""
 _PLACE_EVERY = 200  # rows of a line
-_STREET = (Stretch(180, 60), Stretch(160, 200), Stretch(180, 30), Stretch(110, 60), Stretch(160, 120),
-           Stretch(180, 16), Stretch(150, 250), Stretch(300, 60))
+_STREET = (Stretch(220, 300), Stretch(160, 700), Stretch(210, 250), Stretch(150, 80), Stretch(150, 200),
+           Stretch(150, 50), Stretch(130, 300), Stretch(300, 100))
+# A console that shakes. The serial sensor is no better than a BMA220 with its steps (0.18 m/s2) and less noise: the lab
+# takes one noise for all drives, and calls what is louder in one of them unexplained.
+_NOISE_MPS2 = {DEFAULT: 0.17, LINES: 0.22}
 _LENGTH_M, _SEED = 1300.0, 1927
 
 
-def _pass(speed_mps: float, swing: float, to_m: float, seed: int, sensor: str = "") -> DrivePlan:
+def _pass(speed_mps: float, swing: float, to_m: float, seed: int, sensor: str = DEFAULT) -> DrivePlan:
     """From the car park at the beginning of the street, up to a speed that swings a little, past ``to_m``, to rest."""
     going_s = to_m / speed_mps
     knots = [(0.0, 0.0), (5.0, 0.0), (5.0 + speed_mps / 2, speed_mps)]
@@ -59,17 +62,16 @@ def _pass(speed_mps: float, swing: float, to_m: float, seed: int, sensor: str = 
         knots.append((begin_s + 8.0, speed_mps * (1 + swing * (-1) ** len(knots))))
     end_s = knots[-1][0]
     knots += [(end_s + speed_mps / 2.5, 0.0), (end_s + speed_mps / 2.5 + 4.0, 0.0)]
-    said = {"sensor": sensor, "noise_mps2": 0.05} if sensor else {"noise_mps2": 0.1}
     return DrivePlan(
         speed_knots=knots, stretches=(), seed=seed, reception=Reception(first_fix_s=2.0, latency_s=0.18),
-        offset_mps2=(0.12, -0.2, 0.17), **said)  # type: ignore[arg-type]
+        sensor=sensor, noise_mps2=_NOISE_MPS2[sensor], offset_mps2=(0.12, -0.2, 0.17))
 
 
 PLANS: Mapping[str, DrivePlan] = {
-    "first": _pass(7.0, 0.15, 570.0, 11),
-    "second": _pass(11.0, 0.12, 570.0, 12, LINES),
-    "third": _pass(15.0, 0.10, 570.0, 13),
-    FOURTH: _pass(13.0, 0.12, 1210.0, 14, LINES),
+    "first": _pass(8.0, 0.15, 570.0, 11, LINES),
+    "second": _pass(11.0, 0.12, 570.0, 12),
+    "third": _pass(15.0, 0.10, 570.0, 13, LINES),
+    FOURTH: _pass(13.0, 0.12, 1210.0, 14),
 }
 
 

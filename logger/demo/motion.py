@@ -159,7 +159,7 @@ def body_acceleration(vehicle: Vehicle, road: Road, motion: Motion) -> Array:
 
 
 def sensed_acceleration(car: Car, road: Road, motion: Motion) -> Array:
-    """The same for a car with effects: what its sensor would record [m/s2], looked up between the recorder's samples."""
+    """The same for a car with effects: what its sensor would record [m/s2], between the recorder's samples as well."""
     track = Track(SPACING_M, road.elevation_m, -LEAD_M)
     samples = recorded(car, Passage(track, _RECORDER_HZ, motion.distance_m[::_FINE]))
     return np.asarray(resample_poly(samples, _FINE, 1)[: len(motion.time_s)])

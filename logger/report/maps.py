@@ -13,6 +13,7 @@ from math import hypot
 
 import numpy as np
 
+from logger.chart_data import Array
 from logger.geodesy import east_and_north_m
 from logger.records import WindowRecord
 from logger.report.charts import WIDTH, nice_step, numbered_mark
@@ -24,6 +25,7 @@ _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
 _LEAST_SPAN_M = 50.0
 _TOLERANCE = 0.3
+_SPREAD = (1, 2, 4, 6)  # colours of a page's style that differ most, on its dark casing
 
 Point = tuple[float, float]
 
@@ -56,6 +58,42 @@ def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], 
                 projection.height, concatenated(parts))
 
 
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A line on the ground: latitudes and longitudes (n,) [degrees]."""
+
+    name: str
+    lat_deg: Array
+    lon_deg: Array
+
+
+def ways_map(measured: Sequence[Way], driven: Sequence[Way]) -> Html:
+    """The figure of lines that were measured, wide, under the places at which drives were seen, as dots; with a key."""
+    projection = _Projection.around([place for one in measured for place in _places(one)])
+    parts = [html('<path class="casing" d="{}"/>', _path([projection.xy(place) for place in _places(one)]))
+             for one in measured]
+    for number, one in enumerate(driven):
+        dots = (projection.xy(place) for place in _places(one))
+        parts.append(concatenated(html('<circle cx="{:.1f}" cy="{:.1f}" r="2.4" style="fill:var(--c{})"/>', *dot,
+                                       _SPREAD[number % len(_SPREAD)]) for dot in dots))
+    parts += [_end(projection.xy(_places(one)[0]), "start", one.name) for one in measured]
+    drawn = html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the drives">{}</svg>', WIDTH,
+                 projection.height, concatenated([*parts, _scale_bar(projection), _north()]))
+    key = concatenated(html('<li><i class="f{}"></i>{}</li>', _SPREAD[number % len(_SPREAD)], one.name)
+                       for number, one in enumerate(driven))
+    return drawn + html('<ul class="legend">{}</ul>', key)
+
+
+def _places(way: Way) -> list[_Spot]:
+    return [_Spot(float(lat), float(lon)) for lat, lon in zip(way.lat_deg, way.lon_deg, strict=True)]
+
+
+@dataclass(frozen=True)
+class _Spot:
+    lat_deg: float
+    lon_deg: float
+
+
 @dataclass(frozen=True)
 class _Projection:
     """From degrees to the picture."""
@@ -67,7 +105,7 @@ class _Projection:
     height: float
 
     @classmethod
-    def around(cls, records: Sequence[WindowRecord]) -> _Projection:
+    def around(cls, records: Sequence[WindowRecord | _Spot]) -> _Projection:
         """The largest scale at which all rows fit the picture."""
         latitudes = [record.lat_deg or 0.0 for record in records]
         plain = cls((min(latitudes) + max(latitudes)) / 2, records[0].lon_deg or 0.0, (0.0, 0.0), 1.0, 0.0)
@@ -79,11 +117,11 @@ class _Projection:
         height = max(high_m * scale + 2 * _MARGIN, _LEAST_HEIGHT)
         return cls(plain.lat_deg, plain.lon_deg, (float(middle[0]), float(middle[1])), float(scale), float(height))
 
-    def metres(self, place: WindowRecord | Place) -> Point:
+    def metres(self, place: WindowRecord | Place | _Spot) -> Point:
         """East and north of the origin [m]."""
         return east_and_north_m(place.lat_deg or 0.0, place.lon_deg or 0.0, self.lat_deg, self.lon_deg)
 
-    def xy(self, place: WindowRecord | Place) -> Point:
+    def xy(self, place: WindowRecord | Place | _Spot) -> Point:
         """In the picture, y downwards."""
         east_m, north_m = self.metres(place)
         return (WIDTH / 2 + (east_m - self.middle_m[0]) * self.units_per_m,

@@ -36,7 +36,7 @@ def page(story: Story) -> Html:
         section("At first", paragraphs(headline(story.first)) + bullets(evidence(story.first))),
         section("What was missing", concatenated(paragraphs(summary(one)) for one in story.diagnoses)),
         *map(_added, story.rounds),
-        section("Before and after", _spectra(story) + _place(story)) if story.rounds else "",
+        section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
         section("What the car's numbers had been taken for", _moved(story)),
         section("At last", paragraphs(headline(story.last)) + bullets(evidence(story.last))) if story.rounds else "",
         shape_sections(last),
@@ -75,7 +75,7 @@ def _moved(story: Story) -> Html:
     return grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5)) + hint(MOVED_HINT)
 
 
-def _spectra(story: Story) -> Html:
+def residual_spectra(story: Story) -> Html:
     """The residual before and after, by frequency."""
     before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)

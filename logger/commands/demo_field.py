@@ -1,0 +1,240 @@
+"""``ridelog demo --field``: from recorded bytes on a measured line to a better IRI, each step with its command."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from logger.commands.demo_lab import truth_beside
+from logger.commands.lab import say, take
+from logger.commands.lab_model import bench_from, on_screen, progress, wipe
+from logger.report.text_layout import columns, paragraphs
+
+if TYPE_CHECKING:
+    from logger.api.drives import Run
+    from logger.api.extraction import Extracted
+    from logger.api.lab_loop import Say
+    from logger.estimation.assessment import Assessment
+    from logger.lab.session import Story
+
+PAGE, RUNS = "field.html", "runs"
+_ABOUT = (
+    "A box in a RAV4 recorded three drives along one street, slowly, briskly and fast, and a fourth over the street "
+    "beyond. The second and the fourth have the BMA220 of the box, with its steps of 0.6 m/s2; for the first and the "
+    "third a serial accelerometer was plugged in. Both streets had been measured. All of it is simulated: car, "
+    "streets and receiver, down to the bytes.",
+    "Something is in this car that its file, rav4-2009, does not know. It makes the IRI wrong. The lab is to find out "
+    "from the first three drives what it is, and the fourth is to say whether that was right.",
+)
+_EXPLAINED = {
+    "extract": "First the bytes become runs. Look at the places: fixes are late and wrong by a metre or two, but the "
+               "car felt the road that was measured, and that says where it was.",
+    "before": "What would the box say of the fourth street? Look at the bias, and at the share of windows within two "
+              "standard errors: 0.95 would be right. On a street that nobody measured, nothing would tell.",
+    "compare": "Does the model fail on the three drives, or are only its numbers a little off? They are refitted within "
+               "a few per cent first. Look at what is left then, and where.",
+    "diagnose": "Which physical effect would explain that? Look at the chance, and at the errors: on stretches that no "
+                "fit saw, the right one comes down to the sensor's noise.",
+    "add": "It is fitted on all three drives, with the car's numbers. Look at those that were biased without it.",
+    "again": "Is that all? Look for anything that is more than noise.",
+    "after": "The fourth drive once more, which the lab has never seen, with the new file.",
+}
+
+
+def field(out: Path, unpack_only: bool, as_json: bool) -> None:
+    """Unpack the drives into ``out``, find what is missing, and judge the fourth with and without it."""
+    from logger.api.bench import require_compiler
+    from logger.api.lab_loop import unsaid_lines
+    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
+    from logger.demo.unpacking import unpacked
+    from logger.report.session_text import as_json as story_json
+    from logger.store.formats.effect_file import shipped_effects
+
+    if not unpack_only:
+        require_compiler("ridelog demo --field", shipped_effects().values())
+    unpacked("field.zip", out)
+    first, fourth = [_dump(out, name) for name in DRIVES], _dump(out, FOURTH)
+    commands = _Commands(out, first, fourth, VEHICLE)
+    if unpack_only:
+        print(json.dumps({"vehicle": VEHICLE, "dumps": [*map(str, first), str(fourth)],
+                          "lines": [str(out / LINE), str(out / BEYOND)]}) if as_json else
+              f"Four drives and two measured lines in {out}\nNext: {commands.extract()[0]}")
+        return
+    tell: Say = unsaid_lines if as_json else say
+    tell([paragraphs(_ABOUT)])
+    tell(_headed("Extract", "extract", *commands.extract()))
+    extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]
+    before = _judged(out / RUNS / FOURTH, VEHICLE, "The fourth drive, by the file as it is", "before", commands, tell)
+    story = _story(commands, out, tell)
+    last = story.rounds[-1].file if story.rounds else VEHICLE
+    after = _judged(out / RUNS / FOURTH, last, "The fourth drive, by the last file", "after", commands, tell)
+    page, sentence, table = out / PAGE, *_truth(story)
+    _write_page(page, out, story, before, after, sentence)
+    tell(_ending(story, before, after, page))
+    tell(["", "=== The answer ===", "", paragraphs([sentence]), "", *table])
+    if as_json:
+        print(json.dumps({"runs": [one.as_json() for each in extracted for one in each.runs], **story_json(story),
+                          "fourth": _fourth_json(before, after), "truth": _truth_json(), "page": str(page)},
+                         allow_nan=False))
+
+
+# --- steps ---
+
+
+class _Commands:
+    """What a person types for each step."""
+
+    def __init__(self, out: Path, first: list[Path], fourth: Path, vehicle: str) -> None:
+        self._out, self._first, self._fourth, self.vehicle = out, first, fourth, vehicle
+        self.runs = [out / RUNS / _name(one) for one in first]
+        self._listed = " ".join(map(str, self.runs))
+
+    def extract(self) -> tuple[str, str]:
+        from logger.demo.field_drives import BEYOND, LINE
+
+        runs = self._out / RUNS
+        return (f"ridelog extract {' '.join(map(str, self._first))} --out {runs} --profile {self._out / LINE}",
+                f"ridelog extract {self._fourth} --out {runs} --profile {self._out / BEYOND}")
+
+    def estimate(self, folder: Path, step_mps2: float, vehicle: str) -> str:
+        return f"ridelog estimate {folder} --vehicle {vehicle} --noise auto --step {step_mps2:g}"
+
+    def explain(self, chapter: str, effect: str, vehicle: str) -> str:
+        """Of the steps of ``lab_loop.go_through``."""
+        command = {
+            "compare": f"ridelog compare --vehicle {vehicle} {self._listed}",
+            "diagnose": f"ridelog diagnose --vehicle {vehicle} {self._listed}",
+            "add": f"ridelog add-effect {effect} --vehicle {self.vehicle} --out {vehicle} {self._listed}",
+            "again": f"ridelog compare --vehicle {vehicle} {self._listed}",
+        }[chapter]
+        if chapter == "again":
+            self.vehicle = vehicle  # what the next effect is added to
+        return _typed(chapter, command)
+
+
+def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
+    from logger.api.extraction import extract_dump, read_measured_profile
+    from logger.commands.extract import lines
+
+    try:
+        found = extract_dump(dump, out / RUNS, None, read_measured_profile(out / line), on_screen())
+    finally:
+        wipe()
+    tell(lines(dump, found))
+    return found
+
+
+def _story(commands: _Commands, out: Path, tell: Say) -> Story:
+    from logger.api.lab_loop import go_through, make_ready
+
+    given = bench_from(commands.vehicle, commands.runs)
+    make_ready(given, out, "--out")
+    return go_through(given, out, take, tell, progress, commands.explain)[0]
+
+
+def _run(folder: Path) -> Run:
+    from logger.api.drives import checked_run
+    from logger.store.formats.record_checks import Asked
+
+    return checked_run(folder, Asked(None, None))[0]
+
+
+def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
+    """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
+    from logger.api.drives import assessed
+    from logger.api.ranges import NOISE_MPS2
+    from logger.estimation.sensor_noise import Sensor
+    from logger.report.estimate_text import as_json, lines
+    from logger.shipped import vehicle_path
+    from logger.store.formats.run_file import read_run_facts
+    from logger.store.formats.vehicle_file import read_model
+    from logger.units import WINDOW_M
+
+    step_mps2 = read_run_facts(folder).step_mps2 or 0.0
+    tell(_headed(title, why, commands.estimate(folder, step_mps2, vehicle)))
+    with progress() as told:
+        told("estimating the road")
+        found = assessed(_run(folder), read_model(vehicle_path(vehicle)), Sensor(NOISE_MPS2, step_mps2), WINDOW_M,
+                         learns_noise=True)
+    tell(_essential(lines(found, as_json(str(folder), found))))
+    return found
+
+
+def _essential(lines: list[str]) -> Iterator[str]:
+    """Of what ``ridelog estimate`` prints: the mean, and the table's head, last row and remark."""
+    yield next(line for line in lines if line.startswith(("IRI", "No IRI")))
+    table = [line for line in lines[lines.index("") :] if "bias" in line or line.lstrip().startswith("all ")]
+    yield from ["", *table, lines[-1]]
+
+
+# --- what it came to ---
+
+
+def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
+    from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
+    from logger.files import write_text
+    from logger.report.field_page import page
+    from logger.report.maps import Way
+    from logger.store.formats.profile_file import read_places
+
+    measured = [Way(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
+    driven = []
+    for name in (*DRIVES, FOURTH):
+        run = _run(out / RUNS / name)
+        every = round(run.rate_hz)
+        assert run.lat_deg is not None and run.lon_deg is not None
+        driven.append(Way(name, run.lat_deg[::every], run.lon_deg[::every]))
+    write_text(file, page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story, before,
+                          after, [sentence.partition(" Its numbers")[0]]))
+
+
+def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
+    from logger.report.field_text import HEADS, IN_HINT, rows
+    from logger.report.session_text import ending
+
+    return ["", "=== The end ===", "", paragraphs(ending(story)), "", *columns([HEADS, *rows(before, after)]), "",
+            paragraphs([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
+
+
+def _truth(story: Story) -> tuple[str, list[str]]:
+    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
+
+    return truth_beside(story, EFFECT, EFFECT_VALUES, OFF)
+
+
+def _truth_json() -> dict[str, Any]:
+    from logger.demo.field_drives import EFFECT, EFFECT_VALUES, OFF
+
+    return {"effect": EFFECT, "parameters": dict(EFFECT_VALUES), "numbers_times": dict(OFF)}
+
+
+def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:
+    from logger.report.field_text import figures_of
+
+    return {"before": figures_of(before), "after": figures_of(after)}
+
+
+# --- words ---
+
+
+def _headed(title: str, why: str, *commands: str) -> list[str]:
+    from logger.api.lab_loop import chapter
+
+    return chapter(title, _typed(why, *commands))
+
+
+def _typed(why: str, *commands: str) -> str:
+    """What a step is for, and what to type for it."""
+    return "\n".join([paragraphs([_EXPLAINED[why]]), "", *(f"    {one}" for one in commands)])
+
+
+def _dump(out: Path, name: str) -> Path:
+    return out / f"{name}.dump.gz"
+
+
+def _name(dump: Path) -> str:
+    from logger.api.extraction import name_of
+
+    return name_of(dump)
