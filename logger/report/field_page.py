@@ -56,8 +56,8 @@ def _tiles(story: Story, before: Assessment, after: Assessment) -> Html:
 
 def _iri(before: Assessment, after: Assessment) -> Html:
     exact = np.isfinite(after.exact_m_per_km)
-    lines = (_line("at last", after, True), Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]),
-             _line("at first", before, False))
+    lines = (_line("at last", after, True), _line("at first", before, False),
+             Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]))
     return chart(Curves(f"In windows of {after.window_m:.4g} m, at last with its standard error",
                         "distance along the line [m]", "IRI [m/km]", lines))
 

@@ -76,12 +76,19 @@ def ways_map(measured: Sequence[Way], driven: Sequence[Way]) -> Html:
         dots = (projection.xy(place) for place in _places(one))
         parts.append(concatenated(html('<circle cx="{:.1f}" cy="{:.1f}" r="2.4" style="fill:var(--c{})"/>', *dot,
                                        _SPREAD[number % len(_SPREAD)]) for dot in dots))
-    parts += [_end(projection.xy(_places(one)[0]), "start", one.name) for one in measured]
+    parts += [_begins(projection.xy(_places(one)[0]), one.name) for one in measured]
     drawn = html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the drives">{}</svg>', WIDTH,
                  projection.height, concatenated([*parts, _scale_bar(projection), _north()]))
     key = concatenated(html('<li><i class="f{}"></i>{}</li>', _SPREAD[number % len(_SPREAD)], one.name)
                        for number, one in enumerate(driven))
     return drawn + html('<ul class="legend">{}</ul>', key)
+
+
+def _begins(at: Point, name: str) -> Html:
+    """A disc where a line begins, its name above it, out of the way of the line."""
+    x, y = at
+    return html('<g class="start"><circle cx="{:.1f}" cy="{:.1f}" r="7"/><text x="{:.1f}" y="{:.1f}" '
+                'text-anchor="{}">{}</text></g>', x, y, x, y - 14, "start" if x < WIDTH / 2 else "end", name)
 
 
 def _places(way: Way) -> list[_Spot]:
