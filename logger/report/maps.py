@@ -77,8 +77,9 @@ def ways_map(measured: Sequence[Way], driven: Sequence[Way]) -> Html:
         parts.append(concatenated(html('<circle cx="{:.1f}" cy="{:.1f}" r="2.4" style="fill:var(--c{})"/>', *dot,
                                        _SPREAD[number % len(_SPREAD)]) for dot in dots))
     parts += [_begins(projection.xy(_places(one)[0]), one.name) for one in measured]
-    drawn = html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the drives">{}</svg>', WIDTH,
-                 projection.height, concatenated([*parts, _scale_bar(projection), _north()]))
+    drawn = html('<figure><svg class="map plot" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the drives">{}'
+                 "</svg></figure>", WIDTH, projection.height,
+                 concatenated([*parts, _scale_bar(projection), _north()]))
     key = concatenated(html('<li><i class="f{}"></i>{}</li>', _SPREAD[number % len(_SPREAD)], one.name)
                        for number, one in enumerate(driven))
     return drawn + html('<ul class="legend">{}</ul>', key)

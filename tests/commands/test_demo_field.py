@@ -1,0 +1,76 @@
+"""``ridelog demo --field``: from recorded bytes to a better IRI, and the document that leads through it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput
+from logger.store.formats.vehicle_file import read_model
+from tests.support.printed import printed, shown, words
+
+DOC = Path(__file__).parents[2] / "docs" / "field-lab.md"
+
+
+def test_the_drives_are_unpacked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["vehicle"] == "rav4-2009"
+    assert [Path(one).name for one in told["dumps"]] == ["first.dump.gz", "second.dump.gz", "third.dump.gz",
+                                                         "fourth.dump.gz"]
+    assert all(Path(one).is_file() for one in [*told["dumps"], *told["lines"]])
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path)]) == 0
+    assert f"Next: ridelog extract {tmp_path / 'first.dump.gz'}" in capsys.readouterr().out
+
+
+def test_a_file_of_the_users_own_stays(tmp_path: Path) -> None:
+    (tmp_path / "line.csv").write_text("mine\n", "utf-8")
+    with pytest.raises(BadInput, match=r"line\.csv: expected nothing there"):
+        main(["demo", "--field", "--out", str(tmp_path)])
+    assert [path.name for path in tmp_path.iterdir()] == ["line.csv"]
+
+
+def test_one_demo_at_a_time(ridelog: Path) -> None:
+    done = subprocess.run([ridelog, "demo", "--field", "--lab"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+@pytest.mark.slow
+def test_the_effect_is_found_and_the_fourth_drive_is_judged_rightly(ridelog: Path, tmp_path: Path) -> None:
+    done = subprocess.run([ridelog, "demo", "--field", "--json", "--out", str(tmp_path)],
+                          capture_output=True, text=True, check=False, timeout=600)
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(done.stdout)
+    assert [Path(one["run"]).name for one in told["runs"]] == ["first", "second", "third", "fourth"]
+    assert all(one["by_road"] for one in told["runs"])
+    (name,) = told["added"]
+    (effect,) = told["effects"]
+    assert name == effect["effect"] == told["truth"]["effect"] and not told["unexplained"] and not told["left"]
+    for parameter, value in told["truth"]["parameters"].items():
+        assert effect["parameters"][parameter] == pytest.approx(value, rel=0.1)
+    before, after = (told["fourth"][when]["comparison"] for when in ("before", "after"))
+    assert abs(before["bias"]) > 0.2 and before["within_two"] < 0.75
+    assert abs(after["bias"]) < 0.05 and after["within_two"] > 0.8
+    assert after["r2"] > 0.7 > before["r2"] + 0.5
+    assert [one.effect.name for one in read_model(tmp_path / "vehicle-1.yaml").effects] == [name]
+    page = Path(told["page"]).read_text("utf-8")
+    assert page.count("<svg") == 4 and "simulated" in page and "<script" not in page and "http" not in page
+
+
+@pytest.mark.slow
+def test_the_document_shows_what_its_commands_print(tmp_path: Path) -> None:
+    """All of it, in order, in one folder; ``python -m tests.support.printed`` writes it anew."""
+    page = DOC.read_text("utf-8")
+    commands = shown(page)
+    assert [one.command.split()[1] for one in commands] == [
+        "demo", "extract", "extract", "estimate", "compare", "diagnose", "add-effect", "compare", "estimate", "replay",
+        "replay"]
+    for one in commands:
+        now = list(map(words, printed(one.command, tmp_path)))
+        assert one.paragraphs, one.command
+        for line, paragraph in one.paragraphs:
+            assert words(paragraph) in now, f"{DOC.name}:{line + 1}"
