@@ -1,7 +1,8 @@
 """Run a recorded drive through the service and show the result; needs no hardware.
 
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
-sent. It goes through recorded buses into the real drivers and the real service.
+sent. It goes through recorded buses into the real drivers and the real service. --lab finds what a car has that its
+model lacks; --field does so from recorded bytes, and shows what it does to the IRI.
 
   ridelog demo
   ridelog demo --lab

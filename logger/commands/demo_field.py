@@ -173,19 +173,20 @@ def _essential(lines: list[str]) -> Iterator[str]:
 
 
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
+    from logger.api.extraction import RATE_HZ
     from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
     from logger.files import write_text
     from logger.report.field_page import page
     from logger.report.maps import Way
+    from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
 
     measured = [Way(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
     driven = []
     for name in (*DRIVES, FOURTH):
-        run = _run(out / RUNS / name)
-        every = round(run.rate_hz)
-        assert run.lat_deg is not None and run.lon_deg is not None
-        driven.append(Way(name, run.lat_deg[::every], run.lon_deg[::every]))
+        columns = read_columns(out / RUNS / name / DRIVE)
+        lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
+        driven.append(Way(name, lat_deg, lon_deg))
     write_text(file, page(f"{VEHICLE}: four drives, and what was missing", _ABOUT, measured, driven, story, before,
                           after, [sentence.partition(" Its numbers")[0]]))
 
