@@ -115,7 +115,8 @@ class _Commands:
 
 
 def _extracted(dump: Path, out: Path, line: str, tell: Say) -> Extracted:
-    from logger.api.extraction import extract_dump, read_measured_profile
+    from logger.api.extracted_runs import read_measured_profile
+    from logger.api.extraction import extract_dump
     from logger.commands.extract import lines
 
     try:
@@ -173,7 +174,7 @@ def _essential(lines: list[str]) -> Iterator[str]:
 
 
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
-    from logger.api.extraction import RATE_HZ
+    from logger.api.extracted_runs import RATE_HZ
     from logger.demo.field_drives import BEYOND, DRIVES, FOURTH, LINE, VEHICLE
     from logger.files import write_text
     from logger.report.field_page import page
