@@ -78,8 +78,8 @@ def _recorded(dump: Path, given: Config | None, vehicle: str | None, tell: Tell)
 
 def _facts(sensor: Instrument, config: Config) -> RecordFacts:
     range_g = sensor.description.get("range_g")
-    return RecordFacts(step_mps2=sensor.sensor.step_mps2 or None, range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2,
-                       noise_mps2=_noise_mps2(sensor, config))
+    return RecordFacts(step_mps2=sensor.sensor.step_mps2 or None,
+                       range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2, noise_mps2=_noise_mps2(sensor, config))
 
 
 def _noise_mps2(sensor: Instrument, config: Config) -> float | None:

@@ -14,7 +14,7 @@ from logger.report.text_layout import columns, paragraphs
 
 if TYPE_CHECKING:
     from logger.api.drives import Run
-    from logger.api.extraction import Extracted
+    from logger.api.extracted_runs import Extracted
     from logger.api.lab_loop import Say
     from logger.estimation.assessment import Assessment
     from logger.lab.session import Story

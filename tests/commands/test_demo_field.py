@@ -10,6 +10,7 @@ import pytest
 
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import read_model
 from tests.support.printed import printed, shown, words
 
@@ -32,6 +33,18 @@ def test_a_file_of_the_users_own_stays(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"line\.csv: expected nothing there"):
         main(["demo", "--field", "--out", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["line.csv"]
+
+
+def test_a_run_of_either_sensor_can_be_read_and_says_what_its_steps_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path)]) == 0
+    dumps = [str(tmp_path / f"{name}.dump.gz") for name in ("second", "third")]
+    assert main(["extract", *dumps, "--out", str(tmp_path / "runs"), "--profile", str(tmp_path / "line.csv")]) == 0
+    assert capsys.readouterr().out.count("matched to the road") == 2
+    coarse, fine = (read_run(tmp_path / "runs" / name).facts for name in ("second", "third"))
+    assert coarse.step_mps2 == pytest.approx(2 * 9.80665 / 32, rel=1e-5)
+    assert fine.step_mps2 is None
 
 
 def test_one_demo_at_a_time(ridelog: Path) -> None:
