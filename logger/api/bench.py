@@ -218,12 +218,18 @@ def deviation_of(tolerance: float) -> float:
     return tolerance / _BAND_DEVIATIONS
 
 
-def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
-    """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
-    and the files of the user's own, by name. BadInput for a name that is there twice."""
-    from logger.store.formats.effect_file import own_effect, shipped_effects
+def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
+                  ) -> tuple[dict[str, Effect], dict[str, str]]:
+    """The effects that a search tries unasked, by name: of those that come with ridelog, a model's own, and those of
+    some more files; and the files of the user's own, by name. BadInput for a name that is there twice.
 
-    effects, own = dict(shipped_effects()), {}
+    on_rig    whether the runs are of a test rig, and not of a road
+    """
+    from logger.store.formats.effect_file import own_effect, shipped_effects
+    from logger.vehicle.effect import Sought
+
+    where = (Sought.ALWAYS, Sought.ON_RIGS) if on_rig else (Sought.ALWAYS,)
+    effects, own = {name: one for name, one in shipped_effects().items() if one.sought in where}, {}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
@@ -236,9 +242,13 @@ def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect]
 
 
 def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:
-    """Those of these names, None: all. BadInput for a name that there is not."""
+    """Those of these names, which may be any that come with ridelog; None: all. BadInput for a name that there is not.
+    """
+    from logger.store.formats.effect_file import shipped_effects
+
     if names is None:
         return dict(effects)
+    effects = dict(sorted({**shipped_effects(), **effects}.items()))
     if unknown := set(names) - set(effects):
         raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
     return {name: effects[name] for name in sorted(names)}
