@@ -42,14 +42,20 @@ _KEPT: list[Any] = []  # compiled functions, which live as long as their address
 
 
 def address_of(law: MotionLaw) -> int:
-    """How the loop knows a law. ValueError for one that cannot be compiled, or that holds more than its numbers."""
-    functions = [law.force] if law.rates is None else [law.force, law.rates]
+    """How the loop knows a law. ValueError as ``functions_of``, and for one that cannot be compiled."""
+    functions = functions_of(law)
+    _FUNCTIONS.update((one.__code__, one) for one in functions)
+    return _address(tuple(one.__code__ for one in functions), tuple(sorted(vars(law.p))), len(law.memory))
+
+
+def functions_of(law: MotionLaw) -> list[Any]:
+    """Its force, and its rates if it has states. ValueError for what is no function of (p, seen) and nothing else."""
+    functions: list[Any] = [law.force] if law.rates is None else [law.force, law.rates]
     for word, one in zip(("force", "rates"), functions, strict=False):
         if not isinstance(one, FunctionType) or one.__closure__ or one.__defaults__ or one.__code__.co_argcount != 2:
             raise ValueError(f"expected {word} to be a function of (p, seen) at the top of the file, or a "
                              "@staticmethod, that knows its numbers by p alone")
-    _FUNCTIONS.update((one.__code__, one) for one in functions)
-    return _address(tuple(one.__code__ for one in functions), tuple(sorted(vars(law.p))), len(law.memory))
+    return functions
 
 
 def numbers_of(law: MotionLaw) -> list[float]:

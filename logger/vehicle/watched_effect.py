@@ -211,10 +211,11 @@ _TRIED = np.vstack([np.zeros(8), np.random.default_rng(1).uniform(-1, 1, (30, 8)
 
 def _check_motion(law: MotionLaw) -> None:
     """ValueError for a law by all that moves that gives no numbers, or that a simulation could not ask."""
-    from logger.vehicle.law_call import address_of  # loads the compiler, if there is one
+    from logger.vehicle.law_call import address_of, functions_of  # loads the compiler, if there is one
 
     if not isinstance(law.between, Between):
         raise ValueError(f"expected with_law to get one of {', '.join(map(str, Between))}, found {law.between!r}")
+    functions_of(law)
     memory = law.memory
     if not (isinstance(memory, tuple) and len(memory) <= MOST_MEMORY
             and all(_is_number(one) for one in memory)):

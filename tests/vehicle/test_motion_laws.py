@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from logger.api.bench import among, known_effects
+from logger.errors import BadInput
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import own_effect, shipped_effects
-from logger.store.formats.vehicle_file import read_vehicle
+from logger.store.formats.vehicle_file import Model, read_vehicle
 from logger.vehicle import law_call
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
@@ -363,3 +365,55 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     known = known_vehicle(car, [effect("hysteresis"), effect("frame_friction")]).at(20.0, N_CPM, road(2.0))
     assert np.isfinite(known.by_wheel(np.array([0.0, 1.0, 11.0]))).all()
     assert replace(linear(1.0), wheel_friction_n=1.0).rubs
+
+
+@pytest.mark.parametrize(("functions", "arguments", "words"), [
+    ("def pull(p, seen):\n    return 3.0 / (p.size - 2)\n", "Between.BODY_AND_WHEEL, pull, p", ":7: ZeroDivisionError"),
+    ("def pull(p, seen):\n    return seen.weel_mps\n", "Between.BODY_AND_WHEEL, pull, p", ":7: AttributeError: 'Seen'"),
+    ("def pull(p, seen):\n    return np.log(-p.size)\n", "Between.BODY_AND_WHEEL, pull, p",
+     "expected force to answer with finite numbers"),
+    ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "which can be compiled: Untyped"),
+    ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that knows its numbers by p alone"),
+    ("", "Between.BODY_AND_WHEEL, lambda p: 1.0, p", "expected force to be a function of (p, seen)"),
+    ("def pull(p, seen):\n    return 1.0\n", "'wheel', pull, p", "expected with_law to get one of Between.BODY_AND_WH"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, memory=(0.0,)",
+     "expected rates and memory both, or neither"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0, 0.0, 0.0)",
+     "a tuple of at most 2 finite numbers"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0,)",
+     "rates to answer with a tuple of 1, one number for each state, as in (rate,), found 1.0"),
+])
+def test_a_law_that_will_not_do_is_refused_with_its_file(tmp_path: Path, functions: str, arguments: str, words: str,
+                                                         ) -> None:
+    one = own(tmp_path, functions, arguments)
+    with pytest.raises(BadInput) as caught:
+        compose(RIG, [one])
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "mine.py"))
+
+
+def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
+    """Friction of a wheel on rails; and rubber that creeps, which at last lets everything go."""
+    page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
+    rails, creep = (text.split("```")[0] for text in page.split("```python\n")[2:4])
+    functions = rails.split("\n\nclass")[0] + creep.split("\n\n\n    def")[0] + "\n"
+    functions = functions.replace("p.friction_force_n", "p.size").replace("p.stiffness_n_per_m", "p.size")
+    rubbing, _ = stepped(own(tmp_path, functions.replace("p.creep_s", "0.1"), "Between.WHEEL_AND_GROUND, rubs, p", 30.0))
+    like, _ = stepped(effect("frame_friction", friction_force_n=30.0, transition_velocity_m_per_s=0.02))
+    assert np.sqrt(np.mean((rubbing - like)[:, 3] ** 2)) < 0.002 * np.sqrt(np.mean(like[:, 3] ** 2))
+    one = own(tmp_path, functions.replace("p.creep_s", "0.1"),
+              "Between.BODY_AND_WHEEL, pulls, p, creeps, memory=(0.0,)", 5e4)
+    car = compose(RIG, [one])
+    raised = np.where(np.arange(8000) < 10, 0.0, 0.01)[:, None]
+    did = march(car.structure, car.laws, raised, (raised[1:] + raised[:-1]) / 2, 1e-3)
+    assert np.abs(did.forces[:1000]).max() > 50.0
+    assert did.forces[-1] == pytest.approx(0.0, abs=0.5)
+
+
+def test_which_a_search_tries_unasked() -> None:
+    model = Model(RIG, ())
+    assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
+    assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {"frame_friction"}
+    assert among(known_effects(model, [])[0], ["hysteresis", "dry_friction"]).keys() == {"dry_friction", "hysteresis"}
+    with pytest.raises(BadInput, match="no effect 'stiction'"):
+        among({}, ["stiction"])
