@@ -372,7 +372,7 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     ("def pull(p, seen):\n    return seen.weel_mps\n", "Between.BODY_AND_WHEEL, pull, p", ":7: AttributeError: 'Seen'"),
     ("def pull(p, seen):\n    return np.log(-p.size)\n", "Between.BODY_AND_WHEEL, pull, p",
      "expected force to answer with finite numbers"),
-    ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "which can be compiled: Untyped"),
+    ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "can be compiled: Untyped"),
     ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that knows its numbers by p alone"),
     ("", "Between.BODY_AND_WHEEL, lambda p: 1.0, p", "expected force to be a function of (p, seen)"),
     ("def pull(p, seen):\n    return 1.0\n", "'wheel', pull, p", "expected with_law to get one of Between.BODY_AND_WH"),
@@ -398,11 +398,11 @@ def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
     rails, creep = (text.split("```")[0] for text in page.split("```python\n")[2:4])
     functions = rails.split("\n\nclass")[0] + creep.split("\n\n\n    def")[0] + "\n"
     functions = functions.replace("p.friction_force_n", "p.size").replace("p.stiffness_n_per_m", "p.size")
-    rubbing, _ = stepped(own(tmp_path, functions.replace("p.creep_s", "0.1"), "Between.WHEEL_AND_GROUND, rubs, p", 30.0))
+    functions = functions.replace("p.creep_s", "0.1")
+    rubbing, _ = stepped(own(tmp_path, functions, "Between.WHEEL_AND_GROUND, rubs, p", 30.0))
     like, _ = stepped(effect("frame_friction", friction_force_n=30.0, transition_velocity_m_per_s=0.02))
     assert np.sqrt(np.mean((rubbing - like)[:, 3] ** 2)) < 0.002 * np.sqrt(np.mean(like[:, 3] ** 2))
-    one = own(tmp_path, functions.replace("p.creep_s", "0.1"),
-              "Between.BODY_AND_WHEEL, pulls, p, creeps, memory=(0.0,)", 5e4)
+    one = own(tmp_path, functions, "Between.BODY_AND_WHEEL, pulls, p, creeps, memory=(0.0,)", 5e4)
     car = compose(RIG, [one])
     raised = np.where(np.arange(8000) < 10, 0.0, 0.01)[:, None]
     did = march(car.structure, car.laws, raised, (raised[1:] + raised[:-1]) / 2, 1e-3)
@@ -414,6 +414,9 @@ def test_which_a_search_tries_unasked() -> None:
     model = Model(RIG, ())
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {"frame_friction"}
+    assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
+    with pytest.raises(BadInput, match="each effect once, found dry_friction again"):
+        known_effects(model, ["dry_friction"])
     assert among(known_effects(model, [])[0], ["hysteresis", "dry_friction"]).keys() == {"dry_friction", "hysteresis"}
     with pytest.raises(BadInput, match="no effect 'stiction'"):
         among({}, ["stiction"])
