@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.bench import sought_effects
 from logger.api.outputs import check_out
 from logger.api.run_checks import lab_runs
 from logger.commands.main import main
