@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,9 @@ from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
 from logger.vehicle.state_space import straight_step
 from logger.vehicle.structure import Structure
+
+if TYPE_CHECKING:
+    from logger.vehicle.stepping_loop import Asked
 
 Array = npt.NDArray[np.float64]
 
@@ -101,11 +105,11 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
     rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
     rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
             for i, one in enumerate(rubbing)]
-    places, time_s = _way(structure, laws, way, step_s, len(elevation))
     return Motion(*steps(
         known, forces, step_s, *_tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
-        np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3), *_asked(laws),
-        state_and_seen @ rest, 2 * n, around, elevation, places, time_s))
+        np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3),
+        _asked(structure, laws, way or Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * step_s)),
+        state_and_seen @ rest, 2 * n, around, elevation))
 
 
 @dataclass(frozen=True)
@@ -148,19 +152,11 @@ def _looked_at(one: _Rubs, ease: float) -> float:
     return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
 
 
-def _way(structure: Structure, laws: Sequence[CornerLaws], way: Way | None, step_s: float, count: int
-         ) -> tuple[Array, Array]:
-    """Where each wheel is (M, w) and when (M,), if there are laws that may ask for it."""
+def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked | None:
+    """Laws by all that moves as the loop reads them; None where there are none."""
     if not any(one.motions for one in laws):
-        return np.zeros((1, len(laws))), np.zeros(1)
-    if way is None:
-        way = Way(np.zeros(count), np.arange(0.0, count) * step_s)
-    return way.distance_m[:, None] - structure.behind_m, way.time_s
-
-
-def _asked(laws: Sequence[CornerLaws]) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Laws by all that moves as the loop reads them: whole numbers, their own numbers, states at rest."""
-    from logger.vehicle.law_call import address_of, numbers_of
+        return None
+    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_of
 
     whole, numbers, memories = [], [0.0], []
     for i, corner in enumerate(laws):
@@ -168,8 +164,10 @@ def _asked(laws: Sequence[CornerLaws]) -> tuple[npt.NDArray[np.int64], Array, Ar
             whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
             numbers += numbers_of(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
-    return (np.array(whole, dtype=np.int64).reshape(-1, 5), np.array(numbers, dtype=float),
-            np.array(memories, dtype=float).reshape(-1, MOST_MEMORY))
+    places = way.distance_m[:, None] - structure.behind_m
+    return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),
+            np.array(memories, dtype=float), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places,
+            np.asarray(way.time_s, dtype=float))
 
 
 def _tabulated(

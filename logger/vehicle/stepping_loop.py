@@ -19,10 +19,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.law_call import ANSWERS, FELT, MEMORY_AT, ask
+from logger.vehicle.law_call import FELT, MEMORY_AT, ask
 
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
+Asked = tuple[Whole, Array, Array, Array, Array, Array, Array, Array, Array]
+"""L laws by all that moves: whole numbers (L, 5); their own numbers, one after the other; what they felt at the
+beginning of a step (L, FELT); their states (L, MOST_MEMORY), those of rest at first; room for what one feels (FELT,),
+feels in the middle of a step and how fast its states grow there (FELT + MOST_MEMORY,), and answers (ANSWERS,); the
+places of the wheels (M, w) and the times (M,)."""
 
 try:
     import numba
@@ -230,11 +235,19 @@ def _remember(law: Whole, one: int, given: Array, began: Array, memories: Array,
 
 
 @_compiled
-def _answer(
-    forces: Array, motion: Array, m: int, w: int, law: Whole, given: Array, began: Array, memories: Array, felt: Array,
-    middle: Array, answers: Array, road: Array, places: Array, k: int, time_s: Array, step_s: float,
-) -> None:
+def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> None:
+    """Keep what laws by all that moves feel at the beginning of step k."""
+    law, _, began, memories, _, _, _, places, time_s = asked
+    for one in range(len(law)):
+        _feel(began[one], motion, m, w, law[one, WHEEL], road, places[k, law[one, WHEEL]], time_s[k])
+        for c in range(law[one, STATES]):
+            began[one, MEMORY_AT + c] = memories[one, c]
+
+
+@_compiled
+def _answer(forces: Array, motion: Array, m: int, w: int, asked: Asked, road: Array, k: int, step_s: float) -> None:
     """Add the forces of laws by all that moves at the end of step k, and step their states."""
+    law, given, began, memories, felt, middle, answers, places, time_s = asked
     for one in range(len(law)):
         i, between = law[one, WHEEL], law[one, BETWEEN]
         _feel(felt, motion, m, w, i, road, places[k + 1, i], time_s[k + 1])
@@ -254,8 +267,7 @@ def _answer(
 def _settle(
     motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
     passes: int, rubs: Array, rubs_at: Whole, sweeps: int, road: Array, mounts: Array, step_s: float, earlier: Array,
-    law: Whole, given: Array, began: Array, memories: Array, felt: Array, middle: Array, answers: Array, places: Array,
-    k: int, time_s: Array,
+    asked: Asked | None, k: int,
 ) -> None:
     """Find the forces at the end of step k (2 w + f) from those at its beginning, and the motion there.
 
@@ -273,9 +285,8 @@ def _settle(
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
-        if len(law):
-            _answer(forces, motion, m, w, law, given, began, memories, felt, middle, answers, road, places, k, time_s,
-                    step_s)
+        if asked is not None:
+            _answer(forces, motion, m, w, asked, road, k, step_s)
     if len(rubs):
         _sum(motion, seen, before, forces, 2 * w, by_force)
         _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
@@ -287,17 +298,14 @@ def _walk(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, around: Array,
     elevation: Array, states: Array, recorded: Array, known: Array, before: Array, nothing: Array, motion: Array,
     forces: Array, road: Array, mounts: Array, earlier: Array, passes: int, rubs: Array, rubs_at: Whole, sweeps: int,
-    law: Whole, given: Array, began: Array, memories: Array, felt: Array, middle: Array, answers: Array, places: Array,
-    time_s: Array,
+    asked: Asked | None,
 ) -> None:
     """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
     step needs."""
     count, m, w = len(elevation), states.shape[1], len(numbers)
     for k in range(count - 1):
-        for one in range(len(law)):
-            _feel(began[one], motion, m, w, law[one, WHEEL], road, places[k, law[one, WHEEL]], time_s[k])
-            for c in range(law[one, STATES]):
-                began[one, MEMORY_AT + c] = memories[one, c]
+        if asked is not None:
+            _begin(motion, m, w, asked, road, k)
         for i in range(w):
             known[m + 2 * w + i] = around[k + 1, i]
             known[m + 3 * w + i] = 0.25 * (around[k + 2, i] - around[k, i])
@@ -308,7 +316,7 @@ def _walk(
             earlier[i] = (1 / rubs[i, FRICTION_AT] - 1) * motion[rubs_at[i, RATE_ROW]]
         _sum(before, 0, nothing, known, m + 4 * w, by_known)
         _settle(motion, m, before, forces, by_force, tables, pairs, numbers, passes, rubs, rubs_at, sweeps, road,
-                mounts, step_s, earlier, law, given, began, memories, felt, middle, answers, places, k, time_s)
+                mounts, step_s, earlier, asked, k)
         for r in range(m):
             known[r] = motion[r]
             states[k + 1, r] = motion[r]
@@ -317,18 +325,19 @@ def _walk(
             recorded[k + 1, i] += forces[i]
         # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
         for i in range(len(rubs)):
-            for where in (ON_SUSPENSION, ON_TIRE):
-                column = rubs_at[i, where]
-                if column >= 0:
-                    recorded[k, column] += 0.5 * forces[2 * w + i]
-                    recorded[k + 1, column] += 0.5 * forces[2 * w + i]
+            half, strut, tire = 0.5 * forces[2 * w + i], rubs_at[i, ON_SUSPENSION], rubs_at[i, ON_TIRE]
+            if strut >= 0:
+                recorded[k, strut] += half
+                recorded[k + 1, strut] += half
+            if tire >= 0:
+                recorded[k, tire] += half
+                recorded[k + 1, tire] += half
 
 
 @_compiled_with_arrays
 def steps(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, rubs: Array,
-    rubs_at: Whole, law: Whole, given: Array, memories: Array, start: Array, m: int, around: Array, elevation: Array,
-    places: Array, time_s: Array,
+    rubs_at: Whole, asked: Asked | None, start: Array, m: int, around: Array, elevation: Array,
 ) -> tuple[Array, Array]:
     """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
 
@@ -340,11 +349,10 @@ def steps(
     by_force     (2 w + f, R) the same by the laws' forces at the end, then by dry friction
     tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 12)
     rubs         (f, 3) numbers of what rubs; rubs_at (f, 3) its places
-    law          (L, 5) laws by all that moves; given: their numbers; memories (L, MOST_MEMORY) their states at rest
+    asked        laws by all that moves; None: there are none, and a loop without them runs
     start        (R,) the first motion, of which m make the state
     around       (M + 1, w) means of the road before, in and after the steps
     elevation    (M, w) of the road at the instants
-    places       (M, w) of the wheels along it, and time_s (M,): of a car without such laws none is looked at
     """
     count, w = len(elevation), len(numbers)
     states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
@@ -352,12 +360,11 @@ def steps(
     known, before = np.zeros(m + 4 * w), np.zeros(by_known.shape[1])
     known[:m] = start[:m]
     road = np.concatenate((elevation[0], (around[1] - around[0]) / step_s))
-    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or len(law) > 0
+    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or asked is not None
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
     passes = _PASSES if acts else 0
     sweeps = 1 if (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
     _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,
           np.zeros_like(before), start.copy(), np.zeros(len(by_force)), road, np.zeros((w, 3)), np.zeros(len(rubs)),
-          passes, rubs, rubs_at, sweeps, law, given, np.zeros((len(law), FELT)),
-          memories.copy(), np.zeros(FELT), np.zeros(FELT + ANSWERS), np.zeros(ANSWERS), places, time_s)
+          passes, rubs, rubs_at, sweeps, asked)
     return states, recorded
