@@ -218,27 +218,50 @@ def deviation_of(tolerance: float) -> float:
     return tolerance / _BAND_DEVIATIONS
 
 
-def known_effects(model: Model, files: Sequence[str]) -> tuple[dict[str, Effect], dict[str, str]]:
-    """The effects that there are, by name: those that come with ridelog, a model's own, and those of some more files;
-    and the files of the user's own, by name. BadInput for a name that is there twice."""
+def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
+                  ) -> tuple[dict[str, Effect], dict[str, str]]:
+    """The effects that a search tries, by name: those that it tries unasked, a model's own, and those of some more
+    files; and the files of the user's own, by name. BadInput for a name that is there twice.
+
+    files     of effects, or names of such that a search does not try unasked
+    on_rig    as ``sought_effects``
+    """
     from logger.store.formats.effect_file import own_effect, shipped_effects
 
-    effects, own = dict(shipped_effects()), {}
+    effects, own = sought_effects(on_rig), {}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
     for file in files:
-        effect = own_effect(Path(file))
+        effect = shipped_effects()[file] if file in shipped_effects() else own_effect(Path(file))
         if effect.name in effects:
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
-        effects[effect.name], own[effect.name] = effect, file
+        effects[effect.name] = effect
+        if file not in shipped_effects():
+            own[effect.name] = file
     return effects, own
 
 
+def sought_effects(on_rig: bool = False) -> dict[str, Effect]:
+    """The effects that come with ridelog and that a search tries unasked, by name.
+
+    on_rig    whether the runs are of a test rig, and not of a road
+    """
+    from logger.store.formats.effect_file import shipped_effects
+    from logger.vehicle.effect import Sought
+
+    where = (Sought.ALWAYS, Sought.ON_RIGS) if on_rig else (Sought.ALWAYS,)
+    return {name: one for name, one in shipped_effects().items() if one.sought in where}
+
+
 def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:
-    """Those of these names, None: all. BadInput for a name that there is not."""
+    """Those of these names, which may be any that come with ridelog; None: all. BadInput for a name that there is not.
+    """
+    from logger.store.formats.effect_file import shipped_effects
+
     if names is None:
         return dict(effects)
+    effects = dict(sorted({**shipped_effects(), **effects}.items()))
     if unknown := set(names) - set(effects):
         raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
     return {name: effects[name] for name in sorted(names)}

@@ -34,14 +34,13 @@ _EXPLAINED = {
 
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
-    from logger.api.bench import require_compiler
+    from logger.api.bench import require_compiler, sought_effects
     from logger.api.lab_loop import STORY, unsaid_lines
     from logger.demo.lab_drives import VEHICLE
     from logger.report.session_text import as_json as story_json
-    from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
-        require_compiler("ridelog demo --lab", shipped_effects().values())
+        require_compiler("ridelog demo --lab", sought_effects().values())
     folders = unpack(out)
     drives = " ".join(map(str, folders))
     if unpack_only:

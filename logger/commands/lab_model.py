@@ -25,7 +25,8 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
-                        help="an effect of your own to be tried as well; may repeat")
+                        help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
+                             "tried only where they are named; may repeat")
     add_anyway(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 

@@ -55,7 +55,7 @@ class Car:
     @property
     def rubs(self) -> bool:
         """Whether there is dry friction in it."""
-        return any(one.dry_friction_n > 0 for one in self.laws)
+        return any(one.rubs for one in self.laws)
 
     def factor(self, s: Complex) -> Complex:
         """What lies between the body and the recorder, at s (f,) [1/s]."""
@@ -156,7 +156,7 @@ def bounded(records: Sequence[Array]) -> bool:
 def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws:
-        return march(car.structure, car.laws, *passage.under_wheels(car.structure), passage.step_s)
+        return march(car.structure, car.laws, *passage.under_wheels(car.structure), passage.step_s, passage.way)
     states = _in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 

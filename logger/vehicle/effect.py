@@ -46,6 +46,14 @@ class Scale(Enum):
     RECIPROCAL = "reciprocal"
 
 
+class Sought(Enum):
+    """Where a search tries an effect that nobody asked for by name."""
+
+    ALWAYS = "always"
+    ON_RIGS = "on rigs"
+    NEVER = "never"
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number of an effect.
@@ -139,6 +147,7 @@ class Effect(ABC):
     realigns     whether it moves the model against the measurement, so that a search looks at how they lie first
     reshapes     whether it does more than that
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
+    sought       whether a search tries it where nobody asked for it by name
     """
 
     name: str
@@ -150,6 +159,7 @@ class Effect(ABC):
     realigns: bool = False
     reshapes: bool = True
     replaces: tuple[str, ...] = ()
+    sought: Sought = Sought.ALWAYS
     stage: int = 0
 
     @property

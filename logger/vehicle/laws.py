@@ -5,13 +5,17 @@ against that, positive in extension (it pulls body and wheel together), as k x a
 wheel's height over the road from rest, negative when it is pressed.
 
 Laws are elementwise functions of arrays. A simulation tabulates them, so they may be asked far outside what a car does.
-Effects wrap them; none of them knows whose car it is in.
+Effects wrap them; none of them knows whose car it is in. What no table holds, a force by anything else that moves, by
+place or time, or with a memory, is a ``MotionLaw``: a simulation compiles it and asks it number by number.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import Enum
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +23,59 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Law = Callable[[Array], Array]
 Law2 = Callable[[Array, Array], Array]
+
+
+class Between(Enum):
+    """The two ends that a force acts on. It is positive where it pulls body and wheel together, or the wheel, or the
+    body's end of the suspension, down."""
+
+    BODY_AND_WHEEL = 0
+    WHEEL_AND_GROUND = 1
+    BODY_AND_GROUND = 2
+
+
+class Seen(NamedTuple):
+    """What a ``MotionLaw`` sees at a wheel, at one instant: numbers in a simulation, arrays of one shape elsewhere.
+
+    travel_m, rate_mps              of the suspension, and its rate
+    deflection_m, deflection_mps    of the tire, and its rate
+    wheel_mps, body_mps             how fast the wheel, and the body's end of the suspension, rise against the ground
+    distance_m                      where this wheel stands along the road
+    time_s                          since the record's first sample
+    memory                          the law's own states
+    """
+
+    travel_m: Any
+    rate_mps: Any
+    deflection_m: Any
+    deflection_mps: Any
+    wheel_mps: Any
+    body_mps: Any
+    distance_m: Any
+    time_s: Any
+    memory: tuple[Any, ...]
+
+
+MOST_MEMORY = 2
+"""States that a law may have."""
+
+
+@dataclass(frozen=True)
+class MotionLaw:
+    """A force by all that moves at a wheel, maybe with states of its own.
+
+    between    what it acts on
+    force      (p, seen) -> force [N]
+    p          its numbers
+    rates      (p, seen) -> how fast each state grows [1/s], a tuple; None: it has no states
+    memory     its states at rest
+    """
+
+    between: Between
+    force: Callable[[Any, Seen], Any]
+    p: SimpleNamespace
+    rates: Callable[[Any, Seen], tuple[Any, ...]] | None = None
+    memory: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -31,7 +88,11 @@ class CornerLaws:
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
     dry_friction_n          Coulomb friction beside the damper: this force against any motion, up to it at rest
     friction_transition_mps this times tanh(rate / transition) instead, unless 0
+    wheel_friction_n        Coulomb friction of the wheel against a guide that stands on the ground, as on a test rig
+    body_friction_n         the same of the body's end of the suspension
+    guide_transition_mps    as friction_transition_mps, of these two
     others                  further forces: (travel, rate) -> force
+    motions                 and by anything that moves
     tire_damping_n_s_per_m  of the tire
     tires                   forces by deflection beyond the linear tire: deflection [m] -> force [N]
     tire_pulls              whether the tire holds on to the road, as the linear model has it
@@ -43,10 +104,19 @@ class CornerLaws:
     springs: tuple[Law, ...] = ()
     dry_friction_n: float = 0.0
     friction_transition_mps: float = 0.0
+    wheel_friction_n: float = 0.0
+    body_friction_n: float = 0.0
+    guide_transition_mps: float = 0.0
     others: tuple[Law2, ...] = ()
+    motions: tuple[MotionLaw, ...] = ()
     tire_damping_n_s_per_m: float = 0.0
     tires: tuple[Law, ...] = ()
     tire_pulls: bool = True
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is dry friction in it."""
+        return self.dry_friction_n > 0 or self.wheel_friction_n > 0 or self.body_friction_n > 0
 
     def with_spring(self, law: Law) -> CornerLaws:
         """With one more force by travel."""
@@ -55,6 +125,12 @@ class CornerLaws:
     def with_force(self, law: Law2) -> CornerLaws:
         """With one more force by travel and rate."""
         return replace(self, others=(*self.others, law))
+
+    def with_law(self, between: Between, force: Callable[[Any, Seen], Any], p: SimpleNamespace,
+                 rates: Callable[[Any, Seen], tuple[Any, ...]] | None = None,
+                 memory: tuple[float, ...] = ()) -> CornerLaws:
+        """With one more force by all that moves; see ``MotionLaw``."""
+        return replace(self, motions=(*self.motions, MotionLaw(between, force, p, rates, memory)))
 
     def with_tire(self, law: Law) -> CornerLaws:
         """With one more force by the tire's deflection."""

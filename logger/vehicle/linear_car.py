@@ -6,21 +6,61 @@ its own. Laws that are not linear come with slopes that stand in for them (``lin
 what the laws add at the suspensions Z(s) and at the tires Y(s), the travel J and the wheels W:
 
     (D + J' Z J + W' Y W) q = (R + W' Y) z
+
+A force by all that moves at a wheel is a row of factors on q and z instead, and acts along J, W or their sum.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.vehicle.effect import Chosen, SensorEffect
 from logger.vehicle.frequency_response import at_steady_speed, dynamic_stiffness, frequency_response
+from logger.vehicle.laws import Between
 from logger.vehicle.structure import Output, Structure
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+
+
+MOTIONS = 5
+"""What a ``LinearLaw`` sees: the first of ``laws.Seen``. How fast the body's end rises follows from them."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLaw:
+    """A linear force by all that moves at a wheel, with m states: what stands in for a ``MotionLaw``.
+
+    by         (MOTIONS,) force per motion; through (m,) per state
+    into       (m, MOTIONS) how fast the states grow per motion; own (m, m) per state
+    """
+
+    between: Between
+    by: Array
+    through: Array
+    into: Array
+    own: Array
+
+    def states(self, s: Complex) -> Complex:
+        """States per motion (f, m, MOTIONS) at s (f,), not 0 [1/s]."""
+        return np.asarray(np.linalg.solve(s[:, None, None] * np.eye(len(self.own)) - self.own,
+                                          np.broadcast_to(self.into, (len(s), *self.into.shape))))
+
+    def forces(self, s: Complex) -> Complex:
+        """Force per motion (..., MOTIONS) at s (...); what a state comes to at rest is taken just beside it."""
+        flat = np.where(s == 0, _BESIDE_REST, s).ravel()
+        return np.asarray(self.by + self.through @ self.states(flat)).reshape(*s.shape, MOTIONS)
+
+    def along(self, travel: Array, wheel: Array) -> Array:
+        """The row (n,) that the force acts along, at a wheel whose travel and height are these rows of q."""
+        return {Between.BODY_AND_WHEEL: travel, Between.WHEEL_AND_GROUND: wheel,
+                Between.BODY_AND_GROUND: travel + wheel}[self.between]
+
+
+_BESIDE_REST = 1e-6j  # 1/s
 
 
 @dataclass(frozen=True)
@@ -35,6 +75,8 @@ class CornerSlopes:
     tire_damping_n_s_per_m    of the tire
     contact                   share of its force that the tire gives, 1 while it never lifts
     rest_m                    mean travel of the suspension, where its laws push it one way
+    wheel_n_s_per_m           by how fast the wheel rises against the ground; body_n_s_per_m the body's end
+    motions                   forces by all that moves
     """
 
     spring_n_per_m: float
@@ -45,6 +87,9 @@ class CornerSlopes:
     tire_damping_n_s_per_m: float
     contact: float = 1.0
     rest_m: float = 0.0
+    wheel_n_s_per_m: float = 0.0
+    body_n_s_per_m: float = 0.0
+    motions: tuple[LinearLaw, ...] = field(default=(), compare=False)
 
     def passed(self, s: Complex) -> Complex:
         """Share (f,) of the suspension's rate that reaches the damper, at s (f,) [1/s]."""
@@ -68,6 +113,7 @@ class Waves:
     travel        of the suspensions
     rate          of that [1/s], ``own_rate`` what the dampers feel of it
     deflection    of the tires; ``force`` what they answer as long as they hold [N/m]
+    height        of the wheels
     """
 
     travel: Complex
@@ -75,6 +121,7 @@ class Waves:
     own_rate: Complex
     deflection: Complex
     force: Complex
+    height: Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +173,13 @@ class LinearCar:
         averaged = np.sinc(wave_number_cpm * structure.contact_patch_m)[:, None]
         road = np.exp(-2j * np.pi * wave_number_cpm[:, None] * structure.behind_m) * averaged
         q = (self._coordinates(s) @ road[..., None])[..., 0]
-        travel, deflection = q @ structure.travel.T, q @ structure.wheels.T - road
+        travel, height = q @ structure.travel.T, q @ structure.wheels.T
+        deflection = height - road
         passed = np.stack([one.passed(s) for one in self.corners], axis=1)
         whole = np.stack([tire + one.tire_n_per_m + s * one.tire_damping_n_s_per_m
                           for one, tire in zip(self.corners, structure.tires, strict=True)], axis=1)
         rate = s[:, None] * travel
-        return Waves(travel, rate, passed * rate, deflection, whole * deflection)
+        return Waves(travel, rate, passed * rate, deflection, whole * deflection, height)
 
     def travel_by_wheel(self, f_hz: Array) -> Complex:
         """Travel of each suspension per elevation under each wheel separately (f, w, w), of a car with laws of its own;
@@ -165,4 +213,23 @@ class LinearCar:
         dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
         dynamic = dynamic + (structure.travel.T * suspension[..., None, :]) @ structure.travel
         pressed = structure.wheels.T * tire[..., None, :]
-        return np.asarray(dynamic + pressed @ structure.wheels), np.asarray(pressed)
+        dynamic = dynamic + pressed @ structure.wheels
+        for i, one in enumerate(self.corners):
+            travel, wheel = structure.travel[i], structure.wheels[i]
+            for row, per_rate in ((wheel, one.wheel_n_s_per_m), (travel + wheel, one.body_n_s_per_m)):
+                if per_rate:
+                    dynamic = dynamic + s[..., None, None] * (per_rate * np.outer(row, row))
+            for law in one.motions:
+                by_q, by_road = moved_by(law.forces(s), s, travel, wheel)
+                along = law.along(travel, wheel)
+                dynamic = dynamic + along[:, None] * by_q[..., None, :]
+                pressed[..., i] += along * by_road[..., None]
+        return np.asarray(dynamic), np.asarray(pressed)
+
+
+def moved_by(per_motion: Complex, s: Complex, travel: Array, wheel: Array) -> tuple[Complex, Complex]:
+    """A force per motion (..., MOTIONS) as one per coordinate (..., n), and, the other way, per elevation (...)."""
+    by_travel, by_rate, by_deflection, by_deflection_rate, by_wheel = np.moveaxis(per_motion, -1, 0)
+    by_road = by_deflection + s * by_deflection_rate
+    by_q = (by_travel + s * by_rate)[..., None] * travel + (by_road + s * by_wheel)[..., None] * wheel
+    return np.asarray(by_q), np.asarray(by_road)

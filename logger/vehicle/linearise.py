@@ -12,6 +12,11 @@ P(u < L) of its force. The deviations follow from the road's spectrum through th
 by turns. Where the mean of a force is not 0 (stops, uneven dampers) the suspension rests elsewhere: each carries its
 load whatever it does, which gives the mean travel.
 
+A force by all that moves at a wheel, with states of its own, is replaced in the same way by one that is linear in these
+motions and states, and so is how fast its states grow. The factors are the mean slopes over motions and states that are
+drawn from their joint normal distribution, which are the same as above (for Bouc-Wen: Y.-K. Wen, J. Appl. Mech. 47,
+1980, 150).
+
 Source: J. B. Roberts, P. D. Spanos, Random Vibration and Statistical Linearization (1990), chapters 2 and 5.
 """
 
@@ -19,16 +24,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
 from math import erf, exp, log, pi, sqrt
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.laws import CornerLaws
-from logger.vehicle.linear_car import CornerSlopes, LinearCar
+from logger.vehicle.laws import Between, CornerLaws, MotionLaw, Seen
+from logger.vehicle.linear_car import MOTIONS, CornerSlopes, LinearCar, LinearLaw, Waves
 from logger.vehicle.stepping import static_tire_loads_n
 from logger.vehicle.structure import Output
 from logger.vehicle.vehicle import Vehicle
@@ -66,10 +72,15 @@ def known_vehicle(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> KnownCar:
 
 
 def known_car(car: Car) -> KnownCar:
-    """A car with its effects as readings are judged by: exact if its laws are linear."""
+    """A car with its effects as readings are judged by: exact if its laws are linear.
+
+    ValueError for a law that is another one at another place or time.
+    """
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     if not car.bends_laws:
         return LinearCar(car.structure, output, sensors=car.sensors)
+    for law in (law for one in car.laws for law in one.motions):
+        _check_steady(law)
     if all(map(_is_linear, car.laws)):
         slopes = tuple(_linear_slopes(one) for one in car.laws)
         return LinearCar(car.structure, output, slopes, car.sensors)
@@ -78,12 +89,15 @@ def known_car(car: Car) -> KnownCar:
 
 def _is_linear(one: CornerLaws) -> bool:
     rates = np.array([-2.0, -1.0, -0.1, 0.1, 1.0, 2.0])
-    plain = not one.springs and not one.others and not one.tires and not one.dry_friction_n and one.tire_pulls
+    plain = not (one.springs or one.others or one.motions or one.tires or one.rubs) and one.tire_pulls
     return plain and bool(np.allclose(one.damper(rates), one.damping_n_s_per_m * rates, rtol=1e-9, atol=1e-9))
 
 
 def _linear_slopes(one: CornerLaws) -> CornerSlopes:
-    return CornerSlopes(0.0, one.damping_n_s_per_m, one.mount_n_per_m, 0.0, 0.0, one.tire_damping_n_s_per_m)
+    none = [LinearLaw(law.between, np.zeros(MOTIONS), np.zeros(len(law.memory)), np.zeros((len(law.memory), MOTIONS)),
+                      np.zeros((len(law.memory), len(law.memory)))) for law in one.motions]
+    return CornerSlopes(0.0, one.damping_n_s_per_m, one.mount_n_per_m, 0.0, 0.0, one.tire_damping_n_s_per_m,
+                        motions=tuple(none))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +144,13 @@ def linearised(car: Car, output: Output, speed_mps: float, wave_number_cpm: Arra
     for _ in range(_MOST_TURNS):
         tried = LinearCar(structure, output, slopes, car.sensors)
         moves = tried.waves(wave_number_cpm, speed_mps)
+        s = np.asarray(2j * np.pi * wave_number_cpm * speed_mps)
         found = [_Corner(*(_deviation(one[:, i], power) for one in
-                           (moves.travel, moves.rate, moves.own_rate, moves.deflection, moves.force)))
-                 .slopes(laws, float(structure.springs[i]), float(loads_n[i]), slopes[i].rest_m)
+                           (moves.travel, moves.rate, moves.own_rate, moves.deflection, moves.force,
+                            s[:, None] * moves.height, s[:, None] * (moves.height + moves.travel))))
+                 .slopes(laws, float(structure.springs[i]), float(loads_n[i]), slopes[i].rest_m,
+                         [_linear_law(law, old, _motions(moves, s, i), s, power, slopes[i].rest_m)
+                          for law, old in zip(laws.motions, slopes[i].motions, strict=True)])
                  for i, laws in enumerate(car.laws)]
         after = tuple(_between(old, new) for old, new in zip(slopes, found, strict=True))
         change = max(_change(old, new) for old, new in zip(slopes, after, strict=True))
@@ -148,41 +166,55 @@ def _deviation(gain: npt.NDArray[np.complex128], power: Array) -> float:
 
 def _between(old: CornerSlopes, new: CornerSlopes) -> CornerSlopes:
     """Half the way, so that friction does not swing between stuck and free."""
-    numbers = {}
-    for one in fields(CornerSlopes):
-        before, after = getattr(old, one.name), getattr(new, one.name)
-        numbers[one.name] = before if before == after else 0.5 * (before + after)
-    return CornerSlopes(**numbers)
+    numbers: dict[str, Any] = {}
+    for one in _NUMBERS:
+        before, after = getattr(old, one), getattr(new, one)
+        numbers[one] = before if before == after else 0.5 * (before + after)
+    motions = tuple(LinearLaw(before.between, *(0.5 * (a + b) for a, b in zip(_arrays(before), _arrays(after),
+                                                                             strict=True)))
+                    for before, after in zip(old.motions, new.motions, strict=True))
+    return CornerSlopes(**numbers, motions=motions)
 
 
 def _change(old: CornerSlopes, new: CornerSlopes) -> float:
-    pairs = [(getattr(old, one.name), getattr(new, one.name)) for one in fields(CornerSlopes) if one.name != "rest_m"]
-    return max(abs(after - before) / max(abs(after), abs(before)) if after != before else 0.0
-               for before, after in pairs)
+    pairs = [(getattr(old, one), getattr(new, one)) for one in _NUMBERS if one != "rest_m"]
+    arrays = [(float(np.abs(b - a).max(initial=0.0)), float(np.abs(b).max(initial=0.0)))
+              for before, after in zip(old.motions, new.motions, strict=True)
+              for a, b in zip(_arrays(before), _arrays(after), strict=True)]
+    return max(*(abs(after - before) / max(abs(after), abs(before)) if after != before else 0.0
+                 for before, after in pairs), *(off / size for off, size in arrays if size > 0))
+
+
+_NUMBERS = [one.name for one in fields(CornerSlopes) if one.name != "motions"]
+
+
+def _arrays(law: LinearLaw) -> tuple[Array, Array, Array, Array]:
+    return law.by, law.through, law.into, law.own
 
 
 @dataclass(frozen=True)
 class _Corner:
-    """Standard deviations of what a corner does [m, m/s, m/s, m, N]."""
+    """Standard deviations of what a corner does [m, m/s, m/s, m, N, m/s, m/s]."""
 
     travel_m: float
     rate_mps: float
     own_rate_mps: float
     deflection_m: float
     force_n: float
+    wheel_mps: float
+    body_mps: float
 
-    def slopes(self, laws: CornerLaws, spring_n_per_m: float, load_n: float, rest_m: float
-               ) -> CornerSlopes:
-        """Slopes that stand in for its laws, with the mean travel to be tried next."""
+    def slopes(self, laws: CornerLaws, spring_n_per_m: float, load_n: float, rest_m: float,
+               motions: Sequence[tuple[LinearLaw, float]]) -> CornerSlopes:
+        """Slopes that stand in for its laws, with the mean travel to be tried next.
+
+        motions    those for laws by all that moves, and what these pull on the average
+        """
         travel, rate = max(self.travel_m, _LEAST_TRAVEL_M), max(self.rate_mps, _LEAST_RATE_MPS)
         own_rate = max(self.own_rate_mps, _LEAST_RATE_MPS)
         spring, pull = _sloped(sum((law(rest_m + travel * _NORMAL) for law in laws.springs), 0 * _NORMAL), travel)
         damper, drag = _sloped(laws.damper(own_rate * _NORMAL), own_rate)
-        rubs = 0.0
-        if laws.dry_friction_n:
-            transition = laws.friction_transition_mps
-            held = np.tanh(rate * _NORMAL / transition) if transition else np.sign(_NORMAL)
-            rubs = _sloped(laws.dry_friction_n * held, rate)[0]
+        rubs = _rubs(laws.dry_friction_n, laws.friction_transition_mps, rate)
         if laws.others:
             x, v = np.meshgrid(_NORMAL_OF_TWO, _NORMAL_OF_TWO, indexing="ij")
             force = sum((law(rest_m + travel * x, rate * v) for law in laws.others), 0 * x)
@@ -192,9 +224,21 @@ class _Corner:
         pressed = max(self.deflection_m, _LEAST_TRAVEL_M)
         tire, _ = _sloped(sum((law(pressed * _NORMAL) for law in laws.tires), 0 * _NORMAL), pressed)
         holds = 1.0 if laws.tire_pulls else 0.5 * (1 + erf(load_n / (sqrt(2.0) * self.force_n)))
-        unbalanced = spring_n_per_m * rest_m + pull + drag
+        unbalanced = spring_n_per_m * rest_m + pull + drag + sum(mean for _, mean in motions)
         return CornerSlopes(spring, damper, laws.mount_n_per_m, rubs, tire, laws.tire_damping_n_s_per_m, holds,
-                            rest_m - unbalanced / (spring_n_per_m + max(spring, 0.0)))
+                            rest_m - unbalanced / (spring_n_per_m + max(spring, 0.0)),
+                            _rubs(laws.wheel_friction_n, laws.guide_transition_mps, self.wheel_mps),
+                            _rubs(laws.body_friction_n, laws.guide_transition_mps, self.body_mps),
+                            tuple(law for law, _ in motions))
+
+
+def _rubs(friction_n: float, transition_mps: float, rate_mps: float) -> float:
+    """Slope of a friction by a rate of this deviation."""
+    if not friction_n:
+        return 0.0
+    rate = max(rate_mps, _LEAST_RATE_MPS)
+    held = np.tanh(rate * _NORMAL / transition_mps) if transition_mps else np.sign(_NORMAL)
+    return _sloped(friction_n * held, rate)[0]
 
 
 def _normal(points: int) -> tuple[Array, Array]:
@@ -210,3 +254,66 @@ _NORMAL_OF_TWO, _SHARE_OF_TWO = _normal(_POINTS_OF_TWO)
 def _sloped(force: Array, deviation: float) -> tuple[float, float]:
     """Slope and mean of a force (p,) at the values of a normal variable of this deviation."""
     return float(_SHARE @ (force * _NORMAL)) / deviation, float(_SHARE @ force)
+
+
+# --- laws by all that moves ---
+
+_DRAWN = 2048  # motions that such a law is asked at, half of them the others turned over
+# Means are moved by so much of a deviation to see their slope: far enough for a law that jumps. A law is smoothed by
+# it as by a motion whose variance is 1 / 50 larger.
+_SLOPE_OVER, _LEAST_STEP = 0.25, 1e-9
+_ELSEWHERE = (123.4, 56.7)  # m, s
+
+
+def _check_steady(law: MotionLaw) -> None:
+    """ValueError for a law that is another one at another place or time."""
+    motions, memory = 0.1 * _normals(MOTIONS + 1).T, tuple(np.full(_DRAWN, one) for one in law.memory)
+    for asked in (one for one in (law.force, law.rates) if one is not None):
+        here, there = (asked(law.p, Seen._make([*motions, *at, memory])) for at in ((0.0, 0.0), _ELSEWHERE))
+        if not np.array_equal(here, there):
+            raise ValueError("a force that depends on the place or the time has no linear stand-in: expected effects "
+                             "without one here")
+
+
+def _motions(moves: Waves, s: npt.NDArray[np.complex128], i: int) -> npt.NDArray[np.complex128]:
+    """What a ``LinearLaw`` at wheel i sees, per elevation of the road (f, MOTIONS)."""
+    travel, deflection, height = moves.travel[:, i], moves.deflection[:, i], moves.height[:, i]
+    return np.stack([travel, s * travel, deflection, s * deflection, s * height], axis=1)
+
+
+def _linear_law(law: MotionLaw, old: LinearLaw, motions: npt.NDArray[np.complex128], s: npt.NDArray[np.complex128],
+                power: Array, rest_m: float) -> tuple[LinearLaw, float]:
+    """What stands in for a law where its corner moves like this and its states as the old stand-in has them; and what
+    it pulls at the suspension on the average [N]."""
+    states = (old.states(s) @ motions[..., None])[..., 0]
+    seen = np.concatenate([motions, states], axis=1) * np.sqrt(power)[:, None]
+    sizes, ways = np.linalg.eigh((seen.conj().T @ seen).real)
+    drawn = _normals(seen.shape[1]) * np.sqrt(np.maximum(sizes, 0.0)) @ ways.T
+    at = drawn + np.array([rest_m, *[0.0] * (MOTIONS - 1), *law.memory])
+    steps = np.diag(np.maximum(_SLOPE_OVER * drawn.std(axis=0), _LEAST_STEP))
+    slopes = np.stack([(_means(law, at + step) - _means(law, at - step)) / (2 * step.sum()) for step in steps], axis=1)
+    pulls = law.between is not Between.WHEEL_AND_GROUND
+    return (LinearLaw(law.between, slopes[0, :MOTIONS], slopes[0, MOTIONS:], slopes[1:, :MOTIONS],
+                      slopes[1:, MOTIONS:]), float(_means(law, at)[0]) if pulls else 0.0)
+
+
+def _means(law: MotionLaw, at: Array) -> Array:
+    """The mean force, and how fast the states grow on the average (1 + m,), at motions and states (_DRAWN, ...)."""
+    felt = Seen._make([*at[:, :MOTIONS].T, at[:, 1] + at[:, MOTIONS - 1], 0.0, 0.0, tuple(at[:, MOTIONS:].T)])
+    growing = () if law.rates is None else law.rates(law.p, felt)
+    return np.array([np.mean(one) for one in (law.force(law.p, felt), *growing)])
+
+
+@cache
+def _normals(count: int) -> Array:
+    """Evenly scattered values (_DRAWN, count) of independent normal variables: points of the additive recurrence of R.
+    Kronecker through the transform of Box and Muller, each with its opposite, made uncorrelated."""
+    pairs = -(-count // 2)
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (2 * pairs + 1))
+    even = (0.5 + np.arange(1, _DRAWN // 2 + 1)[:, None] * root ** -np.arange(1.0, 2 * pairs + 1)) % 1.0
+    radius, turn = np.sqrt(-2.0 * np.log(1.0 - even[:, :pairs])), 2.0 * pi * even[:, pairs:]
+    half = np.concatenate([radius * np.cos(turn), radius * np.sin(turn)], axis=1)[:, :count]
+    drawn = np.concatenate([half, -half])
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(np.cov(drawn.T, bias=True)), drawn.T).T)

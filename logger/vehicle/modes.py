@@ -50,7 +50,8 @@ def modes(structure: Structure) -> list[Mode]:
 
 def modes_of_car(car: LinearCar) -> list[Mode]:
     """The same of a car with laws of its own at the corners: a mount in series with a damper is one state more, its
-    compression y, with y' = J q' - k y / c and the force k y on the suspension."""
+    compression y, with y' = J q' - k y / c and the force k y on the suspension; so are the states of laws by all that
+    moves."""
     if not car.corners:
         return modes(car.structure)
     structure, corners = car.structure, car.corners
@@ -68,10 +69,21 @@ def modes_of_car(car: LinearCar) -> list[Mode]:
     stiffness = structure.stiffness + (travel.T * springs) @ travel + (wheels.T * tires) @ wheels
     inverse, pressed = np.linalg.inv(structure.mass), travel[mounted]
     slip = np.array([corners[i].mount_n_per_m / corners[i].damper_n_s_per_m for i in mounted])
+    pulls, by_place, by_rate, own = pressed.T * mounts, np.zeros((len(mounted), n)), pressed, -np.diag(slip)
+    for i, one in enumerate(corners):
+        j, u = travel[i], wheels[i]
+        damping = damping + one.wheel_n_s_per_m * np.outer(u, u) + one.body_n_s_per_m * np.outer(j + u, j + u)
+        places, rates = np.stack([j, 0 * j, u, 0 * u, 0 * u]), np.stack([0 * j, j, 0 * u, u, u])
+        for law in one.motions:
+            along, count = law.along(j, u)[:, None], len(law.own)
+            stiffness, damping = stiffness + along * (law.by @ places), damping + along * (law.by @ rates)
+            pulls = np.hstack([pulls, along * law.through])
+            by_place, by_rate = np.vstack([by_place, law.into @ places]), np.vstack([by_rate, law.into @ rates])
+            own = np.block([[own, np.zeros((len(own), count))], [np.zeros((count, len(own))), law.own]])
     return _of_state_matrix(np.block([
-        [np.zeros((n, n)), np.eye(n), np.zeros((n, len(mounted)))],
-        [-inverse @ stiffness, -inverse @ damping, -inverse @ (pressed.T * mounts)],
-        [np.zeros((len(mounted), n)), pressed, -np.diag(slip)],
+        [np.zeros((n, n)), np.eye(n), np.zeros((n, len(own)))],
+        [-inverse @ stiffness, -inverse @ damping, -inverse @ pulls],
+        [by_place, by_rate, own],
     ]), n)
 
 

@@ -19,6 +19,7 @@ from logger.vehicle.effect import (
     Parameter,
     Scale,
     SensorEffect,
+    Sought,
     VehicleEffect,
 )
 from logger.vehicle.laws import linear
@@ -47,9 +48,7 @@ def look_through(effect: object) -> Effect:
         raise ValueError(f"expected a name of letters, digits and _, found {effect.name!r}")
     if not isinstance(effect.stage, int):
         raise ValueError(f"expected a whole number as stage, found {effect.stage!r}")
-    for word in ("realigns", "reshapes"):
-        if not isinstance(getattr(effect, word), bool):
-            raise ValueError(f"expected True or False as {word}, found {getattr(effect, word)!r}")
+    _look_at_words(effect)
     if not isinstance(effect.parameters, tuple) or not all(isinstance(one, Parameter) for one in effect.parameters):
         raise ValueError("expected parameters to be a tuple of Parameter, as in (Parameter(...),)")
     names = [one.name for one in effect.parameters]
@@ -60,6 +59,14 @@ def look_through(effect: object) -> Effect:
     for one in effect.parameters:
         _look_through(one)
     return effect
+
+
+def _look_at_words(effect: Effect) -> None:
+    for word in ("realigns", "reshapes"):
+        if not isinstance(getattr(effect, word), bool):
+            raise ValueError(f"expected True or False as {word}, found {getattr(effect, word)!r}")
+    if not isinstance(effect.sought, Sought):
+        raise ValueError(f"expected one of {', '.join(map(str, Sought))} as sought, found {effect.sought!r}")
 
 
 def _look_through(one: Parameter) -> None:

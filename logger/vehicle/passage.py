@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from logger.profiles.track import WheelTracks
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
+from logger.vehicle.stepping import Way
 from logger.vehicle.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -72,6 +73,11 @@ class Passage:
     def fine_count(self) -> int:
         """Instants that a car is stepped through, one more than the steps."""
         return len(self._way_m)
+
+    @property
+    def way(self) -> Way:
+        """Where the front tires are at the fine instants, and when."""
+        return Way(self._way_m, np.asarray((np.arange(self.fine_count) - self._lead * self.steps) * self.step_s))
 
     def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted

@@ -7,7 +7,8 @@ step, as far as it reaches, and keeps it for the step: that sticks and slips wit
 time stepping, in: Nonsmooth Mechanics and Applications, 1988). One that grows with the rate is found in the same way. A
 mount in series with a damper has a state, its compression, stepped by the trapezoidal rule.
 
-Laws come as tables, so that one loop serves all of them, in whatever combination. The loop is compiled when numba is
+Laws come as tables, so that one loop serves all of them, in whatever combination; those by more than two variables, or
+with states, as addresses of functions (``law_call``). The loop is compiled when numba is
 installed (the ``lab`` extra) and runs as plain Python, some hundred times slower, when it is not.
 """
 
@@ -15,14 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.units import STANDARD_GRAVITY_MPS2
-from logger.vehicle.laws import CornerLaws, Law, Law2
+from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
 from logger.vehicle.state_space import straight_step
 from logger.vehicle.structure import Structure
+
+if TYPE_CHECKING:
+    from logger.vehicle.stepping_loop import Asked
 
 Array = npt.NDArray[np.float64]
 
@@ -57,12 +62,28 @@ def force_input(structure: Structure) -> Array:
     return np.vstack([np.zeros_like(onto), np.linalg.solve(structure.mass, onto)])
 
 
-def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, mean: Array, step_s: float) -> Motion:
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Where and when a car is, for laws that ask for it.
+
+    distance_m    (M,) of the front tires along the road
+    time_s        (M,) since the record's first sample
+    """
+
+    distance_m: Array
+    time_s: Array
+
+
+def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, mean: Array, step_s: float,
+          way: Way | None = None) -> Motion:
     """The motion of a car on a road, from rest.
 
     laws         one per wheel
     elevation    (M, w) under the wheels at the instants [m]
     mean         (M - 1, w) over each step [m]
+    way          None: it stands at 0, and time begins there
+
+    ValueError for a law by all that moves that cannot be compiled.
     """
     from logger.vehicle.stepping_loop import LANES, steps  # loads the compiler, if there is one
 
@@ -70,8 +91,11 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
     a, b = structure.state_space()
     transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
     road = [at_start[:, :w] + at_end[:, :w], at_end[:, :w] - at_start[:, :w]]
-    held = at_start[:, w : 2 * w] + at_end[:, w : 2 * w]  # dry friction stays the same over a step
+    rubbing = _rubbing(laws, 2 * n)
+    held = (at_start[:, w:] + at_end[:, w:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
     seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
+    if any(one.body_friction_n for one in laws):
+        seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
     state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros(((-len(seen) - 2 * n) % LANES, 2 * n))])
     known, forces = (
         np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
@@ -79,20 +103,75 @@ def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, me
     )
     around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
     rest = np.concatenate([np.linalg.solve(structure.stiffness, structure.road @ elevation[0]), np.zeros(n)])
-    ease = -np.diag(forces[2 * w :, 2 * n + w : 2 * n + 2 * w])
-    return Motion(*steps(known, forces, step_s, *_tabulated(structure, laws, step_s, ease), rest, around, elevation))
+    rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
+            for i, one in enumerate(rubbing)]
+    return Motion(*steps(
+        known, forces, step_s, *_tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
+        np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3),
+        _asked(structure, laws, way or Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * step_s)),
+        state_and_seen @ rest, 2 * n, around, elevation))
 
 
-def _looked_at(one: CornerLaws, ease: float) -> float:
+@dataclass(frozen=True)
+class _Rubs:
+    """One pair that rubs.
+
+    places    the row of its rate in the motion, and where its force is recorded: at a suspension, at a tire; -1: not
+    """
+
+    force_n: float
+    transition_mps: float
+    places: tuple[int, int, int]
+
+
+def _rubbing(laws: Sequence[CornerLaws], m: int) -> list[_Rubs]:
+    """All that rubs in a car with so many states: the suspensions, the wheels on their guides, the body on its."""
+    w = len(laws)
+    suspensions = [_Rubs(one.dry_friction_n, one.friction_transition_mps, (m + w + i, i, -1))
+                   for i, one in enumerate(laws)]
+    wheels = [_Rubs(one.wheel_friction_n, one.guide_transition_mps, (m + 3 * w + i, -1, w + i))
+              for i, one in enumerate(laws)]
+    body = [_Rubs(one.body_friction_n, one.guide_transition_mps, (m + 4 * w + i, i, w + i))
+            for i, one in enumerate(laws)]
+    return [one for one in (*suspensions, *wheels, *body) if one.force_n > 0]
+
+
+def _onto(rubbing: Sequence[_Rubs], w: int) -> Array:
+    """Which forces at suspensions, then at tires, each friction makes (2 w, f)."""
+    onto = np.zeros((2 * w, len(rubbing)))
+    for i, one in enumerate(rubbing):
+        onto[[place for place in one.places[1:] if place >= 0], i] = 1.0
+    return onto
+
+
+def _looked_at(one: _Rubs, ease: float) -> float:
     """At which share of a step friction looks at the rate, which it can change by force times ``ease``. A half would
     be right to second order, but nothing comes to rest then; what grows slowly with the rate needs hardly more."""
-    pull = ease * one.dry_friction_n
-    sudden = pull / (pull + _SLOW * one.friction_transition_mps) if pull > 0 else 1.0
+    pull = ease * one.force_n
+    sudden = pull / (pull + _SLOW * one.transition_mps) if pull > 0 else 1.0
     return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
 
 
+def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked | None:
+    """Laws by all that moves as the loop reads them; None where there are none."""
+    if not any(one.motions for one in laws):
+        return None
+    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_of
+
+    whole, numbers, memories = [], [0.0], []
+    for i, corner in enumerate(laws):
+        for one in corner.motions:
+            whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
+            numbers += numbers_of(one)
+            memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
+    places = way.distance_m[:, None] - structure.behind_m
+    return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),
+            np.array(memories, dtype=float), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places,
+            np.asarray(way.time_s, dtype=float))
+
+
 def _tabulated(
-    structure: Structure, laws: Sequence[CornerLaws], step_s: float, ease: Array,
+    structure: Structure, laws: Sequence[CornerLaws], step_s: float,
 ) -> tuple[Array, Array, Array]:
     """What the laws add to the linear springs, dampers and tires, as the loop reads it: tables of one and of two
     variables, and numbers."""
@@ -109,10 +188,9 @@ def _tabulated(
         tables.append([_sum(one.springs, travel), damper, mount, _sum(one.tires, travel)])
         pairs.append(_pairs(one.others))
         numbers.append([
-            bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others), one.dry_friction_n,
-            one.friction_transition_mps, _looked_at(one, ease[i]), one.mount_n_per_m if mounted else 0.0, low,
-            1 / step, one.damping_n_s_per_m, structure.tires[i], one.tire_damping_n_s_per_m,
-            np.inf if one.tire_pulls else loads[i],
+            bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
+            one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
+            one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i],
         ])
     return np.array(tables).swapaxes(0, 1).copy(), np.array(pairs), np.array(numbers, dtype=float)
 

@@ -5,6 +5,10 @@ It is compiled when numba is there (the ``lab`` extra), at its first use, and ke
 What the laws ask of a car, the travel and rate of each suspension and the deflection of each tire and its rate (the
 ``seen``), is carried through a step beside the state. So the forces at the end of a step are tried on these few
 numbers, and the state is taken on once. Matrices stand transposed and are as wide as the processor likes it.
+
+States of laws (``MotionLaw``) are stepped by an exponential midpoint rule, each with its own decay, the motion at the
+mean of both ends of the step: exact for a state that decays towards something, however quickly (M. Hochbruck, A.
+Ostermann, Exponential integrators, Acta Numerica 19, 2010, 2.3).
 """
 
 from __future__ import annotations
@@ -15,7 +19,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.vehicle.law_call import FELT, MEMORY_AT, ask
+
 Array = npt.NDArray[np.float64]
+Whole = npt.NDArray[np.int64]
+Asked = tuple[Whole, Array, Array, Array, Array, Array, Array, Array, Array]
+"""L laws by all that moves: whole numbers (L, 5); their own numbers, one after the other; what they felt at the
+beginning of a step (L, FELT); their states (L, MOST_MEMORY), those of rest at first; room for what one feels (FELT,),
+feels in the middle of a step and how fast its states grow there (FELT + MOST_MEMORY,), and answers (ANSWERS,); the
+places of the wheels (M, w) and the times (M,)."""
 
 try:
     import numba
@@ -44,14 +56,23 @@ LANES = 4
 """Numbers that are summed side by side."""
 _PASSES = 2
 _NEWTON_STEPS, _NEAR = 4, 1e-3
+_SWEEPS = 4  # a wheel that rubs on suspension and guide is so light that each friction changes what the other has to be
 _SLIDES = 8.0  # tanh is 1 from there on, but for some ten-millionths
+_SMALL_SHARE, _SMALL = 1e-6, 1e-9  # by so much of itself, and so much, a law's state is moved to see how it decays
+_SLOW_DECAY = 1e-5
 
 
 # Rows of the tables of one variable.
 SPRING, DAMPER, MOUNT, TIRE = range(4)
 # Columns of the numbers of a corner: whether it has these tables and one of two variables, and then
-(PAIR, FRICTION_N, FRICTION_MPS, FRICTION_AT, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M,
- TIRE_DAMPING, MOST_PULL_N) = range(4, 15)
+PAIR, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING, MOST_PULL_N = range(4, 12)
+# Of what rubs: its force, how it grows with the rate, and at which share of a step it looks at it; and whole numbers,
+# where its rate stands in the motion and at which suspension and tire it is recorded (-1: at none).
+FRICTION_N, FRICTION_MPS, FRICTION_AT = range(3)
+RATE_ROW, ON_SUSPENSION, ON_TIRE = range(3)
+# Whole numbers of a law: its address, wheel, what it acts on, where its numbers begin, and how many states it has.
+ADDRESS, WHEEL, BETWEEN, FIRST, STATES = range(5)
+BODY_AND_WHEEL, WHEEL_AND_GROUND = 0, 1
 
 
 @_compiled
@@ -150,33 +171,105 @@ def _friction(free: float, ease: float, most: float, transition: float) -> float
 
 @_compiled
 def _rub(
-    motion: Array, m: int, forces: Array, numbers: Array, by_force: Array, earlier: Array,
+    motion: Array, m: int, forces: Array, w: int, rubs: Array, rubs_at: Whole, by_force: Array, earlier: Array,
+    sweeps: int,
 ) -> None:
-    """Find the dry friction at the rates that each suspension has a little after the middle of the step, and add what
-    it does to travels and rates. What the others do to a suspension's rate is so little that theirs of before
-    serves for those that come after it.
+    """Find the dry friction at the rates that each pair has a little after the middle of the step, and add what it does
+    to what is seen. What the others do to a suspension's rate is so little that theirs of before serves for those that
+    come after it; where a wheel rubs on its guide too, they are gone through in some ``sweeps``.
 
-    earlier    (w,) the rates at the beginning, as they count for that instant
+    earlier    (f,) the rates at the beginning, as they count for that instant
     """
-    w = len(numbers)
-    for i in range(w):
-        free = motion[m + w + i] + earlier[i]
-        for j in range(w):
-            if j != i:
-                free += by_force[2 * w + j, m + w + i] * forces[2 * w + j]
-        forces[2 * w + i] = _friction(free, -by_force[2 * w + i, m + w + i], numbers[i, FRICTION_N],
-                                      numbers[i, FRICTION_MPS] / numbers[i, FRICTION_AT])
-    for i in range(w):
-        for r in range(m, m + 4 * w):
+    count = len(rubs)
+    for _ in range(sweeps):
+        for i in range(count):
+            row = rubs_at[i, RATE_ROW]
+            free = motion[row] + earlier[i]
+            for j in range(count):
+                if j != i:
+                    free += by_force[2 * w + j, row] * forces[2 * w + j]
+            forces[2 * w + i] = _friction(free, -by_force[2 * w + i, row], rubs[i, FRICTION_N],
+                                          rubs[i, FRICTION_MPS] / rubs[i, FRICTION_AT])
+    for i in range(count):
+        for r in range(m, len(motion)):
             motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]
+
+
+@_compiled
+def _feel(felt: Array, motion: Array, m: int, w: int, i: int, road: Array, place: float, time: float) -> None:
+    """Fill in what a law sees of wheel i, but for its states."""
+    felt[0], felt[1] = motion[m + i], motion[m + w + i]
+    felt[2], felt[3] = motion[m + 2 * w + i] - road[i], motion[m + 3 * w + i] - road[w + i]
+    felt[4], felt[5] = motion[m + 3 * w + i], motion[m + w + i] + motion[m + 3 * w + i]
+    felt[6], felt[7] = place, time
+
+
+@_compiled
+def _remember(law: Whole, one: int, given: Array, began: Array, memories: Array, felt: Array, middle: Array,
+              answers: Array, step_s: float) -> None:
+    """Step the states of a law.
+
+    began       (L, FELT) what each law felt at the beginning of the step, its states too
+    memories    (L, MOST_MEMORY) states at its end, as far as they are known; written here
+    felt        (FELT,) what it sees at its end
+    middle      (FELT + MOST_MEMORY,) for what it feels at the mean of both, and how fast its states grow there
+    """
+    count = law[one, STATES]
+    for c in range(MEMORY_AT):
+        middle[c] = 0.5 * (began[one, c] + felt[c])
+    for c in range(count):
+        middle[MEMORY_AT + c] = 0.5 * (began[one, MEMORY_AT + c] + memories[one, c])
+    ask(law[one, ADDRESS], given, law[one, FIRST], middle, answers)
+    for c in range(count):
+        middle[FELT + c] = answers[1 + c]
+    for c in range(count):
+        here, rate, start = middle[MEMORY_AT + c], middle[FELT + c], began[one, MEMORY_AT + c]
+        small = _SMALL_SHARE * abs(here) + _SMALL
+        middle[MEMORY_AT + c] = here + small
+        ask(law[one, ADDRESS], given, law[one, FIRST], middle, answers)
+        middle[MEMORY_AT + c] = here
+        growth = (answers[1 + c] - rate) / small
+        whole = growth * step_s
+        share = 1.0 + 0.5 * whole if abs(whole) < _SLOW_DECAY else np.expm1(whole) / whole
+        memories[one, c] = start + step_s * share * (rate - growth * (here - start))
+
+
+@_compiled
+def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> None:
+    """Keep what laws by all that moves feel at the beginning of step k."""
+    law, _, began, memories, _, _, _, places, time_s = asked
+    for one in range(len(law)):
+        _feel(began[one], motion, m, w, law[one, WHEEL], road, places[k, law[one, WHEEL]], time_s[k])
+        for c in range(law[one, STATES]):
+            began[one, MEMORY_AT + c] = memories[one, c]
+
+
+@_compiled
+def _answer(forces: Array, motion: Array, m: int, w: int, asked: Asked, road: Array, k: int, step_s: float) -> None:
+    """Add the forces of laws by all that moves at the end of step k, and step their states."""
+    law, given, began, memories, felt, middle, answers, places, time_s = asked
+    for one in range(len(law)):
+        i, between = law[one, WHEEL], law[one, BETWEEN]
+        _feel(felt, motion, m, w, i, road, places[k + 1, i], time_s[k + 1])
+        if law[one, STATES]:
+            _remember(law, one, given, began, memories, felt, middle, answers, step_s)
+            for c in range(law[one, STATES]):
+                felt[MEMORY_AT + c] = memories[one, c]
+        ask(law[one, ADDRESS], given, law[one, FIRST], felt, answers)
+        # What pulls the body's end down is a pull between body and wheel and one on the wheel alone.
+        if between != WHEEL_AND_GROUND:
+            forces[i] += answers[0]
+        if between != BODY_AND_WHEEL:
+            forces[w + i] += answers[0]
 
 
 @_compiled
 def _settle(
     motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
-    passes: int, rubs: bool, road: Array, mounts: Array, step_s: float, earlier: Array,
+    passes: int, rubs: Array, rubs_at: Whole, sweeps: int, road: Array, mounts: Array, step_s: float, earlier: Array,
+    asked: Asked | None, k: int,
 ) -> None:
-    """Find the forces at the end of a step (3 w) from those at its beginning, and the motion there.
+    """Find the forces at the end of step k (2 w + f) from those at its beginning, and the motion there.
 
     before    (R,) the motion without these forces
     passes    how often the laws are asked: not at all if friction is all there is
@@ -186,75 +279,92 @@ def _settle(
     seen = m // LANES * LANES
     for _ in range(passes):
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        if rubs:
-            _rub(motion, m, forces, numbers, by_force, earlier)
+        if len(rubs):
+            _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
         for i in range(w):
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
-    if rubs:
+        if asked is not None:
+            _answer(forces, motion, m, w, asked, road, k, step_s)
+    if len(rubs):
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        _rub(motion, m, forces, numbers, by_force, earlier)
-    _sum(motion, 0, before, forces, 3 * w, by_force)
+        _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
+    _sum(motion, 0, before, forces, len(forces), by_force)
 
 
 @_compiled
 def _walk(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, around: Array,
     elevation: Array, states: Array, recorded: Array, known: Array, before: Array, nothing: Array, motion: Array,
-    forces: Array, road: Array, mounts: Array, earlier: Array, passes: int, rubs: bool,
+    forces: Array, road: Array, mounts: Array, earlier: Array, passes: int, rubs: Array, rubs_at: Whole, sweeps: int,
+    asked: Asked | None,
 ) -> None:
     """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
     step needs."""
     count, m, w = len(elevation), states.shape[1], len(numbers)
     for k in range(count - 1):
+        if asked is not None:
+            _begin(motion, m, w, asked, road, k)
         for i in range(w):
             known[m + 2 * w + i] = around[k + 1, i]
             known[m + 3 * w + i] = 0.25 * (around[k + 2, i] - around[k, i])
             road[i] = elevation[k + 1, i]
             road[w + i] = (around[k + 2, i] - around[k + 1, i]) / step_s
             mounts[i, 0] = mounts[i, 1] + 0.5 * step_s * (motion[m + w + i] - mounts[i, 2])
-            earlier[i] = (1 / numbers[i, FRICTION_AT] - 1) * motion[m + w + i]
+        for i in range(len(rubs)):
+            earlier[i] = (1 / rubs[i, FRICTION_AT] - 1) * motion[rubs_at[i, RATE_ROW]]
         _sum(before, 0, nothing, known, m + 4 * w, by_known)
-        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, passes, rubs, road, mounts, step_s,
-                earlier)
+        _settle(motion, m, before, forces, by_force, tables, pairs, numbers, passes, rubs, rubs_at, sweeps, road,
+                mounts, step_s, earlier, asked, k)
         for r in range(m):
             known[r] = motion[r]
             states[k + 1, r] = motion[r]
-        for i in range(w):
-            known[m + i], known[m + w + i] = forces[i], forces[w + i]
-            recorded[k + 1, i] += forces[i] + 0.5 * forces[2 * w + i]
-            recorded[k + 1, w + i] = forces[w + i]
-            # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
-            recorded[k, i] += 0.5 * forces[2 * w + i]
+        for i in range(2 * w):
+            known[m + i] = forces[i]
+            recorded[k + 1, i] += forces[i]
+        # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
+        for i in range(len(rubs)):
+            half, strut, tire = 0.5 * forces[2 * w + i], rubs_at[i, ON_SUSPENSION], rubs_at[i, ON_TIRE]
+            if strut >= 0:
+                recorded[k, strut] += half
+                recorded[k + 1, strut] += half
+            if tire >= 0:
+                recorded[k, tire] += half
+                recorded[k + 1, tire] += half
 
 
 @_compiled_with_arrays
 def steps(
-    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, start: Array,
-    around: Array, elevation: Array,
+    by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, rubs: Array,
+    rubs_at: Whole, asked: Asked | None, start: Array, m: int, around: Array, elevation: Array,
 ) -> tuple[Array, Array]:
     """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
 
     The motion (R,) of the linear car is its state, what is seen (4 w: travels, rates, heights of the wheels, rates of
-    these), and 0 up to the next number of whole ``LANES``.
+    these; where the body rubs on a guide, w rates of its ends too), and 0 up to the next number of whole ``LANES``.
 
     by_known     (2 n + 4 w, R) the motion at the end of a step by the state and the laws' forces at its beginning, and
                  the road's mean and how far it rises from the middle of the step to its end
-    by_force     (3 w, R) the same by the laws' forces at the end, then by dry friction
-    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 15)
-    start        (2 n,) the first state
+    by_force     (2 w + f, R) the same by the laws' forces at the end, then by dry friction
+    tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 12)
+    rubs         (f, 3) numbers of what rubs; rubs_at (f, 3) its places
+    asked        laws by all that moves; None: there are none, and a loop without them runs
+    start        (R,) the first motion, of which m make the state
     around       (M + 1, w) means of the road before, in and after the steps
     elevation    (M, w) of the road at the instants
     """
-    count, m, w = len(elevation), len(start), len(numbers)
+    count, w = len(elevation), len(numbers)
     states, recorded = np.zeros((count, m)), np.zeros((count, 2 * w))
-    states[0] = start
-    known, before, motion = np.zeros(m + 4 * w), np.zeros(by_known.shape[1]), np.zeros(by_known.shape[1])
-    known[:m] = start
-    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any()
+    states[0] = start[:m]
+    known, before = np.zeros(m + 4 * w), np.zeros(by_known.shape[1])
+    known[:m] = start[:m]
+    road = np.concatenate((elevation[0], (around[1] - around[0]) / step_s))
+    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or asked is not None
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
+    passes = _PASSES if acts else 0
+    sweeps = 1 if (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
     _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,
-          np.zeros_like(before), motion, np.zeros(3 * w), np.zeros(2 * w), np.zeros((w, 3)), np.zeros(w),
-          _PASSES if acts else 0, numbers[:, FRICTION_N].max() > 0.0)
+          np.zeros_like(before), start.copy(), np.zeros(len(by_force)), road, np.zeros((w, 3)), np.zeros(len(rubs)),
+          passes, rubs, rubs_at, sweeps, asked)
     return states, recorded

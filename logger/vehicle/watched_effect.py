@@ -27,7 +27,7 @@ from logger.vehicle.effect import (
     SensorEffect,
     VehicleEffect,
 )
-from logger.vehicle.laws import CornerLaws
+from logger.vehicle.laws import MOST_MEMORY, Between, CornerLaws, MotionLaw, Seen
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Vehicle
@@ -53,7 +53,7 @@ class _Watched(Effect):
         self.name, self.title, self.parameters = own.name, own.title, own.parameters
         self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
         self.realigns, self.reshapes, self.replaces = own.realigns, own.reshapes, own.replaces
-        self.stage = own.stage
+        self.sought, self.stage = own.sought, own.stage
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         with self._blame():
@@ -110,6 +110,9 @@ class _WatchedForce(_Watched, ForceEffect):
         with self._blame():
             found: CornerLaws = _kept("laws", self._own.laws(p, laws), CornerLaws)
             _check_numbers(found, laws)
+            for one in found.motions:
+                if one not in laws.motions:
+                    _check_motion(one)
         known = {id(law) for law in (laws.damper, *laws.springs, *laws.others, *laws.tires)}
 
         def own(name: str, law: Callable[..., Array]) -> Callable[..., Array]:
@@ -182,7 +185,8 @@ def _check_stands(structure: Structure, name: str) -> None:
 
 def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
     """ValueError for numbers that no corner has."""
-    for name in ("dry_friction_n", "friction_transition_mps", "tire_damping_n_s_per_m", "mount_n_per_m"):
+    for name in ("dry_friction_n", "friction_transition_mps", "wheel_friction_n", "body_friction_n",
+                 "guide_transition_mps", "tire_damping_n_s_per_m", "mount_n_per_m"):
         value = getattr(laws, name)
         infinite = name == "mount_n_per_m" and value == np.inf
         if not (infinite or (np.ndim(value) == 0 and np.isfinite(value) and value >= 0)):
@@ -194,5 +198,47 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
         some = getattr(laws, name)
         if not isinstance(some, tuple) or not all(map(callable, some)):
             raise ValueError(f"expected laws to answer with a tuple of functions as {name}, found {some!r}")
+    if not isinstance(laws.motions, tuple) or not all(isinstance(one, MotionLaw) for one in laws.motions):
+        raise ValueError(f"expected laws to answer with a tuple of MotionLaw as motions, found {laws.motions!r}")
     if not callable(laws.damper):
         raise ValueError(f"expected laws to answer with a function as damper, found {laws.damper!r}")
+
+
+# Motions that a law is tried at: up to what tables of other laws reach to, each as far as it usually goes, and rest.
+_TRIED = np.vstack([np.zeros(8), np.random.default_rng(1).uniform(-1, 1, (30, 8))]) * [
+    0.4, 8.0, 0.1, 8.0, 8.0, 8.0, 1000.0, 100.0]
+
+
+def _check_motion(law: MotionLaw) -> None:
+    """ValueError for a law by all that moves that gives no numbers, or that a simulation could not ask."""
+    from logger.vehicle.law_call import address_of, functions_of  # loads the compiler, if there is one
+
+    if not isinstance(law.between, Between):
+        raise ValueError(f"expected with_law to get one of {', '.join(map(str, Between))}, found {law.between!r}")
+    functions_of(law)
+    memory = law.memory
+    if not (isinstance(memory, tuple) and len(memory) <= MOST_MEMORY
+            and all(_is_number(one) for one in memory)):
+        raise ValueError(f"expected memory to be a tuple of at most {MOST_MEMORY} finite numbers, found {memory!r}")
+    if (law.rates is None) == bool(memory):
+        raise ValueError("expected rates and memory both, or neither: how fast each state grows, and where it is at "
+                         "rest")
+    for name, value in vars(law.p).items():
+        if not _is_number(value):
+            raise ValueError(f"expected p of a law to hold finite numbers, found {name} {value!r}")
+    for now in _TRIED:
+        seen = Seen._make([*map(float, now), tuple(map(float, memory))])
+        with np.errstate(all="ignore"):
+            _numbers("force", law.force(law.p, seen), np.zeros(()))
+            if law.rates is not None:
+                found = law.rates(law.p, seen)
+                if not isinstance(found, tuple) or len(found) != len(memory):
+                    raise ValueError(f"expected rates to answer with a tuple of {len(memory)}, one number for each "
+                                     f"state, as in (rate,), found {found!r}")
+                for one in found:
+                    _numbers("rates", one, np.zeros(()))
+    address_of(law)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and bool(np.isfinite(float(value)))

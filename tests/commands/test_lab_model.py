@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.bench import sought_effects
 from logger.api.outputs import check_out
 from logger.api.run_checks import lab_runs
 from logger.commands.main import main
@@ -18,7 +19,6 @@ from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import read_run, write_drive, write_profile
-from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.lab.runs_with_effects import OWN, named, write_runs
@@ -136,7 +136,7 @@ def test_a_search_that_could_not_try_every_effect_is_refused(
     out = tmp_path / "out"
     given = ["demo", "--lab", "--out", str(out)] if command == "demo" else [
         *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", *runs]
-    words = rf"the lab extra \(pip install '\.\[lab\]'\).* [1-9]\d* of {len(shipped_effects())} effects"
+    words = rf"the lab extra \(pip install '\.\[lab\]'\).* [1-9]\d* of {len(sought_effects())} effects"
     with pytest.raises(BadInput, match=words) as refused:
         main(given)
     assert "\n" not in str(refused.value)

@@ -293,6 +293,10 @@ def test_compiled_and_plain_python_agree(monkeypatch: pytest.MonkeyPatch) -> Non
     rough = 0.02 * np.random.default_rng(1).standard_normal((2, 20)).repeat(4, axis=1).T
     laws = [*compose(RAV4, EVERYTHING).laws]
     laws = [one.with_force(lambda x, v: 500 * v * np.abs(v) + 3000 * x).with_tire(lambda d: 1e6 * d**3) for one in laws]
+    more = compose(RAV4, [effect("hysteresis", yield_force_n=50, yield_travel_m=0.002),
+                          effect("frame_friction", friction_force_n=20, body_friction_force_n=10)]).laws
+    laws = [replace(one, motions=other.motions, wheel_friction_n=other.wheel_friction_n,
+                    body_friction_n=other.body_friction_n) for one, other in zip(laws, more, strict=True)]
     structure = structure_of(RAV4)
     compiled = march(structure, laws, rough, (rough[1:] + rough[:-1]) / 2, 1e-3)
     with monkeypatch.context() as without:

@@ -28,7 +28,7 @@ _STEP_HZ = 0.025
 
 def _is_straight(laws: CornerLaws) -> bool:
     """Whether all forces of a corner are in proportion to how it is moved; of a damper, at some rates either way."""
-    if laws.springs or laws.others or laws.tires or laws.dry_friction_n or not laws.tire_pulls:
+    if laws.springs or laws.others or laws.motions or laws.tires or laws.rubs or not laws.tire_pulls:
         return False
     rates_mps = np.array([-2.0, -0.5, -0.1, 0.02, 0.3, 1.0, 3.0])
     slopes = laws.damper(rates_mps) / rates_mps

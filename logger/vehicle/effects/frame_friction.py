@@ -1,0 +1,45 @@
+"""On a test rig the wheel and the body go up and down along guides that stand on the ground, and rub on them.
+
+While it slides the force against the wheel carrier is F sign(u'), with u' how fast it rises against the ground; while
+it sticks, whatever keeps it stuck, up to F. It may grow with the speed as in ``dry_friction``.
+
+A bench quarter car carries both plates, wheel and body, on rails of one kind, so both may rub: the wheel's guide by one
+force, the body's, at the body's end of each suspension, by a second, which is 0 unless it is said. On a road nothing
+holds a car against the ground: a search tries this effect on rigs alone, or where it is asked for by name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.laws import CornerLaws
+
+
+class FrameFriction(ForceEffect):
+    name = "frame_friction"
+    title = "on a rig: Coulomb friction of wheel and body against their guides"
+    parameters = (
+        Parameter("friction_force_n", 20.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (5.0, 20.0, 80.0),
+                  "of each wheel carrier against its guide"),
+        Parameter("body_friction_force_n", 10.0, 0.0, 2000.0, None, Scale.LINEAR, (0.0, 10.0),
+                  "of the body against its guide, at each suspension", default=0.0),
+        Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
+                  "speed at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
+                  step=0.0003),
+    )
+    source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
+    signature = "small motions of wheel and body die away at once, also those in which the suspension does not move"
+    shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
+    sought = Sought.ON_RIGS
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        if p.friction_force_n == 0 and p.body_friction_force_n == 0:
+            return laws
+        return replace(laws, wheel_friction_n=laws.wheel_friction_n + p.friction_force_n,
+                       body_friction_n=laws.body_friction_n + p.body_friction_force_n,
+                       guide_transition_mps=p.transition_velocity_m_per_s)
+
+
+EFFECT = FrameFriction()

@@ -1,0 +1,61 @@
+"""Rubber bushings and leaves give a little before they slide: the force depends on the way that they have come.
+
+The force F z in each suspension has a memory z, from -1 to 1. With y the travel in which it would yield at its first
+stiffness F / y, and n the sharpness of the yield,
+
+    z' = (x' / y) (1 - |z|^n (1 + sign(x' z)) / 2)
+
+which is the law of Bouc and Wen with A = 1 and equal shares of both its shapes: it is let go along its first stiffness,
+and after a long way it is Coulomb friction. Without a yield travel it is ``dry_friction`` from the beginning.
+
+A search tries it only where it is asked for by name: it makes a quick search half as long again. One that was not told
+to try it finds the residual of such a car unexplained.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.laws import Between, CornerLaws, Seen
+
+
+def force(p: Any, seen: Seen) -> Any:
+    """In the suspension [N]."""
+    return p.yield_force_n * seen.memory[0]
+
+
+def rates(p: Any, seen: Seen) -> tuple[Any]:
+    """How fast the memory grows [1/s]."""
+    z = seen.memory[0]
+    held = 0.5 * np.abs(z) ** p.sharpness_ratio * (1.0 + np.sign(seen.rate_mps * z))
+    return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
+
+
+class Hysteresis(ForceEffect):
+    name = "hysteresis"
+    title = "friction in each suspension that gives before it slides (Bouc-Wen)"
+    parameters = (
+        Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
+                  "at which each suspension slides"),
+        Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
+                  "over which it would come to that at its first stiffness"),
+        Parameter("sharpness_ratio", 1.0, 0.5, 10.0, None, Scale.LOG, (1.0,),
+                  "exponent of the law: the higher, the sharper the yield", default=1.0),
+    )
+    source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
+              "ASCE 102 (1976) 249")
+    signature = "small motions meet a stiffer spring, larger ones friction; each turn of the motion begins stiff"
+    shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
+    sought = Sought.NEVER
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        if p.yield_force_n == 0:
+            return laws
+        return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))
+
+
+EFFECT = Hysteresis()

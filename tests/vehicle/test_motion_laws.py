@@ -1,0 +1,422 @@
+"""Forces by all that moves at a wheel, and with states: against Newton's laws in SciPy, and closed forms."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from dataclasses import replace
+from math import pi, sqrt
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from logger.api.bench import among, known_effects
+from logger.errors import BadInput
+from logger.shipped import vehicle_file
+from logger.store.formats.effect_file import own_effect, shipped_effects
+from logger.store.formats.vehicle_file import Model, read_vehicle
+from logger.vehicle import law_call
+from logger.vehicle.compose import compose
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effects.hysteresis import force, rates
+from logger.vehicle.laws import Between, MotionLaw, Seen, linear
+from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linearise import known_vehicle
+from logger.vehicle.modes import modes_of_car
+from logger.vehicle.stepping import Way, march
+from logger.vehicle.vehicle import Axle, Vehicle
+
+RIG = Vehicle("rig", "quarter_car", 300.0, None, Axle(0.0, 40.0, 20000.0, 600.0, 2e5), None, 0.25)
+STEP_S, LASTS_S = 5e-4, 2.0
+N_CPM = np.geomspace(0.004, 3.3, 300)
+
+
+def effect(name: str, **values: float) -> Chosen:
+    one = shipped_effects()[name]
+    return chosen(one, one.usual | values)
+
+
+def shaken_m(t: np.ndarray | float) -> np.ndarray | float:
+    """A road, from rest, with its rate 0 at first."""
+    return 0.006 * (1 - np.cos(2 * pi * 1.3 * t)) + 0.0015 * (1 - np.cos(2 * pi * 9.0 * t))
+
+
+def shaken_mps(t: float) -> float:
+    return 0.006 * 2 * pi * 1.3 * np.sin(2 * pi * 1.3 * t) + 0.0015 * 2 * pi * 9.0 * np.sin(2 * pi * 9.0 * t)
+
+
+def stepped(*effects: Chosen, way: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """States of the rig, and its forces, in steps of half a millisecond."""
+    car = compose(RIG, effects)
+    time_s = STEP_S * np.arange(round(LASTS_S / STEP_S) + 1)
+    fine = shaken_m(STEP_S / 8 * np.arange(8 * (len(time_s) - 1) + 1)).reshape(-1)
+    mean = np.stack([(fine[:-1] + fine[1:])[i::8] / 2 for i in range(8)]).mean(axis=0)
+    went = Way(15.0 * time_s, time_s) if way else None
+    did = march(car.structure, car.laws, shaken_m(time_s)[:, None], mean[:, None], STEP_S, went)
+    return did.states, did.forces
+
+
+def by_newton(added, memory: int = 0) -> np.ndarray:
+    """States of the rig by Newton's laws.
+
+    added    (t, travel, rate, deflection, deflection rate, wheel's speed, states) -> forces on the body and on the
+             wheel, both down, and how fast the states grow
+    """
+    axle, m = RIG.front, RIG.sprung_mass_kg
+
+    def derivative(t: float, y: np.ndarray) -> list[float]:
+        body, wheel, body_mps, wheel_mps = y[:4]
+        travel, rate = body - wheel, body_mps - wheel_mps
+        press, press_mps = wheel - shaken_m(t), wheel_mps - shaken_mps(t)
+        strut = axle.suspension_stiffness_n_per_m * travel + axle.suspension_damping_n_s_per_m * rate
+        on_body, on_wheel, grow = added(t, travel, rate, press, press_mps, wheel_mps, y[4:])
+        return [body_mps, wheel_mps, (-strut - on_body) / m,
+                (strut - axle.tire_stiffness_n_per_m * press - on_wheel) / axle.unsprung_mass_kg, *grow]
+
+    time_s = STEP_S * np.arange(round(LASTS_S / STEP_S) + 1)
+    return solve_ivp(derivative, (0, LASTS_S), np.zeros(4 + memory), "LSODA", time_s, rtol=1e-8, atol=1e-10,
+                     max_step=1e-3).y.T
+
+
+def off(found: np.ndarray, expected: np.ndarray, plain: np.ndarray) -> float:
+    """The error of the body's and the wheel's speeds, as a share of what the law does to them."""
+    return float(np.sqrt(np.mean((found - expected)[:, 2:4] ** 2) / np.mean((expected - plain)[:, 2:4] ** 2)))
+
+
+@pytest.fixture(scope="module")
+def plain() -> np.ndarray:
+    return by_newton(lambda *_: (0.0, 0.0, []))[:, :4]
+
+
+@pytest.mark.parametrize(("wheel_n", "body_n"), [(30.0, 0.0), (0.0, 25.0), (30.0, 25.0)])
+def test_guides_rub_as_newton_says(wheel_n: float, body_n: float, plain: np.ndarray) -> None:
+    """Friction that grows within 0.5 mm/s nearly at once, in an integrator that takes all the steps it needs."""
+    def added(t, x, v, d, d_mps, u_mps, z):
+        return body_n * np.tanh((v + u_mps) / 5e-4), wheel_n * np.tanh(u_mps / 5e-4), []
+
+    expected = by_newton(added)[:, :4]
+    for transition, allowed in ((5e-4, 0.01), (0.0, 0.03)):
+        states, _ = stepped(effect("frame_friction", friction_force_n=wheel_n, body_friction_force_n=body_n,
+                                   transition_velocity_m_per_s=transition))
+        assert off(states, expected, plain) < allowed
+
+
+def test_guides_and_suspension_rub_together(plain: np.ndarray) -> None:
+    def added(t, x, v, d, d_mps, u_mps, z):
+        strut = 40 * np.tanh(v / 5e-4)
+        return strut + 15 * np.tanh((v + u_mps) / 5e-4), -strut + 30 * np.tanh(u_mps / 5e-4), []
+
+    expected = by_newton(added)[:, :4]
+    states, _ = stepped(effect("frame_friction", friction_force_n=30.0, body_friction_force_n=15.0),
+                        effect("dry_friction", friction_force_n=40.0))
+    assert off(states, expected, plain) < 0.03
+
+
+def test_a_rig_comes_to_rest_and_stays() -> None:
+    """After the shaking, within force over stiffness of where it began."""
+    car = compose(RIG, [effect("frame_friction", friction_force_n=100.0, body_friction_force_n=100.0)])
+    road = 0.01 * np.sin(np.pi * np.clip(np.arange(8000) / 500, 0, 2))[:, None]
+    states = march(car.structure, car.laws, road, (road[1:] + road[:-1]) / 2, 1e-3).states
+    assert np.abs(states).max() > 0.005
+    assert states[-1000:] == pytest.approx(np.broadcast_to(states[-1], (1000, 4)), abs=1e-7)
+    assert abs(states[-1, 0] - states[-1, 1]) * 20000.0 < 100.0 + 1.0
+
+
+@pytest.mark.parametrize(("travel_m", "sharpness"), [(0.0003, 1.0), (0.002, 1.0), (0.004, 2.0), (0.001, 0.7)])
+def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, plain: np.ndarray) -> None:
+    def added(t, x, v, d, d_mps, u_mps, z):
+        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (1.0 if v * z[0] > 0 else 0.0))
+        return 120 * z[0], -120 * z[0], [grow]
+
+    expected = by_newton(added, 1)[:, :4]
+    states, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=sharpness))
+    assert off(states, expected, plain) < 0.01
+
+
+def test_hysteresis_without_a_yield_travel_is_coulomb_friction() -> None:
+    rubs, _ = stepped(effect("dry_friction", friction_force_n=120.0))
+    nearly, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=1e-4))
+    further, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=1e-3))
+    size = np.sqrt(np.mean(rubs[:, 2] ** 2))
+    assert np.sqrt(np.mean((nearly - rubs)[:, 2] ** 2)) < 0.06 * size
+    assert np.sqrt(np.mean((further - rubs)[:, 2] ** 2)) > 3 * np.sqrt(np.mean((nearly - rubs)[:, 2] ** 2))
+
+
+# --- hysteresis alone: its loop ---
+
+
+def loop_area_n_m(amplitude_m: float, values: SimpleNamespace) -> float:
+    """Of a settled loop of the law, by SciPy along the way."""
+    def slope(t: float, z: np.ndarray) -> list[float]:
+        v = 2 * pi * amplitude_m * np.cos(2 * pi * t)
+        return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
+
+    settled = 12
+    t = np.linspace(settled, settled + 1, 4001)
+    z = solve_ivp(slope, (0, settled + 1), [0.0], "LSODA", t, rtol=1e-9, atol=1e-12, max_step=5e-3).y[0]
+    f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
+    return float(np.trapezoid(f, amplitude_m * np.sin(2 * pi * t)))
+
+
+def test_the_loop_is_as_large_as_it_has_to_be() -> None:
+    """n = 1. Far beyond the yield: Coulomb's 4 F a, less what the corners take: from -1 z comes back straight to 0 and
+    then as 1 - exp(-x / y), so half a turn of 2 a takes (2 a - (1/2 + 1 + 1) y) F. Within it each half way begins at
+    -z1, and comes straight to 0, then curved to z1: the area is known from z1 alone."""
+    force_n, y = 120.0, 0.002
+    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0)
+    large = 2 * force_n * (2 * 0.05 - 2.5 * y)
+    assert loop_area_n_m(0.05, values) == pytest.approx(large, rel=1e-3)
+    for small in (0.001, 0.003):
+        low, high = 0.0, 1.0
+        for _ in range(60):  # z1 + ln(1 / (1 - z1)) = 2 a / y
+            z1 = (low + high) / 2
+            low, high = (z1, high) if z1 - np.log(1 - z1) < 2 * small / y else (low, z1)
+        curved, _ = quad(lambda x: 1 - np.exp(-x / y), 0, 2 * small - z1 * y)
+        assert loop_area_n_m(small, values) == pytest.approx(2 * force_n * (curved - z1**2 * y / 2), rel=1e-3)
+
+
+def test_no_friction_gives_energy() -> None:
+    """Over any closed way the work of the force, less what is stored in its first stiffness, is a loss."""
+    values = SimpleNamespace(yield_force_n=1.0, yield_travel_m=1.0, sharpness_ratio=1.0)
+    x = np.cumsum(np.random.default_rng(3).standard_normal(20000)) * 0.03
+    for sharpness in (0.5, 1.0, 4.0):
+        values.sharpness_ratio = sharpness
+        z, lost = 0.0, [0.0]
+        for step in np.diff(x):
+            parts = max(1, int(abs(step) / 0.01))
+            for _ in range(parts):
+                way = step / parts
+                dz = float(rates(values, Seen(0, way, 0, 0, 0, 0, 0, 0, (z,)))[0])
+                lost.append(lost[-1] + (z + dz / 2) * (way - dz))
+                z += dz
+        assert abs(z) <= 1.01
+        assert (np.diff(lost) >= -1e-4).all() and lost[-1] > 1.0
+
+
+# --- laws of ones own ---
+
+HEAD = """\
+import numpy as np
+from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.laws import Between
+
+
+"""
+CLASS = """
+
+
+class Mine(ForceEffect):
+    name = "mine"
+    title = "mine"
+    parameters = (Parameter("size", 1.0, 0.0, 1e6, 0.0, Scale.LINEAR, (1.0,), "how much"),)
+    source = "mine"
+    signature = "mine"
+    shown_by = "drive"
+
+    def laws(self, p, laws):
+        return laws.with_law({arguments})
+
+
+EFFECT = Mine()
+"""
+
+
+def own(folder: Path, functions: str, arguments: str, size: float = 2.0) -> Chosen:
+    (folder / "mine.py").write_text(HEAD + functions + CLASS.format(arguments=arguments))
+    return chosen(own_effect(folder / "mine.py"), {"size": size})
+
+
+def test_a_law_sees_all_that_moves_and_where_and_when(tmp_path: Path, plain: np.ndarray) -> None:
+    """All that it sees at once, between each pair of ends."""
+    text = ("def pull(p, seen):\n    return (p.size * (2000 * seen.travel_m + 30 * seen.rate_mps * abs(seen.rate_mps)\n"
+            "        + 1e3 * seen.deflection_m + 20 * seen.deflection_mps + 40 * seen.wheel_mps + 50 * seen.body_mps)\n"
+            "        + 30 * np.sin(9 * seen.time_s) + 20 * np.sin(seen.distance_m))\n")
+
+    def pull(t, x, v, d, d_mps, u_mps, z):
+        return (2 * (2000 * x + 30 * v * abs(v) + 1e3 * d + 20 * d_mps + 40 * u_mps + 50 * (u_mps + v))
+                + 30 * np.sin(9 * t) + 20 * np.sin(15.0 * t))
+
+    for ends, on_body, on_wheel in (("BODY_AND_WHEEL", 1, -1), ("WHEEL_AND_GROUND", 0, 1), ("BODY_AND_GROUND", 1, 0)):
+        def added(*seen, on_body=on_body, on_wheel=on_wheel):
+            force_n = pull(*seen)
+            return on_body * force_n, on_wheel * force_n, []
+
+        states, _ = stepped(own(tmp_path, text, f"Between.{ends}, pull, p"), way=True)
+        assert off(states, by_newton(added)[:, :4], plain) < 0.005, ends
+
+
+def test_two_states_are_stepped_with_the_car(tmp_path: Path, plain: np.ndarray) -> None:
+    """A mass in the suspension's oil: u' = w, w' = (v - w) a - b u, stiff enough to be seen."""
+    text = ("def pull(p, seen):\n    return p.size * 100 * seen.memory[1]\n\n\n"
+            "def grow(p, seen):\n    u, w = seen.memory\n    return w, 200 * (seen.rate_mps - w) - 3000 * u\n")
+
+    def added(t, x, v, d, d_mps, u_mps, z):
+        pull = 200 * z[1]
+        return pull, -pull, [z[1], 200 * (v - z[1]) - 3000 * z[0]]
+
+    states, _ = stepped(own(tmp_path, text, "Between.BODY_AND_WHEEL, pull, p, grow, memory=(0.0, 0.0)"))
+    assert off(states, by_newton(added, 2)[:, :4], plain) < 0.005
+
+
+def test_a_compiled_law_answers_as_it_is_written() -> None:
+    values = SimpleNamespace(yield_force_n=7.0, yield_travel_m=0.5, sharpness_ratio=1.5)
+    law = MotionLaw(Between.BODY_AND_WHEEL, force, values, rates, (0.0,))
+    felt = np.linspace(-0.4, 0.6, law_call.FELT)
+    seen = Seen(*felt[: law_call.MEMORY_AT], (felt[law_call.MEMORY_AT],))
+    answers = np.zeros(law_call.ANSWERS)
+    given = np.array([9.0, *law_call.numbers_of(law)])
+    law_call.ask(law_call.address_of(law), given, 1, felt, answers)
+    expected = force(values, seen), rates(values, seen)[0]
+    assert answers[:2] == pytest.approx(expected, rel=1e-12)
+    written = np.zeros(law_call.ANSWERS)
+    numbers = namedtuple("numbers", sorted(vars(values)))
+    law_call._plain(force, rates, numbers, 1)(given[1:], felt, written)  # as it is asked without a compiler
+    assert written == pytest.approx(answers, rel=1e-12)
+
+
+# --- in place of them, linear ones ---
+
+
+def road(height: float) -> np.ndarray:
+    return height**2 * 1e-6 * (N_CPM / 0.1) ** -2.0
+
+
+def deviation(gain: np.ndarray, height: float) -> float:
+    return sqrt(float(np.abs(gain) ** 2 @ (road(height) * N_CPM * np.log(N_CPM[1] / N_CPM[0]))))
+
+
+def at(height: float, *effects: Chosen) -> LinearCar:
+    return known_vehicle(RIG, effects).at(20.0, N_CPM, road(height))
+
+
+def test_guides_have_the_slope_of_coulomb_friction() -> None:
+    linear_car = at(2.0, effect("frame_friction", friction_force_n=30.0, body_friction_force_n=10.0))
+    moves, s = linear_car.waves(N_CPM, 20.0), 2j * pi * N_CPM * 20.0
+    corner = linear_car.corners[0]
+    wheel_mps, body_mps = (deviation(s * one, 2.0) for one in (moves.height[:, 0], (moves.height + moves.travel)[:, 0]))
+    assert corner.wheel_n_s_per_m == pytest.approx(sqrt(2 / pi) * 30.0 / wheel_mps, rel=0.25)
+    assert corner.body_n_s_per_m == pytest.approx(sqrt(2 / pi) * 10.0 / body_mps, rel=0.25)
+
+
+@pytest.mark.parametrize("height", [0.2, 1.0, 5.0])
+def test_hysteresis_is_linearised_as_wen_has_it(height: float) -> None:
+    """n = 1, A = 1 / y, both shapes 1 / (2 y): z' = c v - k z with c = A - sqrt(2 / pi) (E[v z] / sv + sz) / (2 y),
+    k = sqrt(2 / pi) (sv + E[v z] / sz) / (2 y)."""
+    y = 0.002
+    linear_car = at(height, effect("hysteresis", yield_force_n=120.0, yield_travel_m=y))
+    law = linear_car.corners[0].motions[0]
+    moves, s = linear_car.waves(N_CPM, 20.0), 2j * pi * N_CPM * 20.0
+    rate = moves.rate[:, 0]
+    into, own_rate = float(law.into[0, 1]), float(-law.own[0, 0])
+    z = rate * into / (s + own_rate)
+    power = road(height) * N_CPM * np.log(N_CPM[1] / N_CPM[0])
+    sv, sz, vz = deviation(rate, height), deviation(z, height), float((rate.conj() * z).real @ power)
+    assert law.by == pytest.approx(0.0, abs=1e-6) and law.through == pytest.approx([120.0], rel=0.01)
+    assert own_rate == pytest.approx(sqrt(2 / pi) * (sv + vz / sz) / (2 * y), rel=0.25)
+    assert into == pytest.approx(1 / y - sqrt(2 / pi) * (vz / sv + sz) / (2 * y), rel=0.25, abs=20.0)
+
+
+@pytest.mark.parametrize("one", [effect("hysteresis", yield_force_n=60.0, yield_travel_m=0.002),
+                                 effect("frame_friction", friction_force_n=20.0, body_friction_force_n=20.0)])
+def test_a_linear_one_moves_as_the_simulation_does(one: Chosen) -> None:
+    """On a random road of the spectrum: the body's r.m.s. speed, beside that of a car without it."""
+    height, speed_mps, step_s, count = 4.0, 20.0, 1e-3, 2**16
+    f_hz = np.fft.rfftfreq(count, step_s)[1:]
+    n_cpm = f_hz / speed_mps
+    inside = (n_cpm > N_CPM[0]) & (n_cpm < N_CPM[-1])
+    psd = np.where(inside, height**2 * 1e-6 * (n_cpm / 0.1) ** -2.0, 0.0)
+    turns = np.exp(2j * pi * np.random.default_rng(5).random(len(f_hz)))
+    waves = np.sqrt(psd * (n_cpm[1] - n_cpm[0]) / 2) * turns * np.sinc(n_cpm * RIG.contact_patch_m)
+    elevation = np.fft.irfft(np.concatenate([[0.0], waves]) * count, count)[:, None]
+    found = []
+    for effects in ([], [one]):
+        car = compose(RIG, effects)
+        did = march(car.structure, car.laws, elevation, (elevation[1:] + elevation[:-1]) / 2, step_s).states
+        known = at(height, *effects, effect("tire_damping", tire_damping_n_s_per_m=1e-6))
+        moves, s = known.waves(N_CPM, speed_mps), 2j * pi * N_CPM * speed_mps
+        told = deviation(s * (moves.height + moves.travel)[:, 0], height)
+        found.append((float(did[5000:, 2].std()), told))
+    (plain, plain_told), (with_it, told) = found
+    assert plain_told == pytest.approx(plain, rel=0.05)
+    assert abs(with_it / plain - 1) > 0.03
+    assert told == pytest.approx(with_it, rel=0.08)
+
+
+def test_modes_ring_as_the_waves_do() -> None:
+    """A root of the modes is one of the car's own equations."""
+    car = at(1.0, effect("hysteresis", yield_force_n=200.0, yield_travel_m=0.002), effect("frame_friction"))
+    for mode in modes_of_car(car):
+        if mode.damping_ratio < 1:
+            w, d = 2 * pi * mode.frequency_hz, mode.damping_ratio
+            dynamic = car._dynamic(np.array([w * complex(-d, sqrt(1 - d * d))]))[0][0]
+            assert abs(np.linalg.det(dynamic)) < 1e-6 * np.prod(np.abs(np.diag(dynamic)))
+
+
+def test_a_law_of_place_or_time_has_no_stand_in(tmp_path: Path) -> None:
+    text = "def push(p, seen):\n    return p.size * np.sin(seen.time_s) + 0.0 * seen.travel_m\n"
+    with pytest.raises(ValueError, match="no linear stand-in"):
+        known_vehicle(RIG, [own(tmp_path, text, "Between.BODY_AND_GROUND, push, p")])
+
+
+def test_the_corners_of_a_half_car_take_them() -> None:
+    car = read_vehicle(vehicle_file("rav4-2009"))
+    known = known_vehicle(car, [effect("hysteresis"), effect("frame_friction")]).at(20.0, N_CPM, road(2.0))
+    assert np.isfinite(known.by_wheel(np.array([0.0, 1.0, 11.0]))).all()
+    assert replace(linear(1.0), wheel_friction_n=1.0).rubs
+
+
+@pytest.mark.parametrize(("functions", "arguments", "words"), [
+    ("def pull(p, seen):\n    return 3.0 / (p.size - 2)\n", "Between.BODY_AND_WHEEL, pull, p", ":7: ZeroDivisionError"),
+    ("def pull(p, seen):\n    return seen.weel_mps\n", "Between.BODY_AND_WHEEL, pull, p", ":7: AttributeError: 'Seen'"),
+    ("def pull(p, seen):\n    return np.log(-p.size)\n", "Between.BODY_AND_WHEEL, pull, p",
+     "expected force to answer with finite numbers"),
+    ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "can be compiled: Untyped"),
+    ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that knows its numbers by p alone"),
+    ("", "Between.BODY_AND_WHEEL, lambda p: 1.0, p", "expected force to be a function of (p, seen)"),
+    ("def pull(p, seen):\n    return 1.0\n", "'wheel', pull, p", "expected with_law to get one of Between.BODY_AND_WH"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, memory=(0.0,)",
+     "expected rates and memory both, or neither"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0, 0.0, 0.0)",
+     "a tuple of at most 2 finite numbers"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0,)",
+     "rates to answer with a tuple of 1, one number for each state, as in (rate,), found 1.0"),
+])
+def test_a_law_that_will_not_do_is_refused_with_its_file(tmp_path: Path, functions: str, arguments: str, words: str,
+                                                         ) -> None:
+    one = own(tmp_path, functions, arguments)
+    with pytest.raises(BadInput) as caught:
+        compose(RIG, [one])
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "mine.py"))
+
+
+def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
+    """Friction of a wheel on rails; and rubber that creeps, which at last lets everything go."""
+    page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
+    rails, creep = (text.split("```")[0] for text in page.split("```python\n")[2:4])
+    functions = rails.split("\n\nclass")[0] + creep.split("\n\n\n    def")[0] + "\n"
+    functions = functions.replace("p.friction_force_n", "p.size").replace("p.stiffness_n_per_m", "p.size")
+    functions = functions.replace("p.creep_s", "0.1")
+    rubbing, _ = stepped(own(tmp_path, functions, "Between.WHEEL_AND_GROUND, rubs, p", 30.0))
+    like, _ = stepped(effect("frame_friction", friction_force_n=30.0, transition_velocity_m_per_s=0.02))
+    assert np.sqrt(np.mean((rubbing - like)[:, 3] ** 2)) < 0.002 * np.sqrt(np.mean(like[:, 3] ** 2))
+    one = own(tmp_path, functions, "Between.BODY_AND_WHEEL, pulls, p, creeps, memory=(0.0,)", 5e4)
+    car = compose(RIG, [one])
+    raised = np.where(np.arange(8000) < 10, 0.0, 0.01)[:, None]
+    did = march(car.structure, car.laws, raised, (raised[1:] + raised[:-1]) / 2, 1e-3)
+    assert np.abs(did.forces[:1000]).max() > 50.0
+    assert did.forces[-1] == pytest.approx(0.0, abs=0.5)
+
+
+def test_which_a_search_tries_unasked() -> None:
+    model = Model(RIG, ())
+    assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
+    assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {"frame_friction"}
+    assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
+    with pytest.raises(BadInput, match="each effect once, found dry_friction again"):
+        known_effects(model, ["dry_friction"])
+    assert among(known_effects(model, [])[0], ["hysteresis", "dry_friction"]).keys() == {"dry_friction", "hysteresis"}
+    with pytest.raises(BadInput, match="no effect 'stiction'"):
+        among({}, ["stiction"])
