@@ -11,7 +11,10 @@ import numpy.typing as npt
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
+NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
+"""What a sample may be: none, a reading, or one that only says that there was at least as much."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
 _EVEN = 1e-3
@@ -59,6 +62,7 @@ class Run:
     track            the road
     skip_s           how much of the beginning is left out [s]
     facts            what is known of the record
+    usable           what each sample is (``NO_READING``, ``READING``, ``CLIPPED``); None: all are readings
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -71,6 +75,7 @@ class Run:
     track: Track
     skip_s: float = SKIP_S
     facts: RecordFacts = UNKNOWN
+    usable: Array | None = None
 
     def __post_init__(self) -> None:
         if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
@@ -97,6 +102,21 @@ class Run:
         return self.measured_mps2[self.first:]
 
     @property
+    def read(self) -> Bools:
+        """Of which samples (n,) something was read."""
+        return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
+
+    def left_by(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
+        """What a prediction (n,) leaves of what was measured, or of other readings (n,) in its place [m/s2]: nothing
+        where nothing was read, and of a clipped reading only what it falls short of it by."""
+        left = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - prediction
+        if self.usable is None:
+            return left
+        way = np.sign(self.measured_mps2)
+        short = way * (self.measured_mps2 - prediction) - 0.5 * (self.facts.step_mps2 or 0.0)  # it may be rounded up
+        return np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0), np.where(self.read, left, 0.0))
+
+    @property
     def two_tracks(self) -> bool:
         """Whether the road is known under the right wheels too."""
         return self.track.elevation_m.ndim == 2
@@ -104,10 +124,11 @@ class Run:
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
     """rms(measured - model) / rms(measured) over all samples that are not left out; predictions (n,) per run, whole.
+    A clipped reading counts as far as the model falls short of it.
 
     NaN where nothing but zeros was measured."""
-    return normalised_rms([run.kept_mps2 - one[run.first:] for run, one in zip(runs, predictions, strict=True)],
-                          [run.kept_mps2 for run in runs])
+    return normalised_rms([run.left_by(one)[run.first:] for run, one in zip(runs, predictions, strict=True)],
+                          [(run.measured_mps2 * run.read)[run.first:] for run in runs])
 
 
 def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.runs import RecordFacts
+from logger.runs import CLIPPED, NO_READING, READING, RecordFacts
 from logger.service.config import Config
 from logger.store.formats import drive_file
 from logger.store.formats.profile_file import Profile, read_places, read_profile
@@ -299,7 +299,7 @@ def _readings(recorded: Recorded, fixes: Fixes) -> tuple[Array, Array, Array]:
     present, clipped = readings.present[inside], readings.clipped[inside]
     accel = readings.accel_mps2[inside]
     whole = present & ~clipped
-    usable = np.where(present, np.where(clipped, drive_file.CLIPPED, drive_file.READING), drive_file.NO_READING)
+    usable = np.where(present, np.where(clipped, CLIPPED, READING), NO_READING)
     return readings.time_s[inside], accel - (accel[whole].mean() if whole.any() else 0.0), usable
 
 
@@ -325,7 +325,7 @@ def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: Measured
         places_by={None: None, True: "road", False: "receiver"}[by_road],
         vehicle=recorded.model.vehicle.name if by_road else None, source=source))
     metres = float(np.ptp(drive.distance_m))
-    gaps = int(np.count_nonzero(np.diff((drive.usable == drive_file.NO_READING).astype(int)) == 1))
+    gaps = int(np.count_nonzero(np.diff((drive.usable == NO_READING).astype(int)) == 1))
     return ExtractedRun(folder, len(drive.time_s) / RATE_HZ, metres, None if found is None else metres, place_std_m,
                         by_road, receiver.delay_s, receiver.std_s, gaps)
 

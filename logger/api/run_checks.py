@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from logger.errors import BadInput
 
 if TYPE_CHECKING:
-    from logger.runs import Run
+    from logger.runs import Array, Bools, Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.drive_file import Drive, DriveOnRoad
 
@@ -60,40 +60,72 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     """The parts of a drive in which the car moved and there were readings, each a run; of one that stood or had none
     nowhere the whole. A part says in its name which seconds it is of.
 
-    Raises BadInput where no part lasts ``LEAST_S``.
+    A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
+    well. One that lasts longer than that is cut out, and so are those at the ends of a part.
+
+    Raises BadInput where no part has readings for ``LEAST_S``.
     """
     import numpy as np
 
     from logger.lab.likelihood.lag import SLOWEST_MPS
-    from logger.runs import Run
-    from logger.store.formats.drive_file import NO_READING
+    from logger.runs import NO_READING, READING, SKIP_S, Run
 
-    usable = drive.speed_mps >= SLOWEST_MPS
-    if drive.usable is not None:
-        usable &= drive.usable != NO_READING
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(int), [0]])))
-    parts = [slice(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
-             if last - first >= LEAST_S * drive.rate_hz]
+    driven = drive.speed_mps >= SLOWEST_MPS
+    read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
+    kept = read.copy()
+    for gap in _stretches(driven & ~read):
+        between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
+        kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
+    parts = [part for part in _stretches(kept) if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
     if not parts:
         raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings at {SLOWEST_MPS:g} m/s or faster, without "
-                       "a break")
+                       f"a break of more than {SKIP_S:g} s")
+    said = None if drive.usable is None or (drive.usable == READING).all() else drive.usable
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track,
-                facts=drive.facts)
+                facts=drive.facts, usable=None if said is None or (said[part] == READING).all() else said[part])
             for part in parts]
 
 
+def _stretches(which: Bools) -> list[slice]:
+    """Where samples (n,) follow each other that are meant."""
+    import numpy as np
+
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], which.astype(int), [0]])))
+    return [slice(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)]
+
+
 def thinned_runs(runs: Sequence[Run]) -> list[Run]:
-    """Runs of one rate, of about 100 samples a second if they had many more."""
+    """Runs of one rate, of about 100 samples a second if they had many more. What is thinned is no longer rounded; a
+    sample is as usable as the least of those beside it."""
     from logger.dsp.thinning import thinned
 
     factor = int(runs[0].rate_hz / _RATE_HZ + _NEARLY)
     if factor < 2:
         return list(runs)
     return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=thinned(one.measured_mps2, factor),
-                    distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor]) for one in runs]
+                    distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor],
+                    facts=replace(one.facts, step_mps2=None), usable=_thinned_marks(one.usable, factor))
+            for one in runs]
+
+
+def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
+    """What every ``factor``-th sample is (n,), with those within reach of it: none where one has no reading, else
+    clipped where one is."""
+    import numpy as np
+
+    from logger.runs import CLIPPED, NO_READING, READING
+
+    if usable is None:
+        return None
+
+    def near(mark: float) -> Bools:
+        around = np.pad(np.asarray(usable == mark, bool), factor)
+        return np.asarray(np.lib.stride_tricks.sliding_window_view(around, 2 * factor + 1)[::factor].max(axis=1))
+
+    return np.where(near(NO_READING), NO_READING, np.where(near(CLIPPED), CLIPPED, READING))
 
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.extraction.along_track import Motion, Observations, motion_of, place_std_m
-from logger.lab.likelihood.lag import SLOWEST_MPS, lags
+from logger.lab.likelihood.lag import SLOWEST_MPS, lags, shift_m
 from logger.profiles.track import Track
 from logger.runs import Run
 
@@ -24,8 +24,7 @@ Array = npt.NDArray[np.float64]
 GPS_PLACE_M = 3.0
 """Of a receiver's positions; they are wrong in the same way for a minute or so."""
 _GPS_LASTS_S = 60.0
-_REACH_M, _GRID_M = 30.0, 0.1  # ten deviations of a receiver's place; a fifth of the shortest wave that is felt
-_LOUD_M = 20.0  # places are compared by their loudness over so much road
+_REACH_M = 30.0  # ten deviations of a receiver's place
 _ROUNDS = 4
 _AGREE_M, _FEWEST = 0.2, 4
 """So many windows or more were felt, and half of them lie so near to the motion: those of another road lie anywhere
@@ -71,11 +70,12 @@ def registered(speeds: Observations, places: Observations, time_s: Array, accel_
 def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track,
              predict: Predict) -> tuple[Motion, Observations] | None:
     """The motion on the road as it was felt, and where that was; None where the road was not recognised."""
-    shift_m = _shift_m(motion.distance_m(time_s), accel_mps2, track, predict)
-    if shift_m is None:
+    distance_m = motion.distance_m(time_s)
+    farther_m = shift_m(distance_m, accel_mps2, predict(distance_m), (track.start_m, track.end_m), _REACH_M)
+    if farther_m is None:
         return None
     state = motion.state.copy()
-    state[:, 0] += shift_m
+    state[:, 0] += farther_m
     motion = Motion(motion.time_s, state, motion.walk, motion.noise_mps)
     felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
     for _ in range(_ROUNDS):
@@ -85,30 +85,6 @@ def _by_road(motion: Motion, speeds: Observations, time_s: Array, accel_mps2: Ar
         felt = _felt(motion, time_s, accel_mps2, rate_hz, track, predict)
     off_m = np.interp(known.time_s, time_s, motion.distance_m(time_s)) - known.value
     return (motion, known) if np.median(np.abs(off_m)) < _AGREE_M else None
-
-
-def _shift_m(distance_m: Array, accel_mps2: Array, track: Track, predict: Predict) -> float | None:
-    """By how much the car was farther than these distances (n,) all the way, if it was on this road; None where it
-    hardly moved."""
-    from scipy.signal import correlate
-
-    grid_m = np.arange(distance_m[0], distance_m[-1], _GRID_M)
-    if len(grid_m) < 2:
-        return None
-    rising = distance_m + 1e-9 * np.arange(len(distance_m))
-    inside = ((grid_m >= track.start_m) & (grid_m <= track.end_m)).astype(float)
-    measured, predicted = (_evened(np.interp(grid_m, rising, one)) * inside
-                           for one in (accel_mps2, predict(distance_m)))
-    reach = min(round(_REACH_M / _GRID_M), len(grid_m) - 1)
-    alike = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
-    return (int(alike.argmax()) - reach) * _GRID_M
-
-
-def _evened(samples: Array) -> Array:
-    """Of places (n,), each as loud as the others: one pothole shall not decide."""
-    size = round(_LOUD_M / _GRID_M)
-    loud = np.sqrt(np.convolve(samples**2, np.full(size, 1 / size), "same"))[: len(samples)]
-    return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
 
 
 def _felt(motion: Motion, time_s: Array, accel_mps2: Array, rate_hz: float, track: Track, predict: Predict

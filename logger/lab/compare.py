@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.likelihood.distance_error import unusual_m
-from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import DISCREPANCY
@@ -97,7 +97,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     plain = Standing.of(ModelResiduals(runs.runs, car, runs.predict(car), runs.respond(car)))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_wall()
     names, deviations = posterior.prior.names, posterior.prior.deviations
-    state = fit(aligned(posterior, posterior.start(effects))).state
+    state = read_beside(fit(aligned(posterior, posterior.start(effects)))).state
     if posterior.error(state) > plain.error:
         # The fit weighs every frequency by its noise, and may buy a better top with a worse body bounce.
         return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), 0.0,

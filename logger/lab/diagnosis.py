@@ -16,8 +16,8 @@ import numpy as np
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_of
+from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_as_read, noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.unexplained import Shape, shape_of
@@ -72,6 +72,7 @@ class Diagnosis:
     catalogue            all effects that were asked for, by name
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
+    noise                of the sensors, their rounding in it
     candidates           those that are missing first, with the values that they end with; then the others of the first
                          round, the least probable by chance first
     obstacles            effects that could not be tried, and why
@@ -141,9 +142,9 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers)
     selection = search.run(before)
     progress("fitting it finely")
-    selection, after = _finely_fitted(posterior, search, selection)
+    selection, after = _finely_fitted(search, selection)
     fine, state = after.posterior, after.state
-    noise = noise_of(fine, state)
+    noise, read = noise_of(fine, state), noise_as_read(fine, state)
     progress("how certain the numbers are")
     with_errors, _ = standard_errors(after)
     progress("what these runs could not show")
@@ -151,8 +152,8 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
-        baseline_error=fine.error(fine.start(present)), final_error=fine.error(state), noise=noise,
-        noise_floor_error=floor_error(fine, noise), candidates=_candidates(selection, state, len(tried)),
+        baseline_error=fine.error(fine.start(present)), final_error=fine.error(state),
+        noise=read, noise_floor_error=floor_error(fine, read), candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles, verdict=tuple(selection.gains), excess=above, conflicts=_conflicts(fine, state),
         steps=_steps(selection, posterior.error(nominal)), effects=with_errors, undetectable=hidden,
         shape=shape_of(fine, state) if above > UNEXPLAINED else None,
@@ -162,7 +163,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 def refitted(posterior: Posterior, nominal: State) -> Baseline:
     """The car's own numbers and the distance errors fitted."""
-    return Baseline.of(fit(aligned(posterior, nominal)))
+    return Baseline.of(read_beside(fit(aligned(posterior, nominal))))
 
 
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
@@ -177,14 +178,14 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
     return found
 
 
-def _finely_fitted(posterior: Posterior, search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
+def _finely_fitted(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, finely simulated, in a car that may bend as far as the runs ask: so that it shows when
     it has to bend too far. What is nothing then, or something else, is left out."""
-    fine = posterior.without_wall(fine=True)
+    fine = selection.before.posterior.without_wall(fine=True)
     while True:
         state = selection.now.state
         start = fine.at(state.effects, state.logs, state.record, state.size)
-        after = fit(aligned(fine, start), selection.now.linear.numbers)
+        after = read_beside(fit(aligned(fine, start), selection.now.linear.numbers))
         ended = [one.effect.name for one in after.state.effects[search.present:] if one.at_an_end]
         if not ended:
             return selection, after

@@ -5,7 +5,9 @@ centimetres a second, now more and now less. Solution: the error begins with a s
 random in between, as a smooth curve (a spline whose coefficients are a random walk: P. Eilers and B. Marx, Statistical
 Science 11, 1996); what of the distance is rougher than any car drives is the recorder's as well. How large each of the
 first three is, the evidence of the runs says: the likelihood with the error integrated out (D. J. C. MacKay, Neural
-Computation 4, 1992), under a prior around what a good recorder does.
+Computation 4, 1992), under a prior around what a good recorder does. A run that says how far off its places may be
+begins, and walks, as many times farther off; and where places are those of a receiver, what this is late by moves all
+of a run by a time.
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ _KNOT_S, _MOST_KNOTS = 1 / 3, 360
 """Knots lie so far apart; a run that would have more has them farther apart. Measured: with half a second, a speed that
 is wrong by 0.1 m/s now more and now less leaves a tenth more than the noise."""
 _UNUSUAL = 3.0  # standard deviations
+_RECEIVER_LASTS_S = 60.0
+"""A receiver's places are wrong in the same way for about so long (``extraction.registration``)."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,15 @@ class ErrorSize:
 
 USUAL = ErrorSize()
 """Of a good recorder."""
+
+
+def usual_of(run: Run) -> ErrorSize:
+    """Of a run's recorder: a good one's, or more if the run says that its places are off by more. What is wrong by the
+    same for a time T walks by the root of 2 / T of its deviation in a second (a first-order Gauss-Markov process)."""
+    off_m = run.facts.place_std_m or 0.0
+    return ErrorSize(max(USUAL.start_m, off_m), max(USUAL.walk_m, off_m * float(np.sqrt(2 / _RECEIVER_LASTS_S))))
+
+
 # Priors of the logarithms of the three sizes. A walk of centimetres is common; a start or a factor that is ten times
 # as far off as usual is a late clock or a wrong wheel radius, which are effects.
 _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
@@ -74,17 +87,20 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 
 @dataclass(frozen=True, eq=False)
 class RecordError:
-    """How the record of one run may be off, by numbers k: those of its distance (coefficients of the curve, the factor,
-    the share of its roughness), then two of its recorder (gain, droop).
+    """How the record of one run may be off, by numbers k: those of its distance (coefficients of the curve, what its
+    receiver is late by if its places are a receiver's, the factor, the share of its roughness), then two of its
+    recorder (gain, droop).
 
     basis     (k - 2, n) of the distance [m]
     knot_s    between the knots of the curve
+    late_s    deviation of what the receiver is late by; None: places are not a receiver's
     """
 
     run: Run
     basis: Array
     tolerance: Tolerance
     knot_s: float
+    late_s: float | None = None
 
     @staticmethod
     def of(run: Run, tolerance: Tolerance) -> RecordError:
@@ -95,8 +111,10 @@ class RecordError:
         pieces = min(max(1, round(lasts_s / _KNOT_S)), _MOST_KNOTS)
         curves = BSpline.design_matrix(np.linspace(0, pieces, run.count), np.arange(-cubic, pieces + cubic + 1.0),
                                        cubic).toarray()
-        return RecordError(run, np.vstack([curves.T, run.distance_m - run.distance_m[0], -_roughness(run)]), tolerance,
-                           lasts_s / pieces)
+        late_s = run.facts.delay_std_s or None if run.facts.places_by == "receiver" else None
+        late = [run.speed_mps] if late_s else []
+        basis = np.vstack([curves.T, *late, run.distance_m - run.distance_m[0], -_roughness(run)])
+        return RecordError(run, basis, tolerance, lasts_s / pieces, late_s)
 
     @property
     def count(self) -> int:
@@ -106,14 +124,22 @@ class RecordError:
     @property
     def coefficients(self) -> int:
         """How many of them, the first ones, are of the curve."""
-        return len(self.basis) - 2
+        return len(self.basis) - (2 if self.late_s is None else 3)
 
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
         walk, start = self._precisions
-        found = walk / (size.walk_m**2 * self.knot_s) + start / size.start_m**2
+        start_m, walk_m = self._own(size)
+        found = walk / (walk_m**2 * self.knot_s) + start / start_m**2
         np.einsum("ii->i", found)[-4:] += size.scale**-2, 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
+        if self.late_s is not None:
+            found[self.coefficients, self.coefficients] += self.late_s**-2
         return found
+
+    def _own(self, size: ErrorSize) -> tuple[float, float]:
+        """Start and walk [m] of this run, if those of a good recorder were of a size."""
+        usual = usual_of(self.run)
+        return size.start_m * (usual.start_m / USUAL.start_m), size.walk_m * (usual.walk_m / USUAL.walk_m)
 
     @cached_property
     def _precisions(self) -> tuple[Array, Array]:
@@ -127,8 +153,10 @@ class RecordError:
 
     def log_determinant(self, size: ErrorSize) -> float:
         """Of the precision."""
-        walk = -(self.coefficients - 1) * np.log(size.walk_m**2 * self.knot_s)
-        return float(walk - 2 * np.log([size.start_m, size.scale, self.tolerance.gain, self.tolerance.droop]).sum())
+        start_m, walk_m = self._own(size)
+        walk = -(self.coefficients - 1) * np.log(walk_m**2 * self.knot_s)
+        others = [start_m, size.scale, self.tolerance.gain, self.tolerance.droop, self.late_s or 1.0]
+        return float(walk - 2 * np.log(others).sum())
 
     def moved_m(self, k: Array) -> Array:
         """By how much the car was farther than its distance signal said (n,)."""
@@ -142,11 +170,13 @@ class RecordError:
         return csr_array(self.basis.T)
 
     def without_trend(self, k: Array) -> Array:
-        """The same error (k,) with its start and its factor taken out, as a straight line along the way."""
+        """The same error (k,) with its start and its factor taken out, as a straight line along the way; what its
+        receiver is late by is of the curve then."""
         moved, way = self.moved_m(k), self.run.distance_m - self.run.distance_m[0]
         trend = np.polyval(np.polyfit(way, moved, 1), way) if np.ptp(way) > 0 else moved.mean()
         found = self.through(moved - trend)
-        found[self.coefficients + 1 :] = k[self.coefficients + 1 :]
+        roughness = len(self.basis) - 1
+        found[roughness:] = k[roughness:]
         return found
 
     def through(self, moved_m: Array) -> Array:
@@ -171,13 +201,14 @@ class RecordError:
 
 
 def unusual_m(errors: Sequence[RecordError], record: Sequence[Array]) -> float:
-    """By how much a distance is off at most (numbers (k,) per run), if that is more than a good recorder's is; else 0
-    [m]."""
+    """By how much a distance is off at most (numbers (k,) per run), if that is more than a good recorder's is, or than
+    the run says; else 0 [m]."""
     found = 0.0
     for one, k in zip(errors, record, strict=True):
-        run = one.run
-        usual_m = np.sqrt(USUAL.start_m**2 + USUAL.walk_m**2 * run.count / run.rate_hz
-                          + (USUAL.scale * np.ptp(run.distance_m)) ** 2)
+        run, usual = one.run, usual_of(one.run)
+        usual_m = np.sqrt(usual.start_m**2 + usual.walk_m**2 * run.count / run.rate_hz
+                          + (usual.scale * np.ptp(run.distance_m)) ** 2
+                          + ((one.late_s or 0.0) * run.speed_mps.max()) ** 2)
         off_m = float(np.abs(one.moved_m(k)).max())
         found = max(found, off_m if off_m > _UNUSUAL * usual_m else 0.0)
     return found

@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
 _LEAST_WINDOWS = 5
+_GRID_M = 0.1  # a fifth of the shortest wave that is felt
+_LOUD_M = 20.0  # places are compared by their loudness over so much road
 SLOWEST_MPS = 0.5
 """A car that is slower stands: a length over its speed says nothing."""
 
@@ -72,6 +74,30 @@ def followed_m(run: Run, prediction: Array) -> Array:
         return np.zeros(run.count)
     places_m = np.maximum.accumulate(windows.along_m)
     return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))
+
+
+def shift_m(distance_m: Array, measured_mps2: Array, prediction: Array, road_m: tuple[float, float],
+            reach_m: float) -> float | None:
+    """By how much the car was farther than these distances (n,) all the way, up to ``reach_m`` either way, if it was on
+    this road, known from ``road_m`` on and up to there; None where it hardly moved [m]."""
+    from scipy.signal import correlate
+
+    grid_m = np.arange(distance_m[0], distance_m[-1], _GRID_M)
+    if len(grid_m) < 2:
+        return None
+    rising = distance_m + 1e-9 * np.arange(len(distance_m))
+    inside = ((grid_m >= road_m[0]) & (grid_m <= road_m[1])).astype(float)
+    measured, predicted = (_evened(np.interp(grid_m, rising, one)) * inside for one in (measured_mps2, prediction))
+    reach = min(round(reach_m / _GRID_M), len(grid_m) - 1)
+    alike = correlate(predicted, measured, "full", "fft")[len(grid_m) - 1 - reach : len(grid_m) + reach]
+    return (int(alike.argmax()) - reach) * _GRID_M
+
+
+def _evened(samples: Array) -> Array:
+    """Of places (n,), each as loud as the others: one pothole shall not decide."""
+    size = round(_LOUD_M / _GRID_M)
+    loud = np.sqrt(np.convolve(samples**2, np.full(size, 1 / size), "same"))[: len(samples)]
+    return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
 
 
 def drift(windows: Lags) -> Trend:

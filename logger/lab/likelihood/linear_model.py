@@ -69,11 +69,13 @@ class LinearModel:
     def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
         self.posterior, self.prior = posterior, posterior.prior
         residuals = posterior.residuals(state)
+        self._predictions = state.predictions
         self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
         self._records = []
-        for error, whitener, prediction, residual, here in zip(
-                posterior.record_errors, self.whiteners, state.predictions, residuals, state.record, strict=True):
-            white = whitener(error.slopes(prediction))
+        for error, whitener, readings, prediction, residual, here in zip(
+                posterior.record_errors, self.whiteners, posterior.readings, state.predictions, residuals, state.record,
+                strict=True):
+            white = whitener(readings.without_deaf(error.slopes(prediction), prediction))
             self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
         self.size = self._likeliest_size(state.size)
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
@@ -145,18 +147,23 @@ class LinearModel:
                 for root, one, columns in zip(self._roots, self._records, white, strict=True)]
 
     def whitened(self, columns: Sequence[Array]) -> list[Array]:
-        """Of each run, (n,) or (m, n) to (..., kept)."""
-        return [whitener(one) for whitener, one in zip(self.whiteners, columns, strict=True)]
+        """Slopes in each run, (n,) or (m, n) to (..., kept)."""
+        return [whitener(one) for whitener, one in zip(self.whiteners, self.without_deaf(columns), strict=True)]
+
+    def without_deaf(self, columns: Sequence[Array]) -> list[Array]:
+        """Slopes in each run, (n,) or (m, n), zero where its readings would not change."""
+        return [readings.without_deaf(one, prediction) for readings, one, prediction in zip(
+            self.posterior.readings, columns, self._predictions, strict=True)]
 
     def eliminated(self, predictions: Sequence[Array], laid: Sequence[Array] | None = None) -> Eliminated:
         """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
         from scipy.linalg import cho_solve
 
         residuals, record, squares = [], [], 0.0
-        for measured, prediction, whitener, root, precision, one, here in zip(
-                self.posterior.measured, predictions, self.whiteners, self._roots, self._precisions, self._records,
+        for left, whitener, root, precision, one, here in zip(
+                self.posterior.left_by(predictions), self.whiteners, self._roots, self._precisions, self._records,
                 self.state.record if laid is None else laid, strict=True):
-            white = whitener(measured - prediction)
+            white = whitener(left)
             owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)
             residuals.append(white - step @ one.white)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.fitting.levenberg_marquardt import minimise
-from logger.lab.likelihood.lag import followed_m
+from logger.lab.likelihood.lag import followed_m, shift_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.effect import Chosen
@@ -31,6 +31,9 @@ _STEPS = 5
 """Of Levenberg and Marquardt's, before slopes are taken anew."""
 _WORTH_ALIGNING = 0.02
 """Of an alignment in the course of a fit, a round that gains a smaller share of what is gained is the last."""
+_FAR_M, _REACH_SIGMA = 0.1, 4.0
+"""Places that may be farther off than a fifth of the shortest wave that is felt are looked for within so many standard
+deviations."""
 _NEAR_M = 0.02
 """A model that lies no farther off than this, a quarter of the shortest wave at walking pace, is aligned to the same
 places."""
@@ -86,6 +89,12 @@ def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int 
     return best
 
 
+def read_beside(found: LinearModel) -> LinearModel:
+    """A fitted model with rounded readings that say what they do beside it, fitted to these; itself where none do."""
+    posterior = found.posterior.beside(found.state)
+    return found if posterior is found.posterior else fit(LinearModel(posterior, found.state), found.numbers)
+
+
 def laid_out(posterior: Posterior, state: State, numbers: Sequence[Array] | None, least: float) -> LinearModel:
     """A state that was fitted to first order, laid out where its distances are; aligned anew where that is not as good
     as the least score so far, because they are far from where they were."""
@@ -95,18 +104,39 @@ def laid_out(posterior: Posterior, state: State, numbers: Sequence[Array] | None
 
 def aligned(posterior: Posterior, state: State, worth: float = 0.0) -> LinearModel:
     """A state with the distance errors alone fitted: from where it has them, or where the runs are followed along the
-    road, from there or from where they lie after that, whichever is likeliest."""
+    road, from there or from where they lie after that, whichever is likeliest. Runs whose places may be far off are
+    tried where all of each is most like the model as well."""
     best = _aligned_from(LinearModel(posterior, state), worth)
-    found = _followed(posterior, state, worth)
-    if found is None:
+    begins = [one for one in (_followed(posterior, state, worth), _shifted(posterior, state, worth)) if one is not None]
+    if not begins:
         return best
-    best = min(best, found, key=lambda one: one.score)
+    best = min(best, *begins, key=lambda one: one.score)
     for _ in range(2):
         found = _followed(posterior, best.state, worth)
         if found is None or found.score > best.score - CONVERGED:
             break
         best = found
     return best
+
+
+def _shifted(posterior: Posterior, state: State, worth: float) -> LinearModel | None:
+    """A state with the runs that say that they may be far off laid where they are most like the model, followed along
+    the road from there, and aligned; None where they lie there already."""
+    record, moves = [], False
+    for run, error, k, prediction in zip(posterior.runs.runs, posterior.record_errors, state.record, state.predictions,
+                                         strict=True):
+        off_m = run.facts.place_std_m or 0.0
+        if off_m > _FAR_M:
+            moved_m = error.moved_m(k)
+            farther_m = shift_m(run.distance_m + moved_m, run.measured_mps2, prediction,
+                                (run.track.start_m, run.track.end_m), _REACH_SIGMA * off_m)
+            if farther_m:
+                k, moves = error.through(moved_m + farther_m), True
+        record.append(k)
+    if not moves:
+        return None
+    there = posterior.at(state.effects, state.logs, record, state.size)
+    return _followed(posterior, there, worth) or _aligned_from(LinearModel(posterior, there), worth)
 
 
 def _followed(posterior: Posterior, state: State, worth: float) -> LinearModel | None:

@@ -41,8 +41,15 @@ class Noise:
 
 
 def noise_of(posterior: Posterior, state: State) -> Noise:
-    """The sensor's noise under the residuals of a fitted state."""
-    return sensor_noise(posterior.bands, posterior.residuals(state), DISCREPANCY * posterior.size_mps2)
+    """The sensor's noise under the residuals of a fitted state; without its rounding where the readings' bounds are
+    taken for what they say."""
+    residuals = [one.noise_in(left) for one, left in zip(posterior.readings, posterior.residuals(state), strict=True)]
+    return sensor_noise(posterior.bands, residuals, DISCREPANCY * posterior.size_mps2)
+
+
+def noise_as_read(posterior: Posterior, state: State) -> Noise:
+    """The same of readings as they were read: rounding adds a twelfth of the step's square to what the noise has."""
+    return noise_of(posterior.as_read(), state)
 
 
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
@@ -81,8 +88,9 @@ def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
     """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
     least 0. Bands that are quiet make up for those that are not."""
     noise = ((1 + UNEXPLAINED) * noise_of(posterior, state).deviation_mps2) ** 2
-    return max(0.0, sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise, one.floor)))
-                        for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True)))
+    return max(0.0, sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise / read.share, one.floor)))
+                        for one, read, residual in zip(posterior.bands, posterior.readings, posterior.residuals(state),
+                                                       strict=True)))
 
 
 def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> float:
@@ -92,9 +100,9 @@ def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> f
     from scipy.special import gammainccinv
 
     found = []
-    for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True):
+    for one, read, residual in zip(posterior.bands, posterior.readings, posterior.residuals(state), strict=True):
         freedom = float(one.freedom.sum())
-        expected = one.freedom @ (noise.deviation_mps2**2 + one.floor)
+        expected = one.freedom @ (noise.deviation_mps2**2 / read.share + one.floor)
         above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
         by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / len(posterior.bands)) / (freedom / 2))) - 1
         found.append(above if above > by_chance else min(above, UNEXPLAINED))

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
+from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.whittle import Bands, deviance
 from logger.runs import normalised_rms_error
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -50,19 +51,21 @@ class Posterior:
 
     stands    the vehicle as it stands, where fits begin, if that is another than the nominal one
     prior     of the vehicle's numbers; None: that of the tolerance
+    readings  what predictions are compared with, per run; None: the readings as they were read
 
     size_mps2 is the r.m.s. of what was measured, by which errors are divided.
     """
 
     def __init__(self, runs: SimulatedRuns, vehicle: Vehicle, tolerance: Tolerance, stands: Vehicle | None = None,
-                 prior: VehiclePrior | None = None) -> None:
+                 prior: VehiclePrior | None = None, readings: Sequence[Readings] | None = None) -> None:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.stands = stands or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)
         self.record_errors = [RecordError.of(run, tolerance) for run in runs.runs]
         self.bands = [Bands(run) for run in runs.runs]
-        self.measured = [run.measured_mps2 for run in runs.runs]
-        counted = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
+        self.readings = list(map(Readings.of, runs.runs)) if readings is None else list(readings)
+        self.measured = [one.mps2 for one in self.readings]
+        counted = np.concatenate([run.kept_mps2[run.read[run.first:]] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
 
@@ -70,7 +73,20 @@ class Posterior:
         """The same with a car that may bend as far as the runs ask; simulated as finely as what is reported is, or as
         now."""
         runs = SimulatedRuns(self.runs.runs) if fine else self.runs
-        return Posterior(runs, self.vehicle, self.tolerance, self.stands, self.prior.without_wall())
+        return Posterior(runs, self.vehicle, self.tolerance, self.stands, self.prior.without_wall(), self.readings)
+
+    def beside(self, state: State) -> Posterior:
+        """The same with rounded readings that say what they do beside this state; itself where none do."""
+        readings = [one.beside(prediction) for one, prediction in zip(self.readings, state.predictions, strict=True)]
+        if all(one.as_read for one in (*readings, *self.readings)):
+            return self
+        return Posterior(self.runs, self.vehicle, self.tolerance, self.stands, self.prior, readings)
+
+    def as_read(self) -> Posterior:
+        """The same with rounding taken as noise."""
+        if all(one.as_read for one in self.readings):
+            return self
+        return Posterior(self.runs, self.vehicle, self.tolerance, self.stands, self.prior)
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
@@ -113,7 +129,11 @@ class Posterior:
 
     def residuals(self, state: State) -> list[Array]:
         """Measured minus predicted (n,), per run."""
-        return [y - one for y, one in zip(self.measured, state.predictions, strict=True)]
+        return self.left_by(state.predictions)
+
+    def left_by(self, predictions: Sequence[Array]) -> list[Array]:
+        """What predictions (n,) per run leave of the readings."""
+        return [one.left_by(prediction) for one, prediction in zip(self.readings, predictions, strict=True)]
 
     def deviance(self, state: State) -> float:
         """Minus twice the log-likelihood, its levels the most likely ones."""
@@ -131,7 +151,7 @@ class Posterior:
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
         """What the car's numbers do to the predictions: (p, n) per run, by differences over steps (p,). They are known
         well enough by a rough simulation."""
-        found = [np.empty((len(steps), len(one))) for one in self.measured]
+        found = [np.empty((len(steps), run.count)) for run in self.runs.runs]
         moved = self.moved_m(state.record)
         here = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
         for index, step in enumerate(steps):

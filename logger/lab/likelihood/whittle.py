@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.runs import Run
+from logger.runs import READING, Run
 
 Array = npt.NDArray[np.float64]
 
@@ -58,8 +58,10 @@ class Bands:
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
-        self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept
-        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2), 1e-12)
+        # What was not read, or clipped, leaves zeros.
+        self._share = 1.0 if run.usable is None else max(float(np.mean(run.usable[run.first:] == READING)), 1 / kept)
+        self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept * self._share
+        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2 * run.read), 1e-12)
 
     def power(self, residual: Array) -> Array:
         """Mean power (b,) of a residual (n,), whole, as if it were white [m2/s4]."""
@@ -78,7 +80,7 @@ class Bands:
 
     def quiet(self, residual: Array) -> tuple[float, float]:
         """Mean power of a residual where nothing but the sensor's noise is, as if it were white, and its freedom."""
-        freedom = 2 * len(self._quiet) / self._size * (self.count - self.first)
+        freedom = 2 * len(self._quiet) / self._size * (self.count - self.first) * self._share
         return float(self._spectrum(residual)[self._quiet].mean()), freedom
 
     def whitener(self, residual: Array) -> Whitener:
@@ -88,7 +90,8 @@ class Bands:
     def _spectrum(self, residual: Array) -> Array:
         """Mean power per frequency, scaled so that white noise has its variance at each."""
         blocks = np.lib.stride_tricks.sliding_window_view(residual[self.first:], self._size)[self._starts]
-        return np.asarray((np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2).mean(axis=0) / self._size)
+        power = (np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2).mean(axis=0)
+        return np.asarray(power / (self._size * self._share))
 
 
 class Whitener:

@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit
-from logger.lab.likelihood.noise_floor import floor_error, noise_of
+from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.noise_floor import floor_error, noise_as_read
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
@@ -124,7 +124,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    before = fit(aligned(posterior, posterior.start(present)))
+    before = read_beside(fit(aligned(posterior, posterior.start(present))))
+    posterior = before.posterior
     after = _with(posterior, before, (*before.state.effects, *added), (*present, *added))
     loose = posterior.without_wall()
     (bent, spread_before), (freed, spread_after) = (_freed(loose, one) for one in (before, after))
@@ -142,7 +143,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         vehicle, effects, tuple(one.effect.name for one in added), numbers,
         error_before=posterior.error(posterior.start(present)), error_refitted=posterior.error(before.state),
         error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
-        noise_floor_error=floor_error(posterior, noise_of(posterior, state)),
+        noise_floor_error=floor_error(posterior, noise_as_read(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
         distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after))
 

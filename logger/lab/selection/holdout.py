@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.readings import as_read_error
 from logger.lab.likelihood.whittle import deviance
-from logger.runs import Run, normalised_rms
+from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
@@ -47,6 +48,7 @@ def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut
     columns = linear.numbers or [np.empty((0, len(one))) for one in residuals]
     if own is not None:
         columns = [np.vstack([first, more]) for first, more in zip(columns, own, strict=True)]
+    columns = linear.without_deaf(columns)
     white, ones = ([whitener.in_time(one) for whitener, one in zip(linear.whiteners, some, strict=True)]
                    for some in (columns, residuals))
     sets = [folds(run) for run in posterior.runs.runs]
@@ -64,9 +66,7 @@ def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
             held = which == fold
             kept[run.first:][held] = (residual - step @ part)[run.first:][held]
-    counted = [one[run.first:] for run, one in zip(posterior.runs.runs, unseen, strict=True)]
-    return HoldOut(normalised_rms(counted, [run.kept_mps2 for run in posterior.runs.runs]),
-                   deviance(posterior.bands, unseen))
+    return HoldOut(as_read_error(posterior.readings, unseen), deviance(posterior.bands, unseen))
 
 
 def _solved(information: Array, gradient: Array) -> Array:

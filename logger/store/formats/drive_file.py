@@ -17,7 +17,7 @@ import numpy.typing as npt
 from logger.errors import BadInput
 from logger.files import naming, read_bounded
 from logger.profiles.track import Track
-from logger.runs import UNKNOWN, RecordFacts
+from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
 from logger.store.formats.csv_table import parse_columns
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import Profile, read_profile
@@ -31,8 +31,6 @@ SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
 USABLE = "usable"
-NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
-"""What stands in the column ``usable``."""
 MAX_SPEED_MPS = 150.0
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
 _LINES_AT_ONCE = 50_000
