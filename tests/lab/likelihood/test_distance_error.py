@@ -8,11 +8,18 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError, rate_of_change, unusual_m
+from logger.lab.likelihood.distance_error import (
+    USUAL,
+    ErrorSize,
+    RecordError,
+    rate_of_change,
+    unusual_m,
+    usual_of,
+)
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
-from logger.runs import Run
+from logger.runs import RecordFacts, Run
 from logger.vehicle.effect import Chosen, chosen
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, off_m, posterior_of, tire_damping, with_wrong_speed, worst_rms
@@ -226,3 +233,63 @@ def test_distances_that_are_coarse_from_sample_to_sample_are_smoothed() -> None:
     (posterior, state), (undisturbed, still) = laid(coarse), laid(true)
     assert posterior.error(posterior.start()) > 1.3 * posterior.error(state)
     assert posterior.error(state) < 1.1 * undisturbed.error(still)
+
+
+# --- runs that say how far off their places may be ---
+
+
+RECEIVER = RecordFacts(place_std_m=1.2, places_by="receiver", delay_std_s=0.1)
+_FORGETS_S = 60.0
+
+
+def by_receiver(run: Run, seed: int, late_s: float = 0.0) -> Run:
+    """The run with a receiver's places: wrong by 1.2 m, slowly now by more and now by less, and late."""
+    rng = np.random.default_rng(seed)
+    seconds = np.arange(int(run.count / run.rate_hz) + 3)
+    apart = np.abs(seconds[:, None] - seconds)
+    covariance = 1.2**2 * np.exp(-apart / _FORGETS_S) + 1e-9 * np.eye(len(seconds))
+    wrong_m = np.linalg.cholesky(covariance) @ rng.normal(0, 1, len(seconds))
+    smooth_m = np.convolve(np.pad(wrong_m, 3, mode="edge"), np.hanning(9)[1:-1] / 4, "valid")
+    off_m = np.interp(run.time_s, seconds, smooth_m) + late_s * run.speed_mps
+    return replace(run, distance_m=np.maximum.accumulate(run.distance_m + off_m), facts=RECEIVER)
+
+
+@pytest.mark.parametrize("facts", [RecordFacts(), RecordFacts(place_std_m=0.0), RecordFacts(place_std_m=0.003)])
+def test_a_run_that_says_nothing_or_little_has_a_good_recorder(facts: RecordFacts) -> None:
+    assert usual_of(replace(RUN, facts=facts)) == USUAL
+
+
+def test_a_receiver_is_off_by_what_it_says_at_the_start_and_by_as_much_a_minute_later() -> None:
+    error = RecordError.of(replace(RUN, facts=RECEIVER), Tolerance())
+    k = np.linalg.solve(np.linalg.cholesky(error.precision(USUAL)).T, np.random.default_rng(1).normal(
+        0, 1, (error.count, 4000)))
+    moved = error.basis.T @ k[:-2]
+    late_m = 0.1 * RUN.speed_mps
+    assert moved[0].std() == pytest.approx(np.hypot(1.2, late_m[0]), rel=0.05)
+    walked = moved[-1] - moved[0] - (late_m[-1] - late_m[0]) / 0.1 * k[error.coefficients]
+    # A process that forgets itself in a minute: its structure function begins as 2 t / 60 of its variance.
+    assert walked.std() == pytest.approx(1.2 * np.sqrt(2 * 20.0 / _FORGETS_S), rel=0.08)
+
+
+@pytest.mark.parametrize("size", [USUAL, ErrorSize(0.05, 0.001, 0.01)])
+def test_the_determinant_of_a_receiver_is_that_of_its_precision(size: ErrorSize) -> None:
+    error = RecordError.of(replace(RUN, facts=RECEIVER), Tolerance())
+    assert np.linalg.slogdet(error.precision(size))[1] == pytest.approx(error.log_determinant(size), abs=1e-6)
+
+
+def test_what_a_receiver_may_be_off_by_is_not_unusual() -> None:
+    error = RecordError.of(replace(RUN, facts=RECEIVER), Tolerance())
+    k = error.through(np.full(RUN.count, 2.0))
+    assert unusual_m([error], [k]) == 0.0 < unusual_m([ERROR], [ERROR.through(np.full(RUN.count, 2.0))])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_runs_are_found_metres_off_and_nothing_is_made_of_it(seed: int) -> None:
+    truth = noisy_runs(lasts_s=20.0)
+    runs = [by_receiver(run, 10 * seed + number, 0.06) for number, run in enumerate(truth)]
+    posterior, state = laid(runs)
+    left = [one - moved for one, moved in zip(off_m(runs, truth), posterior.moved_m(state.record), strict=True)]
+    assert worst_rms(left, truth) < 0.05
+    for one in (chosen(TIME_OFFSET, TIME_OFFSET.usual), chosen(SPEED_SCALE, SPEED_SCALE.usual)):
+        assert gain_of(runs, one)[0] < 10.0

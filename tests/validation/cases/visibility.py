@@ -32,14 +32,22 @@ _NUMBER, _LENGTH = NUMBERS_OFF / np.sqrt(3), np.sqrt(np.mean(np.square(LENGTHS_O
 _START_M, _SCALE = 0.02, 0.001
 
 
-def remainders(case: Case) -> list[float]:
-    """Of each hidden effect: r.m.s. of what neither the car's numbers nor the distance can do, over the noise."""
+def deviations(case: Case, start_m: float) -> list[float]:
+    """Of each hidden effect: by how many standard deviations of the noise it stands out in all that was recorded, over
+    what the car's numbers and distances can do whose starts may be so far off."""
+    count = sum(max(0, len(one.t_s) - int(SKIPPED_S * RATE_HZ)) for one in case.recordings)
+    return [one * float(np.sqrt(count)) for one in remainders(case, start_m)]
+
+
+def remainders(case: Case, start_m: float = _START_M) -> list[float]:
+    """Of each hidden effect: r.m.s. of what neither the car's numbers nor the distance can do, over the noise; starts
+    may be so far off."""
     full = _joined(measured(case.scene, 2 * STEP_S))
     bare = replace(case.scene, physics=Physics(), sensor=Sensor(), speed_scale=1.0, profile_blur_m=0.0)
-    return [_remainder(case, full, without(bare, case.hidden, which)) for which in range(len(case.hidden))]
+    return [_remainder(case, full, without(bare, case.hidden, which), start_m) for which in range(len(case.hidden))]
 
 
-def _remainder(case: Case, full: Array, rest: Scene) -> float:
+def _remainder(case: Case, full: Array, rest: Scene, start_m: float) -> float:
     bare = measured(rest, 2 * STEP_S)
     change = full - _joined(bare)
     columns, deviations = [], []
@@ -49,7 +57,7 @@ def _remainder(case: Case, full: Array, rest: Scene) -> float:
     for number, (drive, one) in enumerate(zip(rest.drives, bare, strict=True)):
         per_metre = np.gradient(one, 1 / RATE_HZ) / drive.speed_at_mps(drive.times_s)
         way = drive.speed_mps * drive.times_s
-        for column, deviation in ((per_metre, _START_M), (per_metre * way, _SCALE)):
+        for column, deviation in ((per_metre, start_m), (per_metre * way, _SCALE)):
             columns.append(_joined(tuple(column if i == number else np.zeros_like(b) for i, b in enumerate(bare))))
             deviations.append(deviation)
     # Columns in units of their deviations over the noise: the prior is then a row of ones.

@@ -68,7 +68,7 @@ def examined(made: Case, in_process: bool) -> Record:
             said, record["diagnosing"] = asked(
                 ["diagnose", "--json", "--vehicle", str(folder / "vehicle.yaml"), *runs], in_process)
             record["said"] = kept_of(said)
-            record["added"] = _added(folder, runs, said, in_process)
+            record["added"] = added(folder, runs, said, in_process)
         except NoAnswer as error:
             record["failed"] = str(error)
     return record
@@ -90,7 +90,7 @@ def kept_of(said: Record) -> Record:
         "candidates": candidates}
 
 
-def _added(folder: Path, runs: Sequence[str], said: Record, in_process: bool) -> Record | None:
+def added(folder: Path, runs: Sequence[str], said: Record, in_process: bool) -> Record | None:
     """The vehicle after the effects of a verdict were added one after the other, from the values that were found."""
     before, after = folder / "vehicle.yaml", None
     seconds = 0.0

@@ -1,0 +1,68 @@
+"""Drives cut into runs: short gaps stay in, long ones and standing are cut out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.api.run_checks import driven_stretches, thinned_runs
+from logger.errors import BadInput
+from logger.runs import CLIPPED, NO_READING, READING, SKIP_S
+from logger.store.formats.drive_file import DriveOnRoad
+
+from ..support.lab.runs_with_residual import a_run
+
+
+def drive(marks: dict[tuple[float, float], float], lasts_s: float = 30.0, stands_s: tuple[float, float] = (0, 0)
+          ) -> DriveOnRoad:
+    """A drive with marks from a second to another."""
+    run = a_run("run", 10.0, lasts_s, 1)
+    usable = np.full(run.count, READING)
+    for (first_s, last_s), mark in marks.items():
+        usable[round(100 * first_s) : round(100 * last_s)] = mark
+    speed = run.speed_mps.copy()
+    speed[round(100 * stands_s[0]) : round(100 * stands_s[1])] = 0.0
+    accel = np.random.default_rng(1).normal(0, 1, run.count)
+    return DriveOnRoad(Path("run"), 100.0, run.time_s, accel, speed, run.distance_m, None, None, usable=usable,
+                       track=run.track)
+
+
+def test_a_loose_wire_leaves_one_run() -> None:
+    gaps = {(5 + 0.9 * n, 5.02 + 0.9 * n + 0.18 * (n % 2)): NO_READING for n in range(20)}
+    (run,) = driven_stretches(drive(gaps))
+    assert run.count == 3000 and run.name == "run"
+    assert run.usable is not None and (~run.read).sum() == 10 * 2 + 10 * 20
+
+
+@pytest.mark.parametrize(("gap_s", "runs"), [(SKIP_S, 1), (SKIP_S + 0.01, 2)])
+def test_a_gap_is_cut_out_once_a_cut_costs_less(gap_s: float, runs: int) -> None:
+    found = driven_stretches(drive({(12.0, 12.0 + gap_s): NO_READING}))
+    assert len(found) == runs
+    assert sum(one.read.sum() for one in found) == 3000 - round(100 * gap_s)
+
+
+def test_gaps_at_the_ends_of_a_part_are_cut_off() -> None:
+    first, last = driven_stretches(drive({(0, 1): NO_READING, (9.5, 10): NO_READING}, stands_s=(10, 15)))
+    assert (first.count, last.count) == (850, 1500)
+    assert first.usable is None and last.usable is None
+
+
+def test_clipped_readings_are_told() -> None:
+    (run,) = driven_stretches(drive({(7, 7.05): CLIPPED}))
+    assert run.usable is not None and (run.usable == CLIPPED).sum() == 5
+
+
+def test_too_few_readings_are_refused() -> None:
+    with pytest.raises(BadInput, match="expected 5 s with readings .* without a break of more than 2 s"):
+        driven_stretches(drive({(3.0 * n, 3.0 * n + 2.5): NO_READING for n in range(10)}))
+
+
+def test_a_thinned_sample_is_as_usable_as_those_beside_it() -> None:
+    (run,) = driven_stretches(drive({(7, 7.01): NO_READING, (8, 8.01): CLIPPED}))
+    (thin,) = thinned_runs([replace(run, rate_hz=200.0)])
+    assert thin.usable is not None and len(thin.usable) == thin.count
+    assert np.flatnonzero(thin.usable == NO_READING).tolist() == [349, 350, 351]
+    assert np.flatnonzero(thin.usable == CLIPPED).tolist() == [399, 400, 401]
