@@ -17,7 +17,7 @@ import numpy.typing as npt
 from logger.identification.road_transform import RoadInTime
 from logger.identification.unknown_inputs import RoadInput, changed_input, check_names, is_input, read_input
 from logger.roads.iso8608 import displacement_psd
-from logger.runs import Run
+from logger.runs import READING, Run
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import move_named
@@ -68,6 +68,23 @@ class DriveModel:
     def predict(self, values: Array) -> list[Array]:
         """Accelerations (n,) per record without its beginning, with these values (p,) [m/s2]."""
         raise NotImplementedError
+
+    def told(self, run: int, prediction: Array) -> Array:
+        """A prediction (n,) of a record, counted from 0, as far as its readings tell: as it was measured where nothing
+        was read, and where a clipped reading is reached."""
+        record = self.records[run]
+        if record.usable is None:
+            return prediction
+        whole = np.concatenate([np.zeros(record.first), prediction])
+        return record.kept_mps2 - record.left_by(whole)[record.first:]
+
+    def told_slopes(self, run: int, prediction: Array, slopes: Array) -> Array:
+        """Slopes (n, p) of that: none where it does not change with the prediction (n,)."""
+        usable = self.records[run].usable
+        if usable is None:
+            return slopes
+        fixed = (usable[self.records[run].first:] != READING) & (self.told(run, prediction) == self.measured[run])
+        return np.where(fixed[:, None], 0.0, slopes)
 
     def vehicle_with(self, values: Array) -> Vehicle:
         """The vehicle with these values of its free numbers."""

@@ -33,7 +33,8 @@ class VehicleModel(DriveModel):
     def predict(self, values: Array) -> list[Array]:
         """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
         car = sensed_car(self.vehicle_with(values))
-        return [road.samples(_response(car, road.s, road.under_wheels(car.structure, self.road_with(values, run))))
+        return [self.told(run, road.samples(_response(
+                    car, road.s, road.under_wheels(car.structure, self.road_with(values, run)))))
                 for run, road in enumerate(self._roads)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
@@ -57,8 +58,9 @@ class VehicleModel(DriveModel):
                 derivatives[index] = _by_car(car, change, road.s, under, q, w, moved)
             for index, name in self._inputs_of(run):
                 derivatives[index] = _through(car, w, road.by_input(car.structure, at, name))
-            predictions.append(road.samples(road.s**2 * (q @ car.row)))
-            slopes.append(road.samples(derivatives).T)
+            prediction = road.samples(road.s**2 * (q @ car.row))
+            predictions.append(self.told(run, prediction))
+            slopes.append(self.told_slopes(run, prediction, road.samples(derivatives).T))
         return predictions, slopes
 
     def _inputs_of(self, run: int) -> list[tuple[int, str]]:

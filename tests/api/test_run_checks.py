@@ -56,7 +56,7 @@ def test_clipped_readings_are_told() -> None:
 
 
 def test_too_few_readings_are_refused() -> None:
-    with pytest.raises(BadInput, match="expected 5 s with readings .* without a break of more than 2 s"):
+    with pytest.raises(BadInput, match=r"expected 5 s with readings .* without a break of more than 2 s"):
         driven_stretches(drive({(3.0 * n, 3.0 * n + 2.5): NO_READING for n in range(10)}))
 
 

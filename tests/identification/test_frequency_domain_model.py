@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 
 from logger.identification.frequency_domain_model import VehicleModel
+from logger.identification.prediction_error_fit import fit
 from logger.profiles.track import Track
-from logger.runs import Run
+from logger.runs import CLIPPED, NO_READING, READING, Run
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.drives import recorded
@@ -102,3 +103,33 @@ def test_records_that_are_none() -> None:
         VehicleModel(HALF, [free(HALF, f"{part}.unsprung_mass_kg") for part in ("rear", "both")], [record])
     with pytest.raises(ValueError, match="no parameter"):
         VehicleModel(HALF, [replace(free(HALF, "sprung_mass_kg"), name="mass")], [record])
+
+
+def gapped(seed: int, clipped_mps2: float = np.inf) -> Run:
+    """A drive with gaps of 50 ms, in which anything stands, and clipped at a level."""
+    record = road_record(HALF, 20.0, 15.0, 3, noise_mps2=0.02, swing_mps=2.0)
+    usable = np.full(record.count, READING)
+    usable[(np.arange(record.count) % 90) < 5] = NO_READING
+    measured = np.where(usable == NO_READING, np.random.default_rng(seed).normal(0, 9, record.count),
+                        np.clip(record.measured_mps2, -clipped_mps2, clipped_mps2))
+    usable[(usable == READING) & (np.abs(measured) == clipped_mps2)] = CLIPPED
+    return replace(record, measured_mps2=measured, usable=usable)
+
+
+def test_what_stands_in_gaps_does_not_change_a_fit() -> None:
+    found = []
+    for seed in (1, 2):
+        model = VehicleModel(HALF, [free(HALF, "sprung_mass_kg")], [gapped(seed)])
+        found.append(fit(model, model.measured).parameters["sprung_mass_kg"])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+    assert found[0] == pytest.approx(HALF.sprung_mass_kg, rel=0.01)
+
+
+def test_a_clipped_drive_is_fitted_as_one_that_is_not() -> None:
+    record = gapped(1, clipped_mps2=0.8)
+    assert record.usable is not None and (record.usable == CLIPPED).sum() > 50
+    model = VehicleModel(changed(HALF, {"sprung_mass_kg": 950.0}), [free(HALF, "sprung_mass_kg")], [record])
+    assert fit(model, model.measured).parameters["sprung_mass_kg"] == pytest.approx(HALF.sprung_mass_kg, rel=0.003)
+    as_read = VehicleModel(HALF, [free(HALF, "sprung_mass_kg")], [replace(record, usable=np.where(
+        record.usable == CLIPPED, READING, record.usable))])
+    assert abs(fit(as_read, as_read.measured).parameters["sprung_mass_kg"] / HALF.sprung_mass_kg - 1) > 0.01
