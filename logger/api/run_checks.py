@@ -57,8 +57,23 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True) -> SimulatedR
 
 
 def driven_stretches(drive: DriveOnRoad) -> list[Run]:
-    """The parts of a drive in which the car moved and there were readings, each a run; of one that stood or had none
-    nowhere the whole. A part says in its name which seconds it is of.
+    """The parts of a drive in which the car moved and there were readings (``driven_parts``), each a run; of one that
+    stood or had none nowhere the whole. A part says in its name which seconds it is of. BadInput as ``driven_parts``.
+    """
+    from logger.runs import READING, Run
+
+    parts, usable = driven_parts(drive), drive.usable
+    whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
+    return [Run(str(drive.path) if whole else
+                f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
+                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track,
+                facts=drive.facts,
+                usable=None if usable is None or (usable[part] == READING).all() else usable[part])
+            for part in parts]
+
+
+def driven_parts(drive: Drive) -> list[slice]:
+    """Where in a drive the car moved and there were readings.
 
     A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
     well. One that lasts longer than that is cut out, and so are those at the ends of a part.
@@ -68,7 +83,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     import numpy as np
 
     from logger.lab.likelihood.lag import SLOWEST_MPS
-    from logger.runs import NO_READING, READING, SKIP_S, Run
+    from logger.runs import NO_READING, SKIP_S
 
     driven = drive.speed_mps >= SLOWEST_MPS
     read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
@@ -80,13 +95,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     if not parts:
         raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings at {SLOWEST_MPS:g} m/s or faster, without "
                        f"a break of more than {SKIP_S:g} s")
-    said = None if drive.usable is None or (drive.usable == READING).all() else drive.usable
-    whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
-    return [Run(str(drive.path) if whole else
-                f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
-                drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part], drive.track,
-                facts=drive.facts, usable=None if said is None or (said[part] == READING).all() else said[part])
-            for part in parts]
+    return parts
 
 
 def _stretches(which: Bools) -> list[slice]:

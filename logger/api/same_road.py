@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.api.bench import Tell, among, deviation_of, known_effects, unsaid
 from logger.api.lab import Diagnosis, Runs, diagnosis_fields, given_runs, word_of
 from logger.api.ranges import USUAL_TOLERANCE
-from logger.api.run_checks import check_record, thinned_runs
+from logger.api.run_checks import check_record, driven_parts, thinned_runs
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.runs import Run as Record
@@ -20,6 +21,12 @@ from logger.store.formats import drive_file, vehicle_file
 
 if TYPE_CHECKING:
     from logger.lab.unknown_road.diagnosis import Found
+
+Array = npt.NDArray[np.float64]
+
+_PLACES_EVERY_M = 10.0
+_LEAST_SHARED_M = 50.0
+"""Some seconds of a drive: over less road nothing is told (``lab.unknown_road.likelihood``)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +56,8 @@ def diagnose_same_road(
     minutes.
 
     vehicle, tolerance    as in ``compare``
-    runs                  as in ``compare``, without profiles; their distances count from the same place, to about 3 m
+    runs                  as in ``compare``, without profiles; their distances count from the same place, to about 3 m,
+                          or they were extracted without a profile and have positions
     candidates, effect_files, progress    as in ``diagnose``
 
     Raises BadInput for fewer than two runs, drives that are plainly over two roads, and as ``diagnose``. Source: the
@@ -84,8 +92,53 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
     for number, (drive, _) in enumerate(drives):
         file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
         check_record(drive, file, [one for one, _ in drives[:number]])
+    if all(_counts_for_itself(one) for one, _ in drives):
+        drives = _on_one_distance(drives)
     return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat)
                          for one, name in drives])
+
+
+def _counts_for_itself(drive: drive_file.Drive) -> bool:
+    """Whether a drive was extracted without a profile, so that its distance begins where it did, and has positions."""
+    return drive.facts.source is not None and drive.facts.places_by is None and drive.lat_deg is not None
+
+
+def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tuple[drive_file.Drive, str]]:
+    """The longest part of each drive in which the car moved, on the distance of the one that goes farthest, by the
+    start that comes nearest to their positions: what these wander by, over a minute or so, is no motion, and ways by a
+    receiver's speeds have no factor.
+
+    BadInput for a drive that goes elsewhere.
+    """
+    from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+
+    driven = [(_longest_part(one), name) for one, name in drives]
+    along, _ = max(driven, key=lambda pair: float(np.ptp(pair[0].distance_m)))
+    metres = np.arange(along.distance_m[0], along.distance_m[-1], _PLACES_EVERY_M)
+    line = MeasuredLine.of(metres, *(np.interp(metres, along.distance_m, one) for one in _places(along)))
+    found = []
+    for drive, name in driven:
+        along_m, aside_m = line.passed(*_places(drive))
+        near = (aside_m < ASIDE_M) & (along_m > metres[0]) & (along_m < metres[-1])
+        if np.ptp(drive.distance_m[near]) < _LEAST_SHARED_M if near.any() else True:
+            raise BadInput(f"{name}: expected a drive over the road of {along.path}, found none of its positions there "
+                           f"for {_LEAST_SHARED_M:g} m")
+        farther_m = float(np.median((along_m - drive.distance_m)[near]))
+        found.append((replace(drive, distance_m=drive.distance_m + farther_m), name))
+    return found
+
+
+def _places(drive: drive_file.Drive) -> tuple[Array, Array]:
+    assert drive.lat_deg is not None and drive.lon_deg is not None
+    return drive.lat_deg, drive.lon_deg
+
+
+def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
+    """BadInput where the car hardly moved."""
+    part = max(driven_parts(drive), key=lambda one: one.stop - one.start)
+    rows = ("time_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg")
+    return replace(drive, usable=None if drive.usable is None else drive.usable[part],
+                   **{name: getattr(drive, name)[part] for name in rows})
 
 
 def diagnosed(

@@ -1,8 +1,10 @@
 """``ridelog diagnose --same-road``: which effect is missing, from drives over one road that nobody measured.
 
 Each RUN is a folder with drive.csv; a profile.csv in it is not read. The runs are drives over the same road at
-different speeds, their distances counted from the same place (to about 3 m); drives that are plainly over two roads are
-refused. An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives tell.
+different speeds, their distances counted from the same place (to about 3 m); those that were extracted without a
+profile count from where each began, and are laid on one distance by their positions. Drives that are plainly over two
+roads are refused. An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives
+tell.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,7 +47,8 @@ def run_same_road(args: argparse.Namespace) -> int:
 def _drives(folders: Sequence[Path]) -> list[tuple[Drive, str]]:
     """The drives in some folders, and the folders' names. BadInput for a folder that is named twice."""
     from logger.store.formats.drive_file import DRIVE, read_drive
+    from logger.store.formats.run_file import read_run_facts
 
     if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")
-    return [(read_drive(folder / DRIVE), str(folder)) for folder in folders]
+    return [(replace(read_drive(folder / DRIVE), facts=read_run_facts(folder)), str(folder)) for folder in folders]
