@@ -33,6 +33,8 @@ BLURRED = 0.5
 """Noise of so many steps makes noise of rounding as well. What it leaves of rounding that goes with the acceleration is
 at most exp(-2 pi^2 0.5^2) / pi = 0.2 % of a step (B. Widrow and I. Kollar, Quantization Noise, 2008); with a third of a
 step it is 3.5 %, and on a smooth road standard errors are half as large again (``tests.benchmarks.rounded_lab``)."""
+_ON_STEPS = 0.02
+"""Readings that lie no nearer to steps were levelled, filtered or laid on other times after they were rounded."""
 _LEAST_SHARE = 1e-3
 """Readings that keep less of their information stood on one step nearly always."""
 _LEAST_NOISE, _MOST_NOISE = 0.01, 3.0  # steps, where the likeliest noise is looked for
@@ -77,12 +79,14 @@ class Readings:
 
     def beside(self, prediction: Array) -> Readings:
         """The same readings with what their bounds say beside a prediction (n,); as they were read, where noise blurs
-        their steps or they have none."""
+        their steps, they lie on none or on one only."""
         step = self.run.facts.step_mps2
         if not step or not self._whole.any():
             return Readings.of(self.run)
         left = (self.run.measured_mps2 - prediction)[self._whole]
-        if not np.ptp(self.run.measured_mps2[self._whole]):
+        read = self.run.measured_mps2[self._whole]
+        steps = (read - read[0]) / step
+        if not steps.any() or np.abs(steps - np.round(steps)).max() > _ON_STEPS:
             return Readings.of(self.run)
         noise, offset = _likeliest_noise(left, step, self.run.facts.noise_mps2 or 0.0)
         if noise > BLURRED * step:

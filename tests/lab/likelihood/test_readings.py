@@ -90,6 +90,13 @@ def test_what_has_no_bounds_worth_it_stays_as_it_was_read(facts: RecordFacts, no
     assert Readings.of(run).beside(prediction).mps2 is run.measured_mps2
 
 
+def test_rounded_readings_that_were_filtered_stay_what_they_are() -> None:
+    prediction = motion()
+    run = rounded(prediction, 0.05)
+    blended = measuring(run, 0.7 * run.measured_mps2 + 0.3 * np.roll(run.measured_mps2, 1))
+    assert Readings.of(replace(blended, facts=run.facts)).beside(prediction).as_read
+
+
 def test_readings_that_never_change_say_nothing() -> None:
     run = rounded(motion(0.001, 2000), 0.001)
     assert np.ptp(run.measured_mps2) == 0
