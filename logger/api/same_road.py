@@ -100,7 +100,8 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
 
 def _counts_for_itself(drive: drive_file.Drive) -> bool:
     """Whether a drive was extracted without a profile, so that its distance begins where it did, and has positions."""
-    return drive.facts.source is not None and drive.facts.places_by is None and drive.lat_deg is not None
+    counts = drive.facts.source is not None and drive.facts.places_by is None
+    return counts and drive.lat_deg is not None and bool(np.isfinite(drive.lat_deg).all())
 
 
 def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tuple[drive_file.Drive, str]]:
