@@ -23,7 +23,7 @@ from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spr
 from logger.identification.time_domain_model import SimulatedModel
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.drive_operator import Drive
-from logger.runs import Run, normalised_rms
+from logger.runs import READING, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import Vehicle
@@ -53,7 +53,8 @@ def check_records(records: Sequence[Run]) -> None:
         if abs(mean_mps2 := float(record.measured_mps2.mean())) > _LARGEST_MEAN_MPS2:
             raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
                                    "average (subtract the mean while the car stood)")
-        if repeats := find_repeats(record.kept_mps2[:, None]):
+        whole = slice(None) if record.usable is None else record.usable[record.first:] == READING
+        if repeats := find_repeats(record.kept_mps2[whole][:, None]):
             raise UnusableRun(run, f"{repeats.complaint}: write a record only as often as the sensor is read")
 
 

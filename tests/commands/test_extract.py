@@ -174,3 +174,27 @@ def test_a_serial_sensor_and_a_car_that_halts_for_long(tmp_path: Path) -> None:
     done = call(tmp_path / "halt.dump", "--out", tmp_path / "runs", "--json")
     assert done.returncode == 0, done.stderr
     assert [Path(one["run"]).name for one in json.loads(done.stdout)["runs"]] == ["halt", "halt-2"]
+
+
+@pytest.mark.slow
+def test_what_stands_where_nothing_was_read_does_not_matter(place: Path, tmp_path: Path) -> None:
+    said = []
+    for seed in (1, 2):
+        out = tmp_path / str(seed)
+        assert call(place / "town.dump", "--out", out, "--profile", place / "line.csv").returncode == 0
+        file = out / "town" / "drive.csv"
+        header, *rows = file.read_text().splitlines()
+        cells = [row.split(",") for row in rows]
+        level, usable = (header.split(",").index(name) for name in ("accel_z_mps2", "usable"))
+        rng = np.random.default_rng(seed)
+        for at in range(500, len(cells) - 200, 60):
+            for row in cells[at : at + 1 + at % 17]:
+                row[level], row[usable] = f"{rng.normal(0, 3):.4f}", "0"
+        file.write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+        done = subprocess.run(["ridelog", "compare", "--json", "--vehicle", "rav4-2009", str(out / "town")],
+                              capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        found = json.loads(done.stdout)
+        assert len(found["runs"]) == 1
+        said.append((found["error"], found["refitted"]["error"]))
+    assert said[0] == pytest.approx(said[1], rel=1e-3)
