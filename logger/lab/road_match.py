@@ -68,8 +68,9 @@ class RoadMatch:
 
     @property
     def is_upside_down(self) -> bool:
-        """Whether the run clearly follows this road when it is turned over."""
-        return self.is_clear and self.turned > self.correlation
+        """Whether the run clearly follows this road when it is turned over, and not much less as it is: a bounce half a
+        swing later looks turned over as well."""
+        return self.is_clear and self.turned - self.correlation > self.chance - self.mean_chance
 
 
 def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
