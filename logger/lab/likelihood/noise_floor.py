@@ -15,7 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.runs import signal_errors
 
 Array = npt.NDArray[np.float64]
 
@@ -40,9 +42,36 @@ class Noise:
     standard_error_mps2: float
 
 
+@dataclass(frozen=True)
+class SignalErrors:
+    """Of one signal: normalised r.m.s. errors before and after, and the error that its noise makes."""
+
+    before: float
+    after: float
+    noise_floor: float
+
+
 def noise_of(posterior: Posterior, state: State) -> Noise:
     """The sensor's noise under the residuals of a fitted state."""
-    return sensor_noise(posterior.bands, posterior.residuals(state), DISCREPANCY * posterior.size_mps2)
+    return _noise_of(_by_signal(posterior, state)[0])
+
+
+def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[str, SignalErrors]:
+    """Errors of the signals beside the sensor's acceleration, by name, under one model and under another."""
+    runs = posterior.runs.runs
+    was, now = (signal_errors(runs, one.predictions) for one in (before, after))
+    left = by_signal(runs, posterior.bands, posterior.residuals(after))
+    return {name: SignalErrors(was[name], now[name], _noise_of(left[name]).deviation_mps2 / left[name].size)
+            for name in was}
+
+
+def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
+    """What a state leaves of each signal, the sensor's acceleration first."""
+    return list(by_signal(posterior.runs.runs, posterior.bands, posterior.residuals(state)).values())
+
+
+def _noise_of(one: SignalResiduals) -> Noise:
+    return sensor_noise(one.bands, one.residuals, DISCREPANCY * one.size)
 
 
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
@@ -80,24 +109,33 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
 def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
     """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
     least 0. Bands that are quiet make up for those that are not."""
-    noise = ((1 + UNEXPLAINED) * noise_of(posterior, state).deviation_mps2) ** 2
-    return max(0.0, sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise, one.floor)))
-                        for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True)))
+    found = 0.0
+    for signal in _by_signal(posterior, state):
+        noise = ((1 + UNEXPLAINED) * _noise_of(signal).deviation_mps2) ** 2
+        found += sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise, one.floor)))
+                     for one, residual in zip(signal.bands, signal.residuals, strict=True))
+    return max(0.0, found)
 
 
 def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> float:
-    """By what share the residual is above the noise, and above what two right simulations differ by, in the run where
-    it is most. A run so short that noise alone may do the same with this probability counts only as far as asks for no
-    explanation."""
+    """By what share the residual is above the noise, and above what two right simulations differ by, in the run and of
+    the signal where it is most. A run so short that noise alone may do the same with this probability counts only as
+    far as asks for no explanation.
+
+    noise    of the sensor's acceleration
+    """
     from scipy.special import gammainccinv
 
-    found = []
-    for one, residual in zip(posterior.bands, posterior.residuals(state), strict=True):
-        freedom = float(one.freedom.sum())
-        expected = one.freedom @ (noise.deviation_mps2**2 + one.floor)
-        above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
-        by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / len(posterior.bands)) / (freedom / 2))) - 1
-        found.append(above if above > by_chance else min(above, UNEXPLAINED))
+    main, *others = _by_signal(posterior, state)
+    signals = [(main, noise), *((one, _noise_of(one)) for one in others)]
+    count, found = sum(len(one.bands) for one, _ in signals), []
+    for signal, own in signals:
+        for one, residual in zip(signal.bands, signal.residuals, strict=True):
+            freedom = float(one.freedom.sum())
+            expected = one.freedom @ (own.deviation_mps2**2 + one.floor)
+            above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
+            by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / count) / (freedom / 2))) - 1
+            found.append(above if above > by_chance else min(above, UNEXPLAINED))
     return max(found)
 
 

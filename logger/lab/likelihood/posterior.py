@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
+from logger.lab.likelihood.clocked_record import record_error
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.likelihood.whittle import Bands, deviance
+from logger.lab.likelihood.signals import bands_of
+from logger.lab.likelihood.whittle import deviance
 from logger.runs import normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -30,7 +32,7 @@ class State:
     logs          (p,) logarithms of the car's numbers over the nominal ones
     record        (k,) per run, numbers of its ``RecordError``
     size          of the distance errors
-    predictions   (n,) per run, whole, the record's error included [m/s2]
+    predictions   (n,) per run, whole, the record's error included [m/s2]; other signals are joined to it
     """
 
     effects: tuple[Chosen, ...]
@@ -59,9 +61,9 @@ class Posterior:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.stands = stands or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)
-        self.record_errors = [RecordError.of(run, tolerance) for run in runs.runs]
-        self.bands = [Bands(run) for run in runs.runs]
-        self.measured = [run.measured_mps2 for run in runs.runs]
+        self.record_errors = [record_error(run, tolerance) for run in runs.runs]
+        self.bands = [bands_of(run) for run in runs.runs]
+        self.measured = [run.joined for run in runs.runs]
         counted = np.concatenate([run.measured_mps2[run.first:] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
@@ -69,7 +71,7 @@ class Posterior:
     def without_wall(self, fine: bool = False) -> Posterior:
         """The same with a car that may bend as far as the runs ask; simulated as finely as what is reported is, or as
         now."""
-        runs = SimulatedRuns(self.runs.runs) if fine else self.runs
+        runs = SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)) if fine else self.runs
         return Posterior(runs, self.vehicle, self.tolerance, self.stands, self.prior.without_wall())
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
