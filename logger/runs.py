@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
@@ -18,6 +19,24 @@ NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
 _EVEN = 1e-3
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One more signal that was measured, beside the acceleration of the sensor.
+
+    name              of its column, which ends in its unit
+    measures          ``acceleration`` [m/s2], ``travel`` (extension of a suspension) [m], ``pitch_rate`` (nose up) or
+                      ``roll_rate`` (left side up) [rad/s]
+    of                the part that is measured: ``body``, ``front_wheel``, ``rear_suspension`` ...
+    ahead_m, left_m   where on the body, from the centre of gravity [m]
+    """
+
+    name: str
+    measures: str
+    of: str = "body"
+    ahead_m: float = 0.0
+    left_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -32,6 +51,7 @@ class RecordFacts:
     places_by                "road": places were found by the road as this vehicle's model feels it; "receiver"
     vehicle                  that vehicle
     source                   the name of the file that it was made of
+    signals                  what more was measured
     """
 
     step_mps2: float | None = None
@@ -44,6 +64,7 @@ class RecordFacts:
     places_by: str | None = None
     vehicle: str | None = None
     source: str | None = None
+    signals: tuple[Signal, ...] = ()
 
 
 UNKNOWN = RecordFacts()
@@ -52,17 +73,18 @@ UNKNOWN = RecordFacts()
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One drive over one road, evenly sampled: arrays (n,).
+    """One drive over one road, or one time on a rig, evenly sampled: arrays (n,).
 
     name             as the user knows it
     rate_hz          samples a second
     measured_mps2    the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
-    distance_m       where the front tires stood on the track, as it was recorded [m]
-    speed_mps        [m/s]
-    track            the road
+    distance_m       where the front tires stood on the track, as it was recorded [m]; on a rig 0
+    speed_mps        [m/s]; on a rig 0
+    track            the road, or what drives the rig
     skip_s           how much of the beginning is left out [s]
     facts            what is known of the record
     usable           what each sample is (``NO_READING``, ``READING``, ``CLIPPED``); None: all are readings
+    more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -72,12 +94,15 @@ class Run:
     measured_mps2: Array
     distance_m: Array
     speed_mps: Array
-    track: Track
+    track: Track | Excitation
     skip_s: float = SKIP_S
     facts: RecordFacts = UNKNOWN
     usable: Array | None = None
+    more: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
+        if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):
+            raise ValueError(f"{self.name}: expected samples of each of {len(self.signals)} signals")
         if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
             raise ValueError(f"{self.name}: expected columns of one length, longer than {self.skip_s:g} s")
 
@@ -107,28 +132,69 @@ class Run:
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
 
     def left_by(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
-        """What a prediction (n,) leaves of what was measured, or of other readings (n,) in its place [m/s2]: nothing
-        where nothing was read, and of a clipped reading only what it falls short of it by."""
-        left = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - prediction
-        if self.usable is None:
+        """What a prediction (n,), or more signals joined to it, leaves of what was measured, or of other readings (n,)
+        of the sensor in its place [m/s2]: nothing where nothing was read, and of a clipped reading only what it falls
+        short of it by."""
+        main = self.main(prediction)
+        left = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - main
+        if self.usable is not None:
+            way = np.sign(self.measured_mps2)
+            short = way * (self.measured_mps2 - main) - 0.5 * (self.facts.step_mps2 or 0.0)  # it may be rounded up
+            left = np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0), np.where(self.read, left, 0.0))
+        if len(main) == len(prediction):
             return left
-        way = np.sign(self.measured_mps2)
-        short = way * (self.measured_mps2 - prediction) - 0.5 * (self.facts.step_mps2 or 0.0)  # it may be rounded up
-        return np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0), np.where(self.read, left, 0.0))
+        others = (self.more - prediction[self.count :].reshape(-1, self.count)) * self.read
+        return np.concatenate([left, others.ravel()])
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What was measured beside the acceleration of the sensor."""
+        return self.facts.signals
+
+    @property
+    def joined_count(self) -> int:
+        """How many samples all signals have together."""
+        return self.count * (1 + len(self.signals))
+
+    def main(self, joined: Array) -> Array:
+        """The part (n,) of the sensor's acceleration of signals that are joined ((1 + s) n,)."""
+        return joined[: self.count]
+
+    @property
+    def counted(self) -> Bools:
+        """Which of the samples that are joined ((1 + s) n,) are not left out."""
+        return np.tile(np.arange(self.count) >= self.first, 1 + len(self.signals))
 
     @property
     def two_tracks(self) -> bool:
         """Whether the road is known under the right wheels too."""
-        return self.track.elevation_m.ndim == 2
+        return self.track.two_tracks
+
+    @property
+    def timed(self) -> bool:
+        """Whether it is driven by time: a rig, with no road, no speed and no distance."""
+        return self.track.timed
 
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
-    """rms(measured - model) / rms(measured) over all samples that are not left out; predictions (n,) per run, whole.
-    A clipped reading counts as far as the model falls short of it.
+    """rms(measured - model) / rms(measured) over all samples that are not left out; predictions (n,) per run, whole, or
+    ((1 + s) n,), of which the sensor's acceleration counts. A clipped reading counts as far as the model falls short
+    of it.
 
     NaN where nothing but zeros was measured."""
-    return normalised_rms([run.left_by(one)[run.first:] for run, one in zip(runs, predictions, strict=True)],
+    pairs = zip(runs, predictions, strict=True)
+    return normalised_rms([run.left_by(run.main(one))[run.first:] for run, one in pairs],
                           [(run.measured_mps2 * run.read)[run.first:] for run in runs])
+
+
+def signal_errors(runs: Sequence[Run], predictions: Sequence[Array]) -> dict[str, float]:
+    """The same of every other signal, by name; predictions ((1 + s) n,) per run."""
+    parts: dict[str, list[tuple[Array, Array]]] = {}
+    for run, one in zip(runs, predictions, strict=True):
+        for signal, measured, predicted in zip(run.signals, run.more, one.reshape(-1, run.count)[1:], strict=True):
+            parts.setdefault(signal.name, []).append((measured[run.first:], predicted[run.first:]))
+    return {name: normalised_rms([measured - predicted for measured, predicted in some], [one for one, _ in some])
+            for name, some in parts.items()}
 
 
 def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> float:

@@ -72,7 +72,7 @@ class Bench:
         """Raise BadInput where an effect cannot be in the car on these runs, or shakes it to pieces."""
         from logger.store.formats.effect_file import check_on
 
-        check_on(self.model.vehicle, one, self.two_tracks)
+        check_on(self.model.vehicle, one, self.two_tracks, self.timed)
         if one.file is not None and not slow([one.effect]):
             predicted(one.file, self.model, self.runs, [one])
 
@@ -91,6 +91,11 @@ class Bench:
     def two_tracks(self) -> bool:
         """Whether the road of every run is known under the right wheels too."""
         return all(run.two_tracks for run in self.runs.runs)
+
+    @property
+    def timed(self) -> bool:
+        """Whether all runs are driven by time."""
+        return all(run.timed for run in self.runs.runs)
 
     def compared(self) -> Comparison:
         """The model against the runs. BadInput when the vehicle lacks what it needs."""
@@ -117,11 +122,13 @@ class Bench:
         """
         from logger.store.formats.effect_file import effect_named
         from logger.vehicle.effect import chosen
+        from logger.vehicle.effect_sizes import sized
 
         if name in self.effects:
             effect, file = self.effects[name], self.files.get(name)
         else:
             effect, file = effect_named(name)
+            effect = effect if file else sized(effect, self.model.vehicle)
         if effect.name in [one.effect.name for one in self.model.effects]:
             raise BadInput(f"{self.word}: expected a vehicle without {effect.name}, which it has")
         try:
@@ -200,7 +207,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
     warn        told where it will take long, and what was wrong where the user goes on ``anyway``
     """
-    effects, files = known_effects(model, effect_files)
+    effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))
     if searches is not None:
         require_compiler(searches, effects.values())
     found = Bench(word, model, runs, effects, files, numbers)
@@ -220,24 +227,26 @@ def deviation_of(tolerance: float) -> float:
 
 def known_effects(model: Model, files: Sequence[str], on_rig: bool = False
                   ) -> tuple[dict[str, Effect], dict[str, str]]:
-    """The effects that a search tries, by name: those that it tries unasked, a model's own, and those of some more
-    files; and the files of the user's own, by name. BadInput for a name that is there twice.
+    """The effects that a search tries, by name: those that it tries unasked, in the model's sizes, a model's own, and
+    those of some more files; and the files of the user's own, by name. BadInput for a name that is there twice.
 
     files     of effects, or names of such that a search does not try unasked
     on_rig    as ``sought_effects``
     """
     from logger.store.formats.effect_file import own_effect, shipped_effects
+    from logger.vehicle.effect_sizes import sized
 
-    effects, own = sought_effects(on_rig), {}
+    effects, own = {name: sized(one, model.vehicle) for name, one in sought_effects(on_rig).items()}, {}
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
     for file in files:
-        effect = shipped_effects()[file] if file in shipped_effects() else own_effect(Path(file))
+        is_shipped = file in shipped_effects()
+        effect = sized(shipped_effects()[file], model.vehicle) if is_shipped else own_effect(Path(file))
         if effect.name in effects:
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
         effects[effect.name] = effect
-        if file not in shipped_effects():
+        if not is_shipped:
             own[effect.name] = file
     return effects, own
 
@@ -302,6 +311,7 @@ def _try_own(found: Bench, files: Sequence[str]) -> None:
     from logger.vehicle.effect import chosen
 
     for name, effect in found.effects.items():
-        if found.files.get(name) in files and effect.obstacle(found.model.vehicle, found.two_tracks) is None:
+        if found.files.get(name) in files and effect.obstacle_on(
+                found.model.vehicle, found.two_tracks, found.timed) is None:
             for values in effect.trials():
                 found.try_out(chosen(effect, values, file=found.files[name]))

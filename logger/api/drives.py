@@ -15,8 +15,11 @@ from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, line, table
 from logger.api.vehicles import Model, car_on, model_of
 from logger.errors import BadInput
+from logger.profiles.excitation import Excitation
+from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
+from logger.store.formats.run_file import write_run_facts
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
@@ -30,31 +33,37 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(drive_file.Drive, Shown):
-    """What a recorder wrote down while it drove, arrays (n,), and the road.
+    """What a recorder wrote down while it drove, or while a rig was driven, arrays (n,), and the road or excitation.
 
     path           of its folder or file; of a simulated one its name
     rate_hz        samples a second
     time_s         evenly spaced [s]
     accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
-    speed_mps      [m/s]
-    distance_m     where the front tires stand on the profile [m]
+    speed_mps      [m/s]; on a rig 0
+    distance_m     where the front tires stand on the profile [m]; on a rig 0
     lat_deg, lon_deg    None where they were not recorded
     usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
     facts          what is known of the record
+    more           columns (n,) of the signals that ``facts`` has, by name
     profile        the road that was driven; None: not known
+    excitation     what moved the wheels of a rig, counted from the first sample; None: it is no rig
     """
 
     profile: Profile | None = None
+    excitation: Excitation | None = None
 
     def __repr__(self) -> str:
         return table(f"Run {self.path}", [
             ("time", len(self.time_s) / self.rate_hz, "s"), ("samples", len(self.time_s), ""),
             ("rate", self.rate_hz, "Hz"),
-            ("distance", f"{self.distance_m.min():.4g} to {self.distance_m.max():.4g}", "m"),
-            ("mean speed", float(self.speed_mps.mean()), "m/s"),
+            ("distance", None if self.excitation else
+             f"{self.distance_m.min():.4g} to {self.distance_m.max():.4g}", "m"),
+            ("mean speed", None if self.excitation else float(self.speed_mps.mean()), "m/s"),
             ("acceleration, r.m.s.", float(np.sqrt(np.mean(self.accel_z_mps2**2))), "m/s2"),
             ("profile", None if self.profile is None else
-             f"{self.profile.start_m:.4g} to {self.profile.distance_m[-1]:.4g}", "m")])
+             f"{self.profile.start_m:.4g} to {self.profile.distance_m[-1]:.4g}", "m"),
+            ("excitation", None if self.excitation is None else
+             f"{self.excitation.start_s:.4g} to {self.excitation.end_s:.4g}", "s")])
 
     def charts(self) -> Sequence[Chart]:
         """The acceleration over time."""
@@ -63,13 +72,16 @@ class Run(drive_file.Drive, Shown):
         return [Curves("Run", "time [s]", "acceleration [m/s2]", (line("sensor", self.time_s, self.accel_z_mps2),))]
 
     @property
-    def track(self) -> Track | None:
-        """The road as models read it."""
+    def track(self) -> Track | Excitation | None:
+        """The road, or the excitation, as models read it."""
+        if self.excitation is not None:
+            return self.excitation
         return None if self.profile is None else drive_file.track_of(self.profile)
 
 
 def read_run(path: Path | str) -> Run:
-    """Read a folder with ``drive.csv`` and, where the road is known, ``profile.csv``; or a ``drive.csv`` alone.
+    """Read a folder with ``drive.csv`` and, where the road is known, ``profile.csv``, of a rig ``excitation.csv``; or a
+    ``drive.csv`` alone.
 
     Raises BadInput (``file:line: expected ..., found ...``) for a file that is missing or not what it should be.
 
@@ -77,8 +89,10 @@ def read_run(path: Path | str) -> Run:
     (1115,)
     """
     place = Path(path)
-    drive = drive_file.read_drive(_file_of(place))
-    return Run(**vars(drive) | {"path": place}, profile=_profile_beside(place))
+    timed = place.is_dir() and drive_file.driven_by_time(place)
+    drive = drive_file.drive_in(place, timed) if place.is_dir() else drive_file.read_drive(place)
+    return Run(**vars(drive), profile=_profile_beside(place),
+               excitation=drive_file.excitation_beside(drive) if timed else None)
 
 
 def _file_of(place: Path) -> Path:
@@ -112,16 +126,24 @@ def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
 
 
 def write_run(folder: Path | str, run: Run) -> None:
-    """Write a run as a folder with ``drive.csv`` (ten digits) and, where its road is known, ``profile.csv``. OSError if
-    that fails.
+    """Write a run as a folder with ``drive.csv`` (ten digits), where its road is known ``profile.csv``, of a rig
+    ``excitation.csv``, and ``run.yaml`` where something is known of the record. OSError if that fails.
 
     >>> write_run(folder / "again", read_run(folder))
     """
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     columns = {"t_s": run.time_s, "accel_z_mps2": run.accel_z_mps2, "speed_mps": run.speed_mps,
-               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable}
-    drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items() if one is not None})
+               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable,
+               **run.more}
+    away = (drive_file.SPEED, drive_file.DISTANCE) if run.excitation is not None else ()
+    drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items()
+                                                      if one is not None and name not in away})
+    if run.facts != UNKNOWN:
+        write_run_facts(place, run.facts)
+    if run.excitation is not None:
+        on_its_clock = run.excitation.begun(-float(run.time_s[0]))
+        drive_file.write_excitation(place / drive_file.EXCITATION, on_its_clock)
     if run.profile is not None:
         write_profile(place / drive_file.PROFILE, run.profile)
 
@@ -324,12 +346,15 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
     expected ...") for a drive that cannot be used."""
     from logger.estimation.assessment import Unusable, assess, estimable
 
+    if run.excitation is not None:
+        raise BadInput(f"{run.path}: expected a drive over a road, found a run that is driven by time")
+    road = None if run.profile is None else drive_file.track_of(run.profile)
     try:
         ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, drive_file.MAX_SPEED_MPS)
     except Unusable as error:
         file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
         raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     try:
-        return assess(ready, model.vehicle, sensor, window_m, run.track, learns_noise, model.effects, model.errors)
+        return assess(ready, model.vehicle, sensor, window_m, road, learns_noise, model.effects, model.errors)
     except ValueError as error:
         raise BadInput(f"{model.vehicle.name}: {error}") from None

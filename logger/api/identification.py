@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from logger.identification.unknown_inputs import RoadInput
     from logger.identification.unknown_road.fisher_scoring import RoadFit
     from logger.identification.unknown_road.road_state import Options as RoadOptions
+    from logger.profiles.excitation import Excitation
     from logger.profiles.track import Track
     from logger.store.formats.drive_file import Drive
     from logger.vehicle.named_parameters import Free
@@ -152,7 +153,7 @@ def identify(
     question = Question(free, start or {}, bounds or {}, obstacles or {}, noise, low_pass_hz, robust, tries, waviness,
                         anyway)
     flat_will_do = bool(obstacles) or road != "measured"
-    if bare := [drive for drive in drives if drive.profile is None and not flat_will_do]:
+    if bare := [drive for drive in drives if drive.track is None and not flat_will_do]:
         raise BadInput(f"{bare[0].path}: expected a run with the profile that it was driven on")
     records = records_of([(drive, drive.track) for drive in drives], skip_s, question)
     found = (on_measured_roads(model, word, records, question) if road == "measured" else
@@ -163,7 +164,8 @@ def identify(
                           tuple(summary["cannot_tell"]), model_of(found.model))
 
 
-def records_of(drives: Sequence[tuple[Drive, Track | None]], skip_s: float, question: Question) -> list[Record]:
+def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s: float,
+               question: Question) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
     from logger.identification.session import LEAST_SAMPLES, UnusableRun, check_records, off_rate
@@ -206,6 +208,7 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     from logger.simulation.simulated_runs import SimulatedRuns
 
     _check_effects(given, word, records, question, warn)
+    _check_rigs(records, question)
     if not question.obstacles:
         check_roads(word, given, SimulatedRuns(records), warn, question.anyway)
     road, unplaced = _road(question)
@@ -238,7 +241,8 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
     from logger.store.formats.effect_file import check_on, shipped_effects
 
     for one in given.effects:
-        check_on(given.vehicle, one, all(record.two_tracks for record in records))
+        check_on(given.vehicle, one, all(record.two_tracks for record in records),
+                 all(record.timed for record in records))
     if words := slow_words([one.effect for one in given.effects]):
         warn(words)
     there = [one.effect.name for one in given.effects]
@@ -249,6 +253,19 @@ def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Recor
                 f" {name}: expected an effect that is in the vehicle's file, {word} has {', '.join(there) or 'none'}; "
                 f"add it with 'ridelog add-effect {effect} --vehicle {word} --out FILE RUN...', or write it under "
                 "'effects' in the file"))
+
+
+def _check_rigs(records: Sequence[Record], question: Question) -> None:
+    """Raise BadInput for what asks for a road, or a speed, of a rig."""
+    from logger.identification.unknown_inputs import is_input
+
+    rig = next((record.name for record in records if record.timed), None)
+    if rig is None:
+        return
+    if asked := [name for name in question.free if is_input(name)] + list(question.obstacles):
+        raise BadInput(f"{rig}: expected a road for {asked[0]}; the run is driven by time")
+    if question.noise == "road":
+        raise question.wrong("noise", f" road: expected white, ar or auto; {rig} is driven by time, on no road")
 
 
 def _road(question: Question) -> tuple[RoadInput, list[str]]:

@@ -277,8 +277,8 @@ def bench_with(
     """All that a question needs, checked together."""
     numbers, model = deviation_of(tolerance), model_of(vehicle)
     drives = [_on_a_road(one) for one in given_runs(runs)]
-    return bench_of(word_of(vehicle, model), model, checked_runs(drives, thin), list(map(str, effect_files)), numbers,
-                    searches, anyway=anyway)
+    return bench_of(word_of(vehicle, model), model, checked_runs(drives, thin, model.vehicle),
+                    list(map(str, effect_files)), numbers, searches, anyway=anyway)
 
 
 def word_of(vehicle: Model | Path | str, model: Model) -> str:
@@ -301,5 +301,5 @@ def given_runs(runs: Runs) -> list[Run]:
 def _on_a_road(run: Run) -> drive_file.DriveOnRoad:
     track = run.track
     if track is None:
-        raise BadInput(f"{run.path}: expected a run with the profile that it was driven on")
+        raise BadInput(f"{run.path}: expected a run with the profile that it was driven on, or its excitation")
     return drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)}, track=track)

@@ -45,13 +45,14 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
 
     for run in runs.runs:
         for one in model.effects:
-            why = one.effect.obstacle(model.vehicle, run.two_tracks)
+            why = one.effect.obstacle_on(model.vehicle, run.two_tracks, run.timed)
             if why is not None:
                 raise BadInput(f"{word}: its effect {one.effect.name} cannot be on {run.name}: {why}")
     predictions = predicted(word, model, runs, model.effects)
     if not any(map(_moves, runs.runs, predictions)):
-        raise BadInput(f"{runs.runs[0].name}: expected a drive over a road that moves the car; where it was the "
-                       "profile is flat, or it stood still")
+        raise BadInput(f"{runs.runs[0].name}: expected " + (
+            "an excitation that moves the car; it is flat while the record lasts" if runs.runs[0].timed else
+            "a drive over a road that moves the car; where it was the profile is flat, or it stood still"))
     car = compose(model.vehicle, model.effects)
     matches, band_hz = _matches(runs, predictions, car)
     _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
@@ -99,11 +100,12 @@ def _matches(runs: SimulatedRuns, predictions: Sequence[Array],
 
     structure = structure_of(car.vehicle)
     band_hz = bounce_band_hz(undamped_frequencies_hz(structure)[: -len(structure.wheels)])
-    return [road_match(run, one, band_hz) for run, one in zip(runs.runs, predictions, strict=True)], band_hz
+    matches = [road_match(run, run.main(one), band_hz) for run, one in zip(runs.runs, predictions, strict=True)]
+    return matches, band_hz
 
 
 def _moves(run: Run, prediction: Array) -> bool:
-    model = prediction[run.first:]
+    model = run.main(prediction)[run.first:]
     return float(model @ model) >= _LEAST_MPS2**2 * len(model)
 
 
@@ -136,10 +138,10 @@ def _other_roads(runs: SimulatedRuns, matches: Sequence[RoadMatch], car: Car,
     if not strangers and pooled(matches).is_refuted:
         strangers = list(range(len(matches)))
     for k in strangers:
-        found = matches[k]
-        yield (f"{runs.runs[k].name}: expected a drive over the road of its profile, found one that does not follow "
-               f"it (correlation {found.correlation:.2f} around the body's bounce, by chance up to "
-               f"{found.chance:.2f}): {_advice(runs.runs[k], car, band_hz)}")
+        found, run = matches[k], runs.runs[k]
+        what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
+        yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
+               f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, band_hz)}")
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
@@ -149,11 +151,13 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
     from logger.simulation.simulated_runs import SimulatedRuns
 
     track = run.track
+    if not isinstance(track, Track):
+        return "is it another run's excitation, or another clock's?"
     reverse = Track(track.spacing_m, track.elevation_m[::-1].copy(), track.start_m)
     both = {False: SimulatedRuns([run]), True: SimulatedRuns([replace(run, track=reverse)])}
 
     def predict(farther_m: Array, backwards: bool) -> Array:
-        return both[backwards].predict(car, [farther_m], rough=True)[0]
+        return run.main(both[backwards].predict(car, [farther_m], rough=True)[0])
 
     found = better_placement(run, predict, band_hz, (track.start_m, track.end_m))
     if found is None:

@@ -15,10 +15,11 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
     runs      their folders
     option    how the file was asked for
     """
-    from logger.store.formats.drive_file import DRIVE, PROFILE
+    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE
+    from logger.store.formats.run_file import RUN
 
     said = f"{option} {out}".lstrip()
-    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE)}:
+    if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE, EXCITATION, RUN)}:
         raise BadInput(f"{said}: expected a file that is none of a run's")
     if out.resolve() in {path.resolve() for path in read}:
         raise BadInput(f"{said}: expected another file than those that are read")

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from logger.api.bench import Tell, among, deviation_of, known_effects, unsaid
 from logger.api.lab import Diagnosis, Runs, diagnosis_fields, given_runs, word_of
 from logger.api.ranges import USUAL_TOLERANCE
-from logger.api.run_checks import check_record, driven_parts, thinned_runs
+from logger.api.run_checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
 from logger.runs import Run as Record
@@ -92,6 +92,7 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
     for number, (drive, _) in enumerate(drives):
         file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
         check_record(drive, file, [one for one, _ in drives[:number]])
+        check_distances(drive, file)
     if all(_counts_for_itself(one) for one, _ in drives):
         drives = _on_one_distance(drives)
     return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat)

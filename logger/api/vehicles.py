@@ -8,6 +8,7 @@ from pathlib import Path
 
 from logger.api.shown import Shown, table
 from logger.errors import BadInput
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.report.quantities import numbers_of, unit_of
 from logger.shipped import vehicle_names, vehicle_path
@@ -171,12 +172,13 @@ def effects() -> Effects:
                                      one.shown_by, one.source) for name, one in effect_file.shipped_effects().items()})
 
 
-def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str], track: Track) -> Car:
+def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str],
+           track: Track | Excitation) -> Car:
     """The vehicle with its effects, which are possible on this road; ``said`` where, by name. BadInput for one that is
     not, ValueError as ``compose``."""
     for one in effects:
         try:
-            effect_file.check_on(vehicle, one, track.elevation_m.ndim == 2)
+            effect_file.check_on(vehicle, one, track.two_tracks, track.timed)
         except BadInput as error:
             raise BadInput(f"{said[one.effect.name]}: {error}") from None
     try:

@@ -1,6 +1,7 @@
 """Compare a vehicle's model with measurements: the error, where it sits, and what kind of thing is missing.
 
-Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
+Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on, or, of
+a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m]) that drove it.
 
   ridelog compare --vehicle mycar.yaml run1 run2
   ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
@@ -24,7 +25,8 @@ from logger.files import write_text
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog compare``."""
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
+                        help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
@@ -46,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(path)
     if args.out is not None:
         check_out(args.out, args.runs, [path, *(Path(one.file) for one in model.effects if one.file is not None)])
-    runs = lab_runs(args.runs, thin=False)  # an error is that of all samples
+    runs = lab_runs(args.runs, thin=False, vehicle=model.vehicle)  # an error is that of all samples
     found = bench_of(args.vehicle, model, runs, (), deviation_of(args.tolerance), warn=warned,
                      anyway=args.anyway).compared()
     if args.out is not None:

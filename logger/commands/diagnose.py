@@ -1,6 +1,7 @@
 """Which physical effect a vehicle's model lacks: every one that is known is tried, the evidence decides.
 
-Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on.
+Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on, or, of
+a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m]) that drove it.
 
   ridelog diagnose --vehicle mycar.yaml run1 run2
   ridelog diagnose --vehicle mycar.yaml run1 run2 --effect-file my_effect.py --out diagnosis.html

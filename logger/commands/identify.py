@@ -1,7 +1,8 @@
 """Vehicle parameters from drives over known roads: a grey-box prediction-error fit.
 
 Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was
-driven on. What is free is named as in the vehicle's file; both.NAME is the front and rear axle together.
+driven on, or, of a rig, with drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m])
+that drove it. What is free is named as in the vehicle's file; both.NAME is the front and rear axle together.
 
   ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
   ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.prediction_error_fit import Fit
     from logger.identification.unknown_road.fisher_scoring import RoadFit
+    from logger.profiles.excitation import Excitation
     from logger.profiles.track import Track
     from logger.store.formats.drive_file import Drive
     from logger.store.formats.vehicle_file import Model
@@ -59,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from logger.runs import SKIP_S
 
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
-                        help="folder with drive.csv and profile.csv, or a drive.csv")
+                        help="folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); "
                              "what is not free stays as it says")
@@ -170,11 +172,11 @@ def _numbers(text: str, option: str, count: int) -> tuple[str, list[float]]:
     return name, values
 
 
-def _drive(path: Path, flat_will_do: bool) -> tuple[Drive, Track | None]:
+def _drive(path: Path, flat_will_do: bool) -> tuple[Drive, Track | Excitation | None]:
     """A drive on its road, or where that will do on none."""
-    from logger.store.formats.drive_file import DRIVE, PROFILE, read_drive, read_run
+    from logger.store.formats.drive_file import DRIVE, EXCITATION, PROFILE, read_drive, read_run
 
-    if flat_will_do and not (path.is_dir() and (path / PROFILE).exists()):
+    if flat_will_do and not any((path / name).exists() for name in (PROFILE, EXCITATION)):
         return read_drive(path / DRIVE if path.is_dir() else path), None
     run = read_run(path)
     return run, run.track

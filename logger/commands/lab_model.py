@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
     """RUN..., --vehicle, --tolerance, --effect-file, --anyway and --json."""
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder with drive.csv and profile.csv")
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
+                        help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
@@ -58,7 +59,8 @@ def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str
     from logger.store.formats.vehicle_file import read_model
 
     numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
-    return bench_of(vehicle, model, lab_runs(folders), effect_files, numbers, searches, warned, anyway)
+    return bench_of(vehicle, model, lab_runs(folders, vehicle=model.vehicle), effect_files, numbers, searches, warned,
+                    anyway)
 
 
 def warned(words: str) -> None:

@@ -5,10 +5,12 @@
       --effect wheel_lift --out drive.csv
   ridelog simulate --vehicle rav4-2009 --flat 60 --obstacle bump:start_m=20,height_m=0.08,width_m=3.6 --speed 5 \\
       --out run/drive.csv --profile-out run/profile.csv
+  ridelog simulate --vehicle ./rig.yaml --excitation run/excitation.csv --rate 500 --out run/drive.csv
 
 The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires at
 the start of the profile, after a flat road, and is sampled as a recorder does it, behind a filter that is flat up to
-0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run.
+0.38 of the sample rate. A folder that holds a drive.csv and the profile.csv it was driven on is a run. A rig that is
+driven by time (--excitation) has no speed and no distance; its drive.csv lasts as long as the excitation.csv beside it.
 
 Physical effects are those of the vehicle's file, then those of --effect; --list-effects tells what there is. The speed
 asked for is the true one: with speed_scale the drive's own columns say something else.
@@ -28,6 +30,7 @@ from logger.commands.numbers import add_number, named_numbers
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
+    from logger.profiles.excitation import Excitation
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import Motion
     from logger.vehicle.effect import Chosen, Effect, Parameter
@@ -46,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     road.add_argument("--profile", type=Path, metavar="FILE",
                       help="CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses "
                            "both, other cars the left one")
+    road.add_argument("--excitation", type=Path, metavar="FILE",
+                      help="what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m"
+                           "[,elevation_rear_m]); without --speed")
     add_number(road, "--flat", *_FLAT_M, "m", metavar="M", help="a flat road of this length instead [m]")
     parser.add_argument("--obstacle", action="append", default=[], metavar="NAME:PARAM=VALUE,...",
                         help="add one to the road; may repeat. bump (Eq 4.41): start_m, height_m, width_m; step: "
@@ -93,6 +99,7 @@ def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
     from logger.api.vehicles import car_on
+    from logger.profiles.track import Track
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
     from logger.store.formats.drive_file import COLUMNS, write_drive, write_profile
 
@@ -102,24 +109,28 @@ def _simulate(args: argparse.Namespace) -> None:
     if args.profile_out is not None:
         check_out(args.profile_out, (), option="--profile-out")
     vehicle, effects, said = _model(args.vehicle, args.effect)
-    track = _road(args)
+    track = _rig(args) if args.excitation is not None else _road(args)
     car = car_on(vehicle, effects, said, track)
     outputs = _outputs(args.output, car.vehicle, car.structure)
     motion = _motion(args, track, float(car.structure.behind_m.max()))
+    away = COLUMNS[2:] if track.timed else ()
     try:
-        columns = recorded_drive(car, bool(effects), outputs, track, motion, args.rate,
+        columns = recorded_drive(car, bool(effects), outputs, track.begun(float(motion.time_s[0])), motion, args.rate,
                                  SensorErrors(args.noise, args.step, args.seed))
     except ValueError as error:
         raise BadInput(f"{car.vehicle.name}: {error}") from None
-    write_drive(args.out, columns)
+    write_drive(args.out, {name: one for name, one in columns.items() if name not in away})
     if args.profile_out is not None:
+        assert isinstance(track, Track)
         write_profile(args.profile_out, track)
     accel, speed_mps, distance_m = (columns[name] for name in COLUMNS[1:])
+    way = {} if track.timed else {
+        "distance_start_m": float(distance_m[0]), "distance_end_m": float(distance_m[-1]),
+        "speed_mean_mps": float(speed_mps.mean())}
     made: dict[str, Any] = {
         "vehicle": vehicle.name, "model": vehicle.model, "file": str(args.out), "samples": len(accel),
-        "rate_hz": args.rate, "duration_s": len(accel) / args.rate,
-        "distance_start_m": float(distance_m[0]), "distance_end_m": float(distance_m[-1]),
-        "speed_mean_mps": float(speed_mps.mean()), "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
+        "rate_hz": args.rate, "duration_s": len(accel) / args.rate, **way,
+        "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
         "noise_mps2": args.noise, "step_mps2": args.step, "seed": args.seed,
         "more_columns": list(columns)[len(COLUMNS):],
@@ -133,9 +144,10 @@ def _in_words(made: dict[str, Any]) -> str:
     for one in made["effects"]:
         more += f"\n  with {one['effect']}"
         more += "".join(f", {name} {value:g}" for name, value in one["parameters"].items())
+    way = (f"{made['distance_start_m']:.2f} to {made['distance_end_m']:.2f} m at {made['speed_mean_mps']:.2f} m/s on "
+           "average, " if "speed_mean_mps" in made else "")
     return (f"{made['file']}: {made['vehicle']} ({made['model'].replace('_', ' ')}), {made['duration_s']:.2f} s in "
-            f"{made['samples']} samples, {made['distance_start_m']:.2f} to {made['distance_end_m']:.2f} m at "
-            f"{made['speed_mean_mps']:.2f} m/s on average, acceleration {made['accel_rms_mps2']:.3f} m/s2 r.m.s., "
+            f"{made['samples']} samples, {way}acceleration {made['accel_rms_mps2']:.3f} m/s2 r.m.s., "
             f"{made['accel_min_mps2']:.2f} to {made['accel_max_mps2']:.2f}{more}")
 
 
@@ -144,8 +156,15 @@ def _in_words(made: dict[str, Any]) -> str:
 
 def _check_given(args: argparse.Namespace) -> None:
     """What is needed for a drive, though not for a list of effects."""
-    needed = {"--vehicle": args.vehicle, "--profile or --flat": args.profile or args.flat is not None,
-              "--speed or --speed-file": args.speed is not None or args.speed_file, "--out": args.out}
+    if args.excitation is not None:
+        others = {"--speed": args.speed is not None, "--speed-file": args.speed_file, "--obstacle": args.obstacle,
+                  "--profile-out": args.profile_out}
+        if beside := [name for name, given in others.items() if given]:
+            raise BadInput(f"{beside[0]}: expected none of it with --excitation: a rig stands, and has no road")
+    needed = {"--vehicle": args.vehicle,
+              "--profile or --flat": args.profile or args.excitation or args.flat is not None,
+              "--speed or --speed-file": args.speed is not None or args.speed_file or args.excitation,
+              "--out": args.out}
     missing = [name for name, given in needed.items() if not given]
     if missing:
         raise BadInput(f"simulate: expected {', '.join(missing)} as well (try 'ridelog simulate --help')")
@@ -154,7 +173,7 @@ def _check_given(args: argparse.Namespace) -> None:
 def _check_files(args: argparse.Namespace) -> None:
     from logger.shipped import vehicle_path
 
-    read = (vehicle_path(args.vehicle), args.profile, args.speed_file)
+    read = (vehicle_path(args.vehicle), args.profile, args.excitation, args.speed_file)
     files = [path.resolve() for path in (args.out, args.profile_out, *read) if path is not None]
     if len(set(files)) < len(files):
         raise BadInput(f"--out {args.out}: expected every file to be another one")
@@ -167,12 +186,14 @@ def _model(name: str, wanted: list[str]) -> tuple[Vehicle, tuple[Chosen, ...], d
     from logger.store.formats.vehicle_file import read_model
     from logger.vehicle.compose import with_effect
     from logger.vehicle.effect import chosen
+    from logger.vehicle.effect_sizes import sized
 
     model = read_model(vehicle_path(name))
     effects, asked = model.effects, dict[str, str]()
     for text in wanted:
         effect_name, values = named_numbers(text, "--effect")
         effect, file = effect_named(effect_name)
+        effect = effect if file else sized(effect, model.vehicle)
         if effect.name in asked:
             raise BadInput(f"--effect {text}: expected each effect once")
         asked[effect.name] = f"--effect {text}"
@@ -228,10 +249,19 @@ def _road(args: argparse.Namespace) -> Track:
         raise BadInput(str(error)) from None
 
 
-def _motion(args: argparse.Namespace, track: Track, wheelbase_m: float) -> Motion:
-    from logger.simulation.virtual_drive import at_one_speed, motion_along
+def _rig(args: argparse.Namespace) -> Excitation:
+    from logger.store.formats.excitation_file import read_excitation
+
+    return read_excitation(args.excitation)
+
+
+def _motion(args: argparse.Namespace, track: Track | Excitation, wheelbase_m: float) -> Motion:
+    from logger.profiles.excitation import Excitation
+    from logger.simulation.virtual_drive import at_one_speed, motion_along, standing
     from logger.store.formats.drive_file import read_speeds
 
+    if isinstance(track, Excitation):
+        return standing(track, args.rate)
     knots = (at_one_speed(track, wheelbase_m, args.speed) if args.speed is not None else read_speeds(args.speed_file))
     try:
         return motion_along(*knots, track.start_m, args.rate)

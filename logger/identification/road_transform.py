@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
-from logger.profiles.track import WheelPath
+from logger.profiles.track import Track, Way, WheelPath
 from logger.runs import Run
 from logger.vehicle.passage import finer, smooth_length
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
@@ -50,6 +50,7 @@ class RoadInTime:
         way = np.concatenate([distance[0] + pace_m * np.arange(-lead, 0), distance,
                               distance[-1] + ahead_m * np.arange(1, 2 * half)])
         self._way_m = finer(way, self._steps)
+        self._time_s = (np.arange(len(self._way_m)) / self._steps - lead) / rate_hz
         self._count = smooth_length(len(way) + int(np.ceil(_RETURN_S * rate_hz)))
         self._kept = slice(lead + record.first, lead + len(distance))
         damping = -np.log(_ROUND_THE_END) * rate_hz / self._count
@@ -82,6 +83,7 @@ class RoadInTime:
             part, _, leaf = name.partition(".")
             path = road.obstacles[part].slopes(patch_m)[leaf]
             return self._wheels(structure, road.speed_scale, [path, path])
+        assert isinstance(self._track, Track)  # a rig has no speed
         under = self._wheels(structure, road.speed_scale, self._track.tire_paths(patch_m), by_scale=True)
         for obstacle in road.obstacles.values():
             path = obstacle.path(patch_m)
@@ -93,8 +95,8 @@ class RoadInTime:
         if place not in self._known:
             if len(self._known) > 2:
                 self._known.clear()
-            self._known[place] = self._wheels(structure, speed_scale,
-                                              self._track.tire_paths(structure.contact_patch_m))
+            _, means = self._track.under_wheels(Way(self._way_m / speed_scale, self._time_s), structure)
+            self._known[place] = np.stack([self._transform(one) for one in means.T], axis=1)
         return self._known[place]
 
     def _wheels(self, structure: Structure, speed_scale: float, paths: Sequence[WheelPath],

@@ -109,6 +109,8 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, robust
             raise UnusableRun(run, f"expected more than {reach} samples for --low-pass {low_pass_hz:g}, found "
                                    f"{len(measured)} after the first {model.records[run].skip_s:g} s")
     kinds: dict[str, Noise] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
+    if any(record.timed for record in model.records):
+        del kinds["road"]
     return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz, robust=robust,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
                    starts=[*model.trials(), *spread_starts(model.parameters, tries)])

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import ROAD_LEVEL, Whitener
 from logger.identification.prediction_error_fit import Fit
+from logger.profiles.track import Track
 from logger.roads.iso8608 import displacement_psd
 from logger.vehicle.named_parameters import Coordinates
 from logger.vehicle.simulate import recorder_gain
@@ -99,10 +100,9 @@ class _Drive:
 
 def may_have_common(model: DriveModel) -> bool:
     """Whether there are several drives whose roads are told to be alike."""
-    first = model.records[0].track
-    alike = [one.track.start_m == first.start_m and np.array_equal(one.track.elevation_m, first.elevation_m)
-             for one in model.records]
-    return len(alike) > 1 and all(alike)
+    roads = [one.track for one in model.records if isinstance(one.track, Track)]
+    alike = [one.start_m == roads[0].start_m and np.array_equal(one.elevation_m, roads[0].elevation_m) for one in roads]
+    return 1 < len(alike) == len(model.records) and all(alike)
 
 
 def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Drive:

@@ -18,9 +18,9 @@ import numpy.typing as npt
 from logger.identification.drive_model import DriveModel
 from logger.identification.obstacle_paths import Obstacle
 from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput
-from logger.profiles.track import Track, WheelPath, WheelTracks
+from logger.profiles.track import Stance, Track, Way, WheelPath, WheelTracks, along_paths
 from logger.runs import Run
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import slope_of, steps_of
 from logger.vehicle.named_parameters import Free
@@ -43,7 +43,7 @@ class SimulatedModel(DriveModel):
     def __init__(self, vehicle: Vehicle, parameters: Sequence[Free], records: Sequence[Run],
                  road: RoadInput | None = None, effects: Sequence[Chosen] = ()) -> None:
         super().__init__(vehicle, parameters, records, road, effects)
-        self._runs = SimulatedRuns(records)
+        self._runs = SimulatedRuns(records, steps_hz(vehicle))
         self._tracks: dict[tuple[int, tuple[Obstacle, ...]], WheelTracks] = {}
 
     def predict(self, values: Array) -> list[Array]:
@@ -80,7 +80,7 @@ class SimulatedModel(DriveModel):
     def _track(self, run: int, road: RoadInput) -> WheelTracks:
         """The road of a run with what lies on it; the same object as long as nothing changes."""
         track, obstacles = self.records[run].track, tuple(road.obstacles.values())
-        if not obstacles:
+        if not obstacles or not isinstance(track, Track):
             return track
         if (run, obstacles) not in self._tracks:
             for old in [*self._tracks][: -_KEPT_TRACKS * len(self.records)]:
@@ -96,10 +96,11 @@ class _TrackWithObstacles:
     track: Track
     obstacles: tuple[Obstacle, ...]
 
-    def tire_paths(self, patch_m: float) -> Sequence[WheelPath]:
+    def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""
+        patch_m = stance.contact_patch_m
         obstacles = [one.path(patch_m) for one in self.obstacles]
-        return [_Sum([path, *obstacles]) for path in self.track.tire_paths(patch_m)]
+        return along_paths([_Sum([path, *obstacles]) for path in self.track.tire_paths(patch_m)], way, stance)
 
 
 @dataclass(frozen=True, eq=False)

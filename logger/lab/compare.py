@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
@@ -20,11 +21,13 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests
-from logger.runs import normalised_rms_error
+from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.simulated_runs import SimulatedRuns
-from logger.vehicle.compose import compose
+from logger.vehicle.compose import Car, Response, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
 
 FAR_SIGMA = 3.0
 """So many standard deviations of what a number is usually off are far: of a dozen numbers that are right, one goes as
@@ -33,16 +36,21 @@ far in thirty comparisons."""
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A model with its residuals, its error (rms residual / rms measured, all samples that count), and where it is."""
+    """A model with its residuals, its error (rms residual / rms measured, all samples that count), and where it is; and
+    its errors of other signals, by name."""
 
     residuals: ModelResiduals
     error: float
     where: Breakdown
+    signals: Mapping[str, float]
 
     @staticmethod
-    def of(residuals: ModelResiduals) -> Standing:
-        """Of a model, by its residuals."""
-        return Standing(residuals, normalised_rms_error(residuals.runs, residuals.predictions), breakdown(residuals))
+    def of(runs: SimulatedRuns, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> Standing:
+        """Of a car, by what it would have recorded and how it moved."""
+        main = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
+        residuals = ModelResiduals(runs.runs, car, main, responses)
+        return Standing(residuals, normalised_rms_error(runs.runs, main), breakdown(residuals),
+                        signal_errors(runs.runs, predictions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +102,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
-    plain = Standing.of(ModelResiduals(runs.runs, car, runs.predict(car), runs.respond(car)))
+    plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle).without_wall()
     names, deviations = posterior.prior.names, posterior.prior.deviations
     state = read_beside(fit(aligned(posterior, posterior.start(effects)))).state
@@ -103,8 +111,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
         return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), 0.0,
                           run_residual_tests(plain.residuals, plain.where, plain.residuals))
     car = posterior.car(state.effects, state.logs)
-    refitted = Standing.of(ModelResiduals(runs.runs, car, state.predictions,
-                                          runs.respond(car, posterior.moved_m(state.record))))
+    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.moved_m(state.record)))
     away = np.abs(state.logs / deviations)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):

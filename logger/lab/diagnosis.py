@@ -10,14 +10,23 @@ the car to explain that no prior allows.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
-from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_as_read, noise_of
+from logger.lab.likelihood.noise_floor import (
+    UNEXPLAINED,
+    Noise,
+    SignalErrors,
+    excess,
+    floor_error,
+    noise_as_read,
+    noise_of,
+    signal_errors_of,
+)
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.unexplained import Shape, shape_of
@@ -83,6 +92,7 @@ class Diagnosis:
     undetectable         effects that these runs could not show at their usual strength
     shape                of what no candidate explains; None where no more than noise is left
     distance_error_m     by how much a distance is off at most, if that is more than usual; else 0
+    signals              errors of signals beside the sensor's acceleration, by name
     """
 
     runs: tuple[str, ...]
@@ -101,6 +111,7 @@ class Diagnosis:
     undetectable: tuple[Undetectable, ...]
     shape: Shape | None
     distance_error_m: float
+    signals: Mapping[str, SignalErrors] = field(default_factory=dict)
 
     @property
     def left_over(self) -> bool:
@@ -158,6 +169,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         steps=_steps(selection, posterior.error(nominal)), effects=with_errors, undetectable=hidden,
         shape=shape_of(fine, state) if above > UNEXPLAINED else None,
         distance_error_m=unusual_m(fine.record_errors, state.record),
+        signals=signal_errors_of(fine, fine.start(present), state),
     )
 
 
@@ -168,11 +180,12 @@ def refitted(posterior: Posterior, nominal: State) -> Baseline:
 
 def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
-    two_tracks = all(run.two_tracks for run in posterior.runs.runs)
+    runs = posterior.runs.runs
+    two_tracks, timed = all(run.two_tracks for run in runs), all(run.timed for run in runs)
     there = {one.effect.name for one in present}
     found = {}
     for name, effect in effects.items():
-        why = HAS_IT if name in there else effect.obstacle(posterior.vehicle, two_tracks)
+        why = HAS_IT if name in there else effect.obstacle_on(posterior.vehicle, two_tracks, timed)
         if why is not None:
             found[name] = why
     return found

@@ -37,11 +37,40 @@ class WheelPath(Protocol):
         """As ``TirePath``."""
 
 
-class WheelTracks(Protocol):
-    """A road, as cars need it."""
+class Stance(Protocol):
+    """Where the wheels (w,) of a car stand: behind the front ones, left of the middle; and their patch [m]."""
 
-    def tire_paths(self, patch_m: float) -> Sequence[WheelPath]:
-        """As ``Track``."""
+    @property
+    def behind_m(self) -> Array: ...
+
+    @property
+    def left_m(self) -> Array: ...
+
+    @property
+    def contact_patch_m(self) -> float: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """The way of a car in fine steps of time, (M,) each: where the front tires stand [m], and when, from the first
+    sample of the record on [s]."""
+
+    distance_m: Array
+    time_s: Array
+
+
+class WheelTracks(Protocol):
+    """What moves the wheels of cars: a road that they drive along, or a rig that they stand on."""
+
+    def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
+        """Elevations (M, w) under the wheels on a way, and their means (M - 1, w) over each step [m]."""
+
+
+def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:
+    """As ``WheelTracks``, of the paths of a road, left and right: each wheel meets it where it stands."""
+    wheels = [(paths[-1] if left_m < 0 else paths[0]).step_means(way.distance_m - behind_m)
+              for behind_m, left_m in zip(stance.behind_m, stance.left_m, strict=True)]
+    return np.stack([one for one, _ in wheels], axis=1), np.stack([mean for _, mean in wheels], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +87,8 @@ class Track:
     spacing_m: float
     elevation_m: Array
     start_m: float = 0.0
+
+    timed = False
 
     def __post_init__(self) -> None:
         if not 0 < self.spacing_m < np.inf or not np.isfinite(self.start_m):
@@ -77,6 +108,24 @@ class Track:
     def end_m(self) -> float:
         """Where the last sample lies [m]."""
         return self.start_m + self.spacing_m * (len(self.elevation_m) - 1)
+
+    @property
+    def two_tracks(self) -> bool:
+        """Whether the road is known under the right wheels too."""
+        return self.elevation_m.ndim == 2
+
+    def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
+        """As ``WheelTracks``."""
+        return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
+
+    def begun(self, later_s: float) -> Track:
+        """The same for a record that begins so much later [s]: a road stays where it is."""
+        return self
+
+    def under_axle(self, way: Way, behind_m: float, patch_m: float) -> Array:
+        """Elevations (M,) under an axle so far behind the front one, tracks averaged [m]."""
+        height = self.averaged(way.distance_m - behind_m, patch_m)
+        return np.asarray(height.reshape(len(height), -1).mean(axis=1))
 
     def tire_paths(self, patch_m: float) -> tuple[TirePath, ...]:
         """What tires of this patch [m, 0 or more] meet on each track: one path, or the left and the right one."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from logger.lab.selection.add_effect import BIASED, AddedEffects, Number
-from logger.report.quantities import chance, distance_error, finite, numbers_of
+from logger.report.quantities import chance, distance_error, finite, numbers_of, signal_errors
 
 _AT_BOUND = 1e-6
 _NAMED = 4
@@ -26,6 +26,8 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
 def judgement(found: AddedEffects) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
     lines = [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
+    lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
+                           "{} refitted without it, {} with it, its noise alone about {}")
     lines += distance_error(found.distance_error_m)
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.moves
@@ -89,5 +91,7 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
                      "with_standard_error": one.standard_error, "shift_standard_errors": one.shift,
                      "written": one.written}
                     for one in found.moved],
+        "signals": {name: {"error_refitted": one.before, "error_after": one.after,
+                           "noise_floor_error": one.noise_floor} for name, one in found.signals.items()},
         "biased": [one.name for one in found.moved if one.biased],
     }

@@ -10,7 +10,7 @@ from logger.lab.compare import FAR_SIGMA, Comparison, Standing
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
-from logger.report.quantities import distance_error
+from logger.report.quantities import distance_error, signal_errors
 from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error
 
@@ -33,6 +33,8 @@ def headline(found: Comparison) -> list[str]:
                      "residual's power.")
     else:
         lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
+    lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
+                           "{}, refitted {}")
     lines += distance_error(found.distance_error_m)
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
@@ -83,7 +85,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
 def _standing_json(standing: Standing) -> dict[str, Any]:
     residuals, where = standing.residuals, standing.where
     return {
-        "error": standing.error,
+        "error": standing.error, "signals": dict(standing.signals),
         "runs": [{"run": run.name, "error": _finite(normalised_rms_error([run], [prediction])),
                   "samples": run.count - run.first}
                  for run, prediction in zip(residuals.runs, residuals.predictions, strict=True)],

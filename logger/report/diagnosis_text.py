@@ -10,7 +10,7 @@ from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
-from logger.report.quantities import chance, distance_error, finite, numbers_of
+from logger.report.quantities import chance, distance_error, finite, numbers_of, signal_errors
 from logger.vehicle.effect import Chosen
 
 JUDGED_ON = "stretches that no fit saw"
@@ -36,6 +36,8 @@ def summary(found: Diagnosis) -> list[str]:
                      "there, or an effect is missing that no candidate explains.")
     lines += distance_error(found.distance_error_m)
     lines.append(_errors(found))
+    lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
+                           "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
     lines += [_confusion(found, one) for one in found.missing if found.candidate(one.effect.name).confused_with]
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
@@ -119,6 +121,8 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
             for one in found.candidates],
         "verdict": list(found.verdict), "unexplained": found.unexplained,
         "left_over_noise": 1 + found.excess, "numbers_off_too_far": dict(found.conflicts),
+        "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
+                    for name, one in found.signals.items()},
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},

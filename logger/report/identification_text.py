@@ -153,6 +153,9 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
     if fit.at_bound:
         yield (f"At a bound: {', '.join(fit.at_bound)}. That is where it was stopped, not what was measured; its "
                "standard error means nothing. Widen --bounds, or ask what the model lacks.")
+        if fit.noise.name != "white":
+            yield ("Coloured noise takes what the model misses for noise, most of all in a sweep, which has one "
+                   "frequency at a time: try --noise white.")
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in fit.free if one.by_factors]

@@ -20,11 +20,11 @@ from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.residual_text import error_text, paired
+from logger.report.worst_moment import worst_moment
 from logger.runs import short_names
 
 Array = npt.NDArray[np.float64]
 
-_AROUND_S = 1.5
 _BODY_HZ = 5.0
 _QUIET_DB = -80.0
 _MOST_RUNS = 8
@@ -55,19 +55,12 @@ def _tiles(found: Comparison) -> Html:
 
 
 def _worst_place(standing: Standing) -> Html:
-    residuals, worst = standing.residuals, worst_places(standing.where, 1)[0]
-    index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
-    run, residual = residuals.runs[index], residuals.residual[index]
-    at_m = run.distance_m[run.first:]
-    inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
-    middle = int(inside[np.abs(residual[inside]).argmax()])
-    reach = round(_AROUND_S * residuals.rate_hz)
-    part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(residual)))[part] / residuals.rate_hz
+    residuals, worst = standing.residuals, worst_moment(standing)
+    index, part = worst.run, worst.part
+    time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
         ("measured", residuals.measured), ("what is left", residuals.residual), ("model", residuals.model)))
-    title = f"{short_names(residuals.runs)[run.name]}, around {at_m[middle]:.0f} m"
-    return section("The worst place", chart(Curves(title, "time in the run [s]", "acceleration [m/s2]", lines)))
+    return section("The worst place", chart(Curves(worst.words, "time in the run [s]", "acceleration [m/s2]", lines)))
 
 
 def spectra_section(residuals: ModelResiduals) -> Html:
@@ -91,6 +84,8 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
 
 
 def _places(standing: Standing) -> Html:
+    if not standing.where.place:
+        return EMPTY
     lines, names = [], short_names(standing.residuals.runs)
     for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
@@ -123,7 +118,7 @@ def _alignment(found: Comparison) -> Html:
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
-    if not lines:
+    if not lines or all(run.timed for run in runs):
         return EMPTY
     drawn = chart(Curves("How far the model runs ahead of the measurement", "way into the run [m]", "time [ms]",
                            tuple(lines), (0.0, "together")))
@@ -138,7 +133,7 @@ def _alignment(found: Comparison) -> Html:
 def _tables(found: Comparison) -> Html:
     plain, refitted = found.plain.where, found.refitted.where
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
-            + _table("By speed", "m/s", plain.speed, refitted.speed)
+            + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
             + _table("By how strongly the road moves the car", "m/s2", plain.amplitude, refitted.amplitude))
 
 

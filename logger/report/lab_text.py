@@ -37,11 +37,11 @@ def _tables(found: Comparison) -> list[str]:
     for title, unit, one, other in (
         ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
     ):
-        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))]
+        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))] if other else []
     lines += ["Model's acceleration", *(_row(None, part, "m/s2") for part in refitted.amplitude)]
     names = short_names(found.plain.residuals.runs)
-    lines += ["Worst places", *(_place(part, names[part.name]) for part in worst_places(refitted, _PLACES))]
-    return lines
+    places = [_place(part, names[part.name]) for part in worst_places(refitted, _PLACES)]
+    return [*lines, "Worst places", *places] if places else lines
 
 
 def _row(plain: Part | None, refitted: Part, unit: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import floor, isfinite, log10
 
 from logger.vehicle.effect import Chosen
@@ -67,6 +67,12 @@ def chance(p_value: float) -> str:
 def finite(errors: Mapping[str, float]) -> dict[str, float]:
     """Those standard errors that are known."""
     return {name: error for name, error in errors.items() if isfinite(error)}
+
+
+def signal_errors(errors: Mapping[str, Sequence[float]], words: str) -> list[str]:
+    """A sentence on the errors of other signals, by name, as many of each as ``words`` has places; none for none."""
+    each = "; ".join(f"{name} {words.format(*(f'{one:.3f}' for one in some))}" for name, some in errors.items())
+    return [f"Errors of the other signals: {each}."] if each else []
 
 
 def distance_error(off_m: float) -> list[str]:

@@ -99,7 +99,9 @@ def _gain(test: ResidualTest) -> str:
 
 def _shift(test: ResidualTest, time_s: float, length_m: float, is_time: bool | None) -> str:
     as_time, as_length = f"{abs(time_s) * 1000:.0f} ms", f"{abs(length_m):.2f} m"
-    if is_time is None:
+    if not np.isfinite(length_m):  # a rig has no speed
+        words = f"{as_time} all along"
+    elif is_time is None:
         words = f"about {as_time} or {as_length}; drives at other speeds would tell which"
     else:
         words = f"{as_time if is_time else f'{as_length} of road'}, whatever the speed"

@@ -6,7 +6,6 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
-from logger.lab.residuals.residual_tests import worst_places
 from logger.lab.session import Round, Story
 from logger.report.add_effect_text import MOVED_HEADS, MOVED_HINT, errors, judgement, moved_rows
 from logger.report.charts import chart
@@ -16,11 +15,10 @@ from logger.report.diagnosis_text import summary, untested
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated
 from logger.report.session_text import ending, steps
-from logger.runs import short_names
+from logger.report.worst_moment import worst_moment
 
 STEPS_HINT = ("From step 1 on the car's numbers and the distances are refitted within their tolerance; as "
               "the files are written, and on the distances as recorded, errors are larger.")
-_AROUND_S = 1.5
 _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
 
@@ -94,19 +92,12 @@ def residual_spectra(story: Story) -> Html:
 def _place(story: Story) -> Html:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
-    worst = worst_places(before.where, 1)[0]
-    residuals = before.residuals
-    index = next(i for i, run in enumerate(residuals.runs) if run.name == worst.name)
-    run, residual = residuals.runs[index], residuals.residual[index]
-    at_m = run.distance_m[run.first:]
-    inside = np.flatnonzero((at_m >= worst.low) & (at_m < worst.high))
-    middle = int(inside[np.abs(residual[inside]).argmax()])
-    reach = round(_AROUND_S * residuals.rate_hz)
-    part = slice(max(0, middle - reach), middle + reach)
-    time_s = (run.first + np.arange(len(residual)))[part] / residuals.rate_hz
-    name = short_names(residuals.runs)[run.name]
+    worst, residuals = worst_moment(before), before.residuals
+    index, part = worst.run, worst.part
+    residual = residuals.residual[index]
+    time_s = (residuals.runs[index].first + np.arange(len(residual)))[part] / residuals.rate_hz
     lines = (Line("measured", time_s, residuals.measured[index][part]),
              Line("residual at first", time_s, residual[part]),
              Line("residual at last", time_s, after.residuals.residual[index][part]))
-    return chart(Curves(f"Where it was worst at first: {name}, around {at_m[middle]:.0f} m", "time in the run [s]",
+    return chart(Curves(f"Where it was worst at first: {worst.words}", "time in the run [s]",
                           "acceleration [m/s2]", lines))

@@ -15,17 +15,30 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.profiles.track import WheelTracks
-from logger.runs import Run
-from logger.vehicle.compose import MOST_MPS2, Car, Response, recorded, respond
+from logger.runs import Run, Signal
+from logger.vehicle.compose import MOST_MPS2, Car, Response, respond
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
+from logger.vehicle.observe import recorded_signals
 from logger.vehicle.passage import Passage
 from logger.vehicle.simulate import FINE_RATE_HZ
+from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
 _KEPT_PASSAGES = 4
 _STEPPERS = 2
+_HOP_HZ = 13.0  # of a car's wheels
+_MOST_FINER = 16
 # Dry friction changes at once: it needs so many times the steps that other laws need.
 _FINER_IF_IT_RUBS = 2
+
+
+def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
+    """Steps a second in which a vehicle is simulated: as usual for one whose wheels hop as those of cars do, twice as
+    many for one an octave quicker, and so on up to four octaves."""
+    quickest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[-1])
+    return usual_hz * float(np.clip(2 ** np.round(np.log2(quickest_hz / _HOP_HZ)), 1, _MOST_FINER))
 
 
 class SimulatedRuns:
@@ -42,7 +55,7 @@ class SimulatedRuns:
 
     def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False,
                 tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
-        """What would have been recorded in each run, (n,) whole [m/s2].
+        """What would have been recorded in each run, whole (n,) [m/s2]; of one with more signals all ((1 + s) n,).
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         rough      step a car that rubs no finer than others: what a change does is told well enough by that
@@ -50,7 +63,8 @@ class SimulatedRuns:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._laid_out(car, moved_m, rough, tracks)
-        each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(partial(_recorded, car), passages)
+        each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
+            partial(_recorded, car), passages, [run.signals for run in self.runs])
         return list(each)
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
@@ -76,7 +90,7 @@ class SimulatedRuns:
         return found
 
 
-def _recorded(car: Car, passage: Passage) -> Array:
+def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...]) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
-        found = recorded(car, passage)
+        found = recorded_signals(car, passage, signals)
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.roads.obstacles import OBSTACLES
 from logger.vehicle.compose import Car, bounded, recorded
@@ -154,11 +155,21 @@ def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: floa
     return Motion(time_s, speed_mps, start_m + driven)
 
 
+def standing(excitation: Excitation, rate_hz: float) -> Motion:
+    """The motion, none, at a recorder's instants on a rig as long as it is driven.
+
+    ValueError as ``motion_along``.
+    """
+    last_s = excitation.end_s - excitation.start_s
+    still = motion_along(np.array([0.0, last_s]), np.zeros(2), 0.0, rate_hz)
+    return replace(still, time_s=excitation.start_s + still.time_s)
+
+
 # --- what is felt ---
 
 
 def response(
-    structure: Structure, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float
+    structure: Structure, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion, rate_hz: float
 ) -> dict[str, Array]:
     """The outputs (n,) of a car without effects, which came to the start on a flat road as fast as it goes there."""
     pace_m = float(motion.distance_m[1] - motion.distance_m[0])
@@ -172,7 +183,7 @@ def response(
 
 
 def response_with_effects(
-    car: Car, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float
+    car: Car, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion, rate_hz: float
 ) -> tuple[dict[str, Array], Motion]:
     """The outputs (n,) of a car with effects, that of ``SENSOR`` behind the sensor's own, and the motion as it is
     recorded.
@@ -205,8 +216,8 @@ def _accelerations(car: Car, passage: Passage) -> Array:
 
 
 def recorded_drive(
-    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track, motion: Motion, rate_hz: float,
-    errors: SensorErrors,
+    car: Car, has_effects: bool, outputs: Mapping[str, Output], track: Track | Excitation, motion: Motion,
+    rate_hz: float, errors: SensorErrors,
 ) -> dict[str, Array]:
     """The columns (n,) of a drive's file, by name: those of the outputs last, but for that of ``SENSOR``.
 

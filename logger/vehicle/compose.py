@@ -41,6 +41,7 @@ class Car:
     sensors      effects between body and record, in order
     drives       effects on the position signal, in order
     body         equal for two cars whose bodies move alike where the sensor sits
+    shift_m      by how much its effects moved its centre of gravity ahead; what is bolted to the body stays
     """
 
     vehicle: Vehicle
@@ -51,6 +52,7 @@ class Car:
     drives: tuple[Chosen, ...]
     bends_laws: bool
     body: Hashable
+    shift_m: float = 0.0
 
     @property
     def rubs(self) -> bool:
@@ -91,7 +93,7 @@ class Response:
 
 def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     """A vehicle with its effects. ValueError when it lacks what its model or an effect needs."""
-    given = vehicle.model
+    given, front_m = vehicle.model, vehicle.front.cg_distance_m
     ordered = sorted(effects, key=lambda one: (one.effect.stage, one.effect.name))
     for one in ordered:
         if isinstance(one.effect, VehicleEffect):
@@ -116,7 +118,8 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
         (one.effect, *sorted(one.values.items())) for one in ordered if not isinstance(one.effect, around)))
     return Car(vehicle, structure, tuple(laws), row,
                tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
-               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body)
+               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body,
+               front_m - vehicle.front.cg_distance_m)
 
 
 def recorded(car: Car, passage: Passage) -> Array:
@@ -157,7 +160,7 @@ def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws:
         return march(car.structure, car.laws, *passage.under_wheels(car.structure), passage.step_s, passage.way)
-    states = _in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
+    states = in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 
 
@@ -180,11 +183,11 @@ def _linear(car: Car, passage: Passage) -> Array:
     """The sensor's acceleration at the fine instants (M,), of a car without laws of its own."""
     n = len(car.structure.mass)
     a, b = car.structure.state_space()
-    seen = _in_blocks(car.structure, passage, (car.row @ a[n:])[None])[:, 0]
+    seen = in_blocks(car.structure, passage, (car.row @ a[n:])[None])[:, 0]
     return np.asarray(seen + passage.under_wheels(car.structure)[0] @ (car.row @ b[n:]))
 
 
-def _in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
+def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car from rest."""
     elevation, mean = passage.under_wheels(structure)
     a, b = structure.state_space()

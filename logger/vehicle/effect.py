@@ -36,6 +36,8 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _AT_END = 1e-3
+ON_A_RIG = "it needs a road and a speed, and the run is driven by time"
+"""Why some effects cannot be tried on a rig."""
 
 
 class Scale(Enum):
@@ -148,6 +150,7 @@ class Effect(ABC):
     reshapes     whether it does more than that
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     sought       whether a search tries it where nobody asked for it by name
+    needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     """
 
     name: str
@@ -160,6 +163,7 @@ class Effect(ABC):
     reshapes: bool = True
     replaces: tuple[str, ...] = ()
     sought: Sought = Sought.ALWAYS
+    needs_road: bool = False
     stage: int = 0
 
     @property
@@ -170,6 +174,10 @@ class Effect(ABC):
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         """Why it cannot be there in this vehicle on this road; None if it can."""
         return None
+
+    def obstacle_on(self, vehicle: Vehicle, two_tracks: bool, timed: bool) -> str | None:
+        """The same where runs may be driven by time (``timed``)."""
+        return ON_A_RIG if timed and self.needs_road else self.obstacle(vehicle, two_tracks)
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         """Values of all its parameters that a search begins at; some effects look at how the runs are misaligned."""
@@ -197,6 +205,8 @@ class Effect(ABC):
 
 class DriveEffect(Effect):
     """The position signal."""
+
+    needs_road = True
 
     @abstractmethod
     def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:

@@ -62,7 +62,7 @@ def look_through(effect: object) -> Effect:
 
 
 def _look_at_words(effect: Effect) -> None:
-    for word in ("realigns", "reshapes"):
+    for word in ("realigns", "reshapes", "needs_road"):
         if not isinstance(getattr(effect, word), bool):
             raise ValueError(f"expected True or False as {word}, found {getattr(effect, word)!r}")
     if not isinstance(effect.sought, Sought):

@@ -15,9 +15,8 @@ from collections.abc import Callable, Hashable
 import numpy as np
 import numpy.typing as npt
 
-from logger.profiles.track import WheelTracks
+from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.simulate import FINE_RATE_HZ, recorder_taps
-from logger.vehicle.stepping import Way
 from logger.vehicle.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -37,9 +36,9 @@ _EVEN = 1e-3
 class Passage:
     """One drive: N samples at an even rate.
 
-    track         the road
+    track         the road, or the rig
     rate_hz       samples a second
-    distance_m    (N,) where the front tires stand at each sample [m]
+    distance_m    (N,) where the front tires stand at each sample [m]; on a rig 0
     fine_hz       at least so many steps a second
 
     ValueError unless there are two or more finite distances.
@@ -56,7 +55,8 @@ class Passage:
         pace_m, ahead_m = distance_m[1] - distance_m[0], distance_m[-1] - distance_m[-2]
         way = np.concatenate([distance_m[0] + pace_m * np.arange(-self._lead, 0), distance_m,
                               distance_m[-1] + ahead_m * np.arange(1, self._tail + 1)])
-        self._way_m = finer(way, self.steps)
+        way_m = finer(way, self.steps)
+        self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - self._lead * self.steps) * self.step_s))
         coarse = len(way) + round(_REST_S * rate_hz)
         self._coarse = smooth_length(coarse)
         f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
@@ -72,12 +72,12 @@ class Passage:
     @property
     def fine_count(self) -> int:
         """Instants that a car is stepped through, one more than the steps."""
-        return len(self._way_m)
+        return len(self._way.time_s)
 
     @property
     def way(self) -> Way:
         """Where the front tires are at the fine instants, and when."""
-        return Way(self._way_m, np.asarray((np.arange(self.fine_count) - self._lead * self.steps) * self.step_s))
+        return self._way
 
     def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
@@ -85,19 +85,15 @@ class Passage:
         place = (structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m))
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
-            paths = self.track.tire_paths(structure.contact_patch_m)
-            wheels = [
-                (paths[-1] if left_m < 0 else paths[0]).step_means(self._way_m - behind_m)
-                for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True)
-            ]
-            level = wheels[0][0][0]
-            known = (np.stack([one for one, _ in wheels], axis=1) - level,
-                     np.stack([mean for _, mean in wheels], axis=1) - level)
+            elevation, mean = self.track.under_wheels(self._way, structure)
+            level = elevation[0, 0]
+            known = elevation - level, mean - level
             self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}
         return known
 
     def recorded(self, fine: Array, factor: Callable[[Complex], Complex]) -> Array:
-        """What the recorder keeps of an acceleration at the fine instants (M,): samples (N,).
+        """What the recorder keeps of an acceleration at the fine instants (M,): samples (N,); or of several signals
+        (c, M), of which it is the first: (c, N).
 
         factor    of what lies between the body and the recorder, by s (f,) [1/s]
         """
@@ -116,10 +112,14 @@ class Passage:
         return self._kept(transform, factor)
 
     def _transform(self, fine: Array) -> Complex:
-        return np.asarray(np.fft.rfft(fine, self._coarse * self.steps)[: len(self._s)] * self._recorder)
+        return np.asarray(np.fft.rfft(fine, self._coarse * self.steps)[..., : len(self._s)] * self._recorder)
 
     def _kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
-        return np.fft.irfft(transform * factor(self._s), self._coarse)[self._lead : self._lead + self.count]
+        if transform.ndim == 1:
+            behind = transform * factor(self._s)
+        else:
+            behind = np.concatenate([transform[:1] * factor(self._s), transform[1:]])
+        return np.fft.irfft(behind, self._coarse)[..., self._lead : self._lead + self.count]
 
     def sampled(self, fine: Array) -> Array:
         """Fine instants (M, ...) at the samples (N, ...), as they are."""

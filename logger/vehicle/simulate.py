@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp import kaiser
-from logger.profiles.track import Track
+from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.state_space import driven_outputs, straight_step
 from logger.vehicle.structure import Output, Structure
 
@@ -39,7 +39,8 @@ _EVEN = 1e-3
 
 
 def simulate(
-    structure: Structure, outputs: Sequence[Output], track: Track, time_s: npt.ArrayLike, distance_m: npt.ArrayLike
+    structure: Structure, outputs: Sequence[Output], track: WheelTracks, time_s: npt.ArrayLike,
+    distance_m: npt.ArrayLike,
 ) -> Array:
     """Outputs (N, p) of a car at the instants given, not filtered.
 
@@ -59,7 +60,7 @@ def simulate(
 def drive(
     structure: Structure,
     outputs: Sequence[Output],
-    track: Track,
+    track: WheelTracks,
     time_s: npt.ArrayLike,
     distance_m: npt.ArrayLike,
     oversample: int | None = None,
@@ -94,6 +95,15 @@ def recorder_taps(steps: int) -> Array:
     return kaiser.low_pass_taps(_HALF_SAMPLES * steps, steps, PASS_OF_RATE + STOP_OF_RATE, STOP_DB)
 
 
+def resampled(samples: Array, factor: int) -> Array:
+    """Every ``factor``-th of samples (n,) behind the recorder's filter at the lower rate; both ends are continued by
+    their mirror image about the last sample."""
+    taps = recorder_taps(factor)
+    half = min(len(taps) // 2, len(samples) - 1)
+    around = np.pad(samples, half, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(np.pad(around, len(taps) // 2 - half, mode="edge"), taps, "valid")[::factor])
+
+
 def recorder_gain(f_of_rate: Array) -> Array:
     """The size of the recorder's gain at shares of its rate (f,)."""
     gains = np.abs(np.fft.rfft(recorder_taps(_GAIN_STEPS), _GAIN_GRID))
@@ -113,13 +123,14 @@ def _checked(time_s: npt.ArrayLike, distance_m: npt.ArrayLike) -> tuple[Array, A
 
 
 def _respond(
-    structure: Structure, outputs: Sequence[Output], track: Track, step_s: float, distance: Array
+    structure: Structure, outputs: Sequence[Output], track: WheelTracks, step_s: float, distance: Array
 ) -> tuple[Array, Array, Array]:
     """What the car's own motion gives to the outputs (N, p); elevations (N, w) and their means in each step (N - 1, w).
 
     What is missing in the outputs is what they contain of the road directly.
     """
-    elevations, means = _under_wheels(structure, track, distance)
+    way = Way(distance, np.asarray(step_s * np.arange(len(distance)), float))
+    elevations, means = track.under_wheels(way, structure)
     # Elevations count from a level near the first ones, so that no digits go into the height of the country.
     level = elevations[0].mean()
     around = np.concatenate([2 * elevations[:1] - means[:1], means, 2 * elevations[-1:] - means[-1:]])
@@ -131,16 +142,6 @@ def _respond(
     rest = np.concatenate([still @ (elevations[0] - level), np.zeros(len(still))])
     response = driven_outputs(transition, gain, observe, np.hstack([means - level, rise]), rest)
     return response + level * (observe[:, :len(still)] @ still.sum(axis=1)), elevations, means
-
-
-def _under_wheels(structure: Structure, track: Track, distance: Array) -> tuple[Array, Array]:
-    """Elevations under the wheels (N, w) at the front tires' distances, and their means in each step (N - 1, w)."""
-    paths = track.tire_paths(structure.contact_patch_m)
-    per_wheel = [
-        (paths[-1] if left_m < 0 else paths[0]).step_means(distance - behind_m)
-        for behind_m, left_m in zip(structure.behind_m, structure.left_m, strict=True)
-    ]
-    return np.stack([one for one, _ in per_wheel], axis=1), np.stack([mean for _, mean in per_wheel], axis=1)
 
 
 def _smooth(elevations: Array, means: Array) -> Array:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
 from logger.vehicle.state_space import straight_step
@@ -60,18 +61,6 @@ def force_input(structure: Structure) -> Array:
     """What forces at the suspensions, then at the tires, do to the state's derivative (2 n, 2 w)."""
     onto = -np.hstack([structure.travel.T, structure.wheels.T])
     return np.vstack([np.zeros_like(onto), np.linalg.solve(structure.mass, onto)])
-
-
-@dataclass(frozen=True, eq=False)
-class Way:
-    """Where and when a car is, for laws that ask for it.
-
-    distance_m    (M,) of the front tires along the road
-    time_s        (M,) since the record's first sample
-    """
-
-    distance_m: Array
-    time_s: Array
 
 
 def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, mean: Array, step_s: float,

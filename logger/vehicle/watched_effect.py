@@ -53,7 +53,7 @@ class _Watched(Effect):
         self.name, self.title, self.parameters = own.name, own.title, own.parameters
         self.source, self.signature, self.shown_by = own.source, own.signature, own.shown_by
         self.realigns, self.reshapes, self.replaces = own.realigns, own.reshapes, own.replaces
-        self.sought, self.stage = own.sought, own.stage
+        self.sought, self.needs_road, self.stage = own.sought, own.needs_road, own.stage
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         with self._blame():

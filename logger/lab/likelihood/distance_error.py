@@ -186,17 +186,22 @@ class RecordError:
         return np.concatenate([curve, np.zeros(self.count - len(curve))])
 
     def recorded(self, prediction: Array, k: Array) -> Array:
-        """A prediction (n,) as such a recorder has it."""
-        rise = rate_of_change(prediction, self.run.rate_hz)
-        return np.asarray(prediction + k[len(self.basis) :] @ _by_recorder(prediction, rise, self.run))
+        """A prediction (n,), or more signals joined to it, as such a recorder has it."""
+        main = self.run.main(prediction)
+        rise = rate_of_change(main, self.run.rate_hz)
+        found = np.asarray(main + k[len(self.basis) :] @ _by_recorder(main, rise, self.run))
+        return np.concatenate([found, prediction[len(main) :]]) if len(main) < len(prediction) else found
 
     def slopes(self, prediction: Array) -> Array:
-        """What each of k does to a prediction (n,): (k, n) [m/s2 per unit]."""
-        rise = rate_of_change(prediction, self.run.rate_hz)
-        by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
+        """What each of k does to a prediction (n,), or more signals joined to it: (k, n) [m/s2 per unit]. They are all
+        where the car was; the recorder's numbers are those of the sensor."""
+        n, places = self.run.count, len(self.basis)
         found = np.empty((self.count, len(prediction)))
-        np.multiply(self.basis, by_place, out=found[: len(self.basis)])
-        found[len(self.basis) :] = _by_recorder(prediction, rise, self.run)
+        for start in range(0, len(prediction), n):
+            rise = rate_of_change(prediction[start : start + n], self.run.rate_hz)
+            by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
+            np.multiply(self.basis, by_place, out=found[:places, start : start + n])
+            found[places:, start : start + n] = 0.0 if start else _by_recorder(prediction[:n], rise, self.run)
         return found
 
 

@@ -33,7 +33,7 @@ class Lags:
     run           which run it is in
     along_m       how far into the run [m]
     lag_s, error_s    how much later than the model the measurement is: the model is ahead where it is above 0
-    speed_mps     in the window
+    speed_mps     in the window; NaN on a rig
     """
 
     run: npt.NDArray[np.intp]
@@ -58,19 +58,19 @@ class Trend:
 
 
 def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
-    """The windows of runs beside a model's predictions (n,)."""
+    """The windows of runs beside a model's predictions (n,), or ((1 + s) n,) of all signals."""
     rows: list[tuple[float, ...]] = []
     for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
-        rows += _windows(number, run, prediction)
+        rows += _windows(number, run, run.main(prediction))
     table = np.array(rows).reshape(-1, 5).T
     return Lags(table[0].astype(np.intp), *table[1:])
 
 
 def followed_m(run: Run, prediction: Array) -> Array:
     """By how much the car seems to have been farther than a model of it (n,) [m], straight between windows in which
-    both are alike; nothing where there are none."""
+    both are alike; nothing where there are none, and on a rig."""
     windows = lags([run], [prediction])
-    if not len(windows.run):
+    if run.timed or not len(windows.run):
         return np.zeros(run.count)
     places_m = np.maximum.accumulate(windows.along_m)
     return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))
@@ -154,7 +154,7 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
         middle = start + size // 2
         found.append((number, run.distance_m[middle] - run.distance_m[0],
                       lag / run.rate_hz + (late / gain if gain else 0.0), error_s,
-                      max(float(run.speed_mps[start : start + size].mean()), SLOWEST_MPS)))
+                      np.nan if run.timed else max(float(run.speed_mps[start : start + size].mean()), SLOWEST_MPS)))
     return found
 
 

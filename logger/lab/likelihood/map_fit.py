@@ -20,6 +20,7 @@ from logger.fitting.levenberg_marquardt import minimise
 from logger.lab.likelihood.lag import followed_m, shift_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
 
@@ -126,9 +127,9 @@ def _shifted(posterior: Posterior, state: State, worth: float) -> LinearModel | 
     for run, error, k, prediction in zip(posterior.runs.runs, posterior.record_errors, state.record, state.predictions,
                                          strict=True):
         off_m = run.facts.place_std_m or 0.0
-        if off_m > _FAR_M:
+        if off_m > _FAR_M and isinstance(run.track, Track):
             moved_m = error.moved_m(k)
-            farther_m = shift_m(run.distance_m + moved_m, run.measured_mps2, prediction,
+            farther_m = shift_m(run.distance_m + moved_m, run.measured_mps2, run.main(prediction),
                                 (run.track.start_m, run.track.end_m), _REACH_SIGMA * off_m)
             if farther_m:
                 k, moves = error.through(moved_m + farther_m), True

@@ -15,7 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.runs import signal_errors
 
 Array = npt.NDArray[np.float64]
 
@@ -40,16 +42,43 @@ class Noise:
     standard_error_mps2: float
 
 
+@dataclass(frozen=True)
+class SignalErrors:
+    """Of one signal: normalised r.m.s. errors before and after, and the error that its noise makes."""
+
+    before: float
+    after: float
+    noise_floor: float
+
+
 def noise_of(posterior: Posterior, state: State) -> Noise:
     """The sensor's noise under the residuals of a fitted state; without its rounding where the readings' bounds are
     taken for what they say."""
-    residuals = [one.noise_in(left) for one, left in zip(posterior.readings, posterior.residuals(state), strict=True)]
-    return sensor_noise(posterior.bands, residuals, DISCREPANCY * posterior.size_mps2)
+    main = _by_signal(posterior, state)[0]
+    scaled = [residual * np.sqrt(share) for residual, share in zip(main.residuals, main.shares, strict=True)]
+    return sensor_noise(main.bands, scaled, DISCREPANCY * posterior.size_mps2)
 
 
 def noise_as_read(posterior: Posterior, state: State) -> Noise:
     """The same of readings as they were read: rounding adds a twelfth of the step's square to what the noise has."""
     return noise_of(posterior.as_read(), state)
+
+
+def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[str, SignalErrors]:
+    """Errors of the signals beside the sensor's acceleration, by name, under one model and under another."""
+    was, now = (signal_errors(posterior.runs.runs, one.predictions) for one in (before, after))
+    _, *others = _by_signal(posterior, after)
+    return {one.name: SignalErrors(was[one.name], now[one.name], _noise_of(one).deviation_mps2 / one.size)
+            for one in others}
+
+
+def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
+    """What a state leaves of each signal, the sensor's acceleration first."""
+    return by_signal(posterior.readings, posterior.bands, posterior.residuals(state))
+
+
+def _noise_of(one: SignalResiduals) -> Noise:
+    return sensor_noise(one.bands, one.residuals, DISCREPANCY * one.size)
 
 
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
@@ -87,25 +116,34 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
 def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
     """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
     least 0. Bands that are quiet make up for those that are not."""
-    noise = ((1 + UNEXPLAINED) * noise_of(posterior, state).deviation_mps2) ** 2
-    return max(0.0, sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise / read.share, one.floor)))
-                        for one, read, residual in zip(posterior.bands, posterior.readings, posterior.residuals(state),
-                                                       strict=True)))
+    main, *others = _by_signal(posterior, state)
+    found = 0.0
+    for signal, own in [(main, noise_of(posterior, state)), *((one, _noise_of(one)) for one in others)]:
+        noise = ((1 + UNEXPLAINED) * own.deviation_mps2) ** 2
+        found += sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise / share, one.floor)))
+                     for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True))
+    return max(0.0, found)
 
 
 def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> float:
-    """By what share the residual is above the noise, and above what two right simulations differ by, in the run where
-    it is most. A run so short that noise alone may do the same with this probability counts only as far as asks for no
-    explanation."""
+    """By what share the residual is above the noise, and above what two right simulations differ by, in the run and of
+    the signal where it is most. A run so short that noise alone may do the same with this probability counts only as
+    far as asks for no explanation.
+
+    noise    of the sensor's acceleration
+    """
     from scipy.special import gammainccinv
 
-    found = []
-    for one, read, residual in zip(posterior.bands, posterior.readings, posterior.residuals(state), strict=True):
-        freedom = float(one.freedom.sum())
-        expected = one.freedom @ (noise.deviation_mps2**2 / read.share + one.floor)
-        above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
-        by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / len(posterior.bands)) / (freedom / 2))) - 1
-        found.append(above if above > by_chance else min(above, UNEXPLAINED))
+    main, *others = _by_signal(posterior, state)
+    signals = [(main, noise), *((one, _noise_of(one)) for one in others)]
+    count, found = sum(len(one.bands) for one, _ in signals), []
+    for signal, own in signals:
+        for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True):
+            freedom = float(one.freedom.sum())
+            expected = one.freedom @ (own.deviation_mps2**2 / share + one.floor)
+            above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1
+            by_chance = float(np.sqrt(gammainccinv(freedom / 2, chance / count) / (freedom / 2))) - 1
+            found.append(above if above > by_chance else min(above, UNEXPLAINED))
     return max(found)
 
 

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
+from logger.lab.likelihood.clocked_record import record_error
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
-from logger.lab.likelihood.whittle import Bands, deviance
+from logger.lab.likelihood.signals import bands_of
+from logger.lab.likelihood.whittle import deviance
 from logger.runs import normalised_rms_error
-from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -31,7 +33,7 @@ class State:
     logs          (p,) logarithms of the car's numbers over the nominal ones
     record        (k,) per run, numbers of its ``RecordError``
     size          of the distance errors
-    predictions   (n,) per run, whole, the record's error included [m/s2]
+    predictions   (n,) per run, whole, the record's error included [m/s2]; other signals are joined to it
     """
 
     effects: tuple[Chosen, ...]
@@ -61,10 +63,9 @@ class Posterior:
         self.runs, self.vehicle, self.tolerance = runs, vehicle, tolerance
         self.stands = stands or vehicle
         self.prior = prior or VehiclePrior.of(vehicle, tolerance)
-        self.record_errors = [RecordError.of(run, tolerance) for run in runs.runs]
-        self.bands = [Bands(run) for run in runs.runs]
+        self.record_errors = [record_error(run, tolerance) for run in runs.runs]
+        self.bands = [bands_of(run) for run in runs.runs]
         self.readings = list(map(Readings.of, runs.runs)) if readings is None else list(readings)
-        self.measured = [one.mps2 for one in self.readings]
         counted = np.concatenate([run.kept_mps2[run.read[run.first:]] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
@@ -72,7 +73,7 @@ class Posterior:
     def without_wall(self, fine: bool = False) -> Posterior:
         """The same with a car that may bend as far as the runs ask; simulated as finely as what is reported is, or as
         now."""
-        runs = SimulatedRuns(self.runs.runs) if fine else self.runs
+        runs = SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)) if fine else self.runs
         return Posterior(runs, self.vehicle, self.tolerance, self.stands, self.prior.without_wall(), self.readings)
 
     def beside(self, state: State) -> Posterior:
@@ -151,7 +152,7 @@ class Posterior:
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
         """What the car's numbers do to the predictions: (p, n) per run, by differences over steps (p,). They are known
         well enough by a rough simulation."""
-        found = [np.empty((len(steps), run.count)) for run in self.runs.runs]
+        found = [np.empty((len(steps), run.joined_count)) for run in self.runs.runs]
         moved = self.moved_m(state.record)
         here = self.runs.predict(self.car(state.effects, state.logs), moved, rough=True)
         for index, step in enumerate(steps):

@@ -66,21 +66,24 @@ class Readings:
         return self.mps2 is self.run.measured_mps2
 
     def left_by(self, prediction: Array) -> Array:
-        """What a prediction (n,) leaves (n,) [m/s2]."""
+        """What a prediction (n,), or more signals joined to it, leaves [m/s2]."""
         return self.run.left_by(prediction, self.mps2)
 
     def without_deaf(self, columns: Array, prediction: Array) -> Array:
-        """Slopes of a prediction (n,), (n,) or (m, n), zero where the readings would not change with it."""
-        usable = self.run.usable
+        """Slopes of a prediction (n,), or of more signals joined to it, (n,) or (m, n), zero where the readings would
+        not change with it."""
+        usable, run = self.run.usable, self.run
         if usable is None:
             return columns
-        reached = (usable == CLIPPED) & (self.run.left_by(prediction) == 0)
-        return np.asarray(columns * (self.run.read & ~reached))
+        main = run.main(prediction)
+        reached = (usable == CLIPPED) & (run.left_by(main) == 0)
+        counts = np.concatenate([run.read & ~reached, *(run.read for _ in run.signals)])
+        return np.asarray(columns * counts[: len(prediction)])
 
     def beside(self, prediction: Array) -> Readings:
-        """The same readings with what their bounds say beside a prediction (n,); as they were read, where noise blurs
-        their steps, they lie on none or on one only."""
-        step = self.run.facts.step_mps2
+        """The same readings with what their bounds say beside a prediction (n,), or more signals joined to it; as they
+        were read, where noise blurs their steps, they lie on none or on one only."""
+        prediction, step = self.run.main(prediction), self.run.facts.step_mps2
         if not step or not self._whole.any():
             return Readings.of(self.run)
         left = (self.run.measured_mps2 - prediction)[self._whole]
@@ -97,10 +100,6 @@ class Readings:
         found[self._whole] = prediction[self._whole] + mean / share
         return Readings(self.run, found, share)
 
-    def noise_in(self, residual: Array) -> Array:
-        """A residual (n,) scaled so that right predictions leave the sensor's noise without rounding."""
-        return residual if self.share == 1.0 else residual * np.sqrt(self.share)
-
     @cached_property
     def _whole(self) -> Bools:
         """Samples (n,) that count and are readings."""
@@ -109,8 +108,9 @@ class Readings:
 
 
 def as_read_error(readings: Sequence[Readings], residuals: Sequence[Array]) -> float:
-    """Normalised r.m.s. error of residuals (n,) per run, those of rounded readings as they were read."""
-    counted = [(left + (one.run.measured_mps2 - one.mps2) * one.run.read)[one.run.first:]
+    """Normalised r.m.s. error of residuals (n,) per run, or more signals joined to them, of which the sensor's
+    acceleration counts; those of rounded readings as they were read."""
+    counted = [(one.run.main(left) + (one.run.measured_mps2 - one.mps2) * one.run.read)[one.run.first:]
                for one, left in zip(readings, residuals, strict=True)]
     return normalised_rms(counted, [(one.run.measured_mps2 * one.run.read)[one.run.first:] for one in readings])
 

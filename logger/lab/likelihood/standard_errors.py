@@ -16,6 +16,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effect_parameters import Move, coordinates_of, moves_of, slope_of
+from logger.vehicle.effect_sizes import grows_with_mass
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
 
@@ -52,7 +53,8 @@ def number_errors(found: LinearModel) -> NumberErrors:
 def _covariance(linear: LinearModel) -> Array:
     """Of the logarithms of the car's numbers, then of those of the effects on their scales; infinite where nothing is
     known."""
-    slopes, state = own_slopes(linear), linear.state
+    state = linear.state
+    linear, slopes = _without_size(linear, own_slopes(linear))
     information = linear.information(state.logs, None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > 0
@@ -60,6 +62,28 @@ def _covariance(linear: LinearModel) -> Array:
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
     return np.asarray(np.where(np.outer(seen, seen), inverse / np.outer(scale, scale),
                                np.diag(np.where(seen, 0.0, np.inf))))
+
+
+def _without_size(linear: LinearModel, own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
+    """The slopes by the car's numbers and by those of its effects (m, n), per run, without what all masses and forces
+    would do together: a car in which they are larger by one factor moves alike. Differences of what sticks and slips
+    are too jagged to show that, and would tell the size of a car that only its prior tells. A user's own effects may
+    have units that nobody knows."""
+    state, prior, numbers = linear.state, linear.prior, linear.numbers
+    if numbers is None or own is None or any(one.file for one in state.effects) or not linear.posterior.car(
+            state.effects, state.logs).rubs:
+        return linear, own
+    step = [float(grows_with_mass(name)) for name in prior.names]
+    for move in moves_of(state.effects):
+        one = state.effects[move.effect]
+        parameter = one.effect.parameters[move.parameter]
+        value = one.values[parameter.name]
+        step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
+    larger = np.array(step)
+    share = np.divide(1.0, larger, out=np.zeros_like(larger), where=larger != 0) / np.count_nonzero(larger)
+    freed = [one - share[:, None] * (larger @ one) for one in map(np.vstack, zip(numbers, own, strict=True))]
+    p = linear.count
+    return linear.by([one[:p] for one in freed]), [one[p:] for one in freed]
 
 
 def with_errors(effects: Sequence[Chosen], moves: Sequence[Move], deviations: Array,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,25 +26,30 @@ dry friction, whose force comes late by part of a step. A judgement: with 1 %, s
 """
 _BLOCK_S = 3.0
 """Of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
-_HIGHEST_OF_RATE = 0.37
+HIGHEST_OF_RATE = 0.37
 """Above it recorders' filters take away what no two of them take away alike."""
+# Least deviations: of the sensor's acceleration, and of another signal as a share of its own.
+_LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
 _ROUNDED = 1e-3  # samples: a rate is read off times that were rounded
 # Ends of the bands at 100 samples a second [Hz].
 _EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
              30.0, 33.5, 37.0)
+# Of a rig, whose wheels may hop above all that cars do, they go on as wide for their frequency.
+_MORE_EDGES_HZ = tuple(37.0 * (37.0 / 33.5) ** number for number in range(1, 60))
 # Of the highest frequencies, where a car leaves nothing and the recorder's filter even less.
 _QUIET_OF_RATE = (0.465, 0.5)
 
 
 class Bands:
-    """The bands of one run.
+    """The bands of one run: of its sensor's acceleration, or of one of its other signals.
 
     edges_hz    their ends (b + 1,) [Hz]
     freedom     degrees of freedom of each (b,)
-    floor       the least level of each (b,) [m2/s4], as white noise of that level would have in all
+    floor       the least level of each (b,) [m2/s4, or the square of another unit], as white noise of that level would
+                have in all
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, signal: int | None = None) -> None:
         rate = run.rate_hz
         self.rate_hz, self.first, self.count = rate, run.first, run.count
         kept = run.count - run.first
@@ -54,14 +60,17 @@ class Bands:
         starts = np.ceil(np.arange(0, kept, 0.5 * _BLOCK_S * rate) - _ROUNDED).astype(int)
         self._starts = starts[starts <= kept - size]
         f_hz = np.fft.rfftfreq(size, 1 / rate)
-        edges = np.array([one for one in _EDGES_HZ if one < _HIGHEST_OF_RATE * rate - 0.5] + [_HIGHEST_OF_RATE * rate])
+        ends_hz = (*_EDGES_HZ, *_MORE_EDGES_HZ) if run.timed else _EDGES_HZ
+        edges = np.array([one for one in ends_hz if one < HIGHEST_OF_RATE * rate - 0.5] + [HIGHEST_OF_RATE * rate])
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
         self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
         # What was not read, or clipped, leaves zeros.
         self._share = 1.0 if run.usable is None else max(float(np.mean(run.usable[run.first:] == READING)), 1 / kept)
         self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept * self._share
-        self.floor = np.maximum(DISCREPANCY**2 * self.power(run.measured_mps2 * run.read), 1e-12)
+        measured = (run.measured_mps2 if signal is None else run.more[signal]) * run.read
+        least = _LEAST_MPS2**2 if signal is None else _LEAST_SHARE**2 * float(measured.var())
+        self.floor = np.maximum(DISCREPANCY**2 * self.power(measured), least)
 
     def power(self, residual: Array) -> Array:
         """Mean power (b,) of a residual (n,), whole, as if it were white [m2/s4]."""
@@ -125,6 +134,13 @@ class Whitener:
         return np.fft.rfft(samples[..., self._first:], self._padded, axis=-1)[..., self._inside]
 
 
-def deviance(bands: Sequence[Bands], residuals: Sequence[Array]) -> float:
+class Judge(Protocol):
+    """What tells how likely residuals are: the bands of one signal, or of several."""
+
+    def deviance(self, residual: Array) -> float:
+        """As ``Bands``."""
+
+
+def deviance(bands: Sequence[Judge], residuals: Sequence[Array]) -> float:
     """Of several runs together."""
     return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))

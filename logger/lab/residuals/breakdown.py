@@ -178,7 +178,9 @@ def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
 
 
 def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
-    """In so many steps of a round speed at most, or one more."""
+    """In so many steps of a round speed at most, or one more; not at all on rigs."""
+    if all(run.timed for run in residuals.runs):
+        return ()
     speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
     low, high = float(speed.min()), float(speed.max())
     step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= most), 50.0)
@@ -203,12 +205,14 @@ def _running_rms(signal: Array, samples: int) -> Array:
 
 
 def _by_place(residuals: ModelResiduals, place_s: float = 0.6) -> tuple[Part, ...]:
-    """In stretches of a round length, about what a car drives in so long or somewhat more."""
+    """In stretches of a round length, about what a car drives in so long or somewhat more; not on rigs."""
     usual_mps = float(np.median(np.concatenate(residuals.kept(lambda run: run.speed_mps))))
     length = next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step >= place_s * usual_mps), 50.0)
     whole = sum(float(one @ one) for one in residuals.residual)
     found: list[Part] = []
     for run, residual, measured in zip(residuals.runs, residuals.residual, residuals.measured, strict=True):
+        if run.timed:
+            continue
         at = run.distance_m[run.first:]
         edges = np.arange(np.floor(at.min() / length), np.floor(at.max() / length) + 2) * length
         found += _parts(at, edges, residual, measured, whole, run.name)

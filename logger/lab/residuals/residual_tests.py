@@ -297,7 +297,7 @@ def _place(residuals: ModelResiduals, where: Breakdown) -> ResidualTest:
     """The place with most power for its length, as so many independent samples as its autocorrelation leaves."""
     from scipy.stats import chi2
 
-    usual = float(np.median([part.residual_mps2 for part in where.place]))
+    usual = float(np.median([part.residual_mps2 for part in where.place])) if where.place else 0.0
     if not usual > 0:
         return ResidualTest("place")
     worth = 1 / (1 + 2 * float((autocorrelations(residuals.residual, 2 * LAGS) ** 2).sum()))

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
+from logger.profiles.track import Way
 from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
@@ -82,7 +83,8 @@ def with_road(residuals: ModelResiduals) -> Coherence:
 def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
     """How fast the road rises under a wheel, tracks averaged, the samples that count, per run [m/s]."""
     def of(run: Run) -> Array:
-        height = run.track.averaged(run.distance_m - behind_m, residuals.car.structure.contact_patch_m)
-        return np.gradient(height.reshape(run.count, -1).mean(axis=1), 1 / run.rate_hz)
+        way = Way(run.distance_m, run.time_s)
+        height = run.track.under_axle(way, behind_m, residuals.car.structure.contact_patch_m)
+        return np.gradient(height, 1 / run.rate_hz)
 
     return residuals.kept(of)

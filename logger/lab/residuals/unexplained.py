@@ -58,8 +58,9 @@ def shape_of(posterior: Posterior, state: State) -> Shape:
     """The shape of the residuals of a fitted model."""
     runs, car = posterior.runs, posterior.car(state.effects, state.logs)
     responses = runs.respond(car, posterior.moved_m(state.record))
-    residuals = ModelResiduals(runs.runs, car, state.predictions, responses)
-    as_recorded = ModelResiduals(runs.runs, car, runs.predict(car), responses)
+    residuals, as_recorded = (
+        ModelResiduals(runs.runs, car, [run.main(one) for run, one in zip(runs.runs, some, strict=True)], responses)
+        for some in (state.predictions, runs.predict(car)))
     where = breakdown(residuals)
     return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 

@@ -10,8 +10,8 @@ but the effect makes the difference.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
-from logger.lab.likelihood.noise_floor import floor_error, noise_as_read
+from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, noise_as_read, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
@@ -78,6 +78,7 @@ class AddedEffects:
     p_value             how often, at most, noise alone would gain as much
     distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
     errors              of the numbers of vehicle and effects together
+    signals             errors of signals beside the sensor's acceleration, by name: refitted without and with
     """
 
     vehicle: Vehicle
@@ -92,6 +93,7 @@ class AddedEffects:
     p_value: float
     distance_error_m: float
     errors: NumberErrors
+    signals: Mapping[str, SignalErrors] = field(default_factory=dict)
 
     @property
     def helps(self) -> bool:
@@ -145,7 +147,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, noise_as_read(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
-        distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after))
+        distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after),
+        signals=signal_errors_of(posterior, before.state, state))
 
 
 def _with(posterior: Posterior, before: LinearModel, beside: tuple[Chosen, ...],

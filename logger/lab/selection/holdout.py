@@ -35,10 +35,10 @@ class HoldOut:
 
 
 def folds(run: Run) -> npt.NDArray[np.intp]:
-    """Which of the sets each sample that counts is held out with (n,)."""
+    """Which of the sets each sample that counts is held out with (n,), of each signal after the other."""
     time_s = np.arange(run.count - run.first) / run.rate_hz
     stretch_s = min(_STRETCH_S, (run.count - run.first) / run.rate_hz / _FOLDS)
-    return np.asarray((time_s / stretch_s).astype(np.intp) % _FOLDS)
+    return np.tile((time_s / stretch_s).astype(np.intp) % _FOLDS, 1 + len(run.signals))
 
 
 def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut:
@@ -64,8 +64,8 @@ def held_out(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut
             gradient = gradient + part[:, seen] @ residual[seen]
         step = _solved(information, gradient)
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
-            held = which == fold
-            kept[run.first:][held] = (residual - step @ part)[run.first:][held]
+            held = np.flatnonzero(run.counted)[which == fold]
+            kept[held] = (residual - step @ part)[held]
     return HoldOut(as_read_error(posterior.readings, unseen), deviance(posterior.bands, unseen))
 
 

@@ -298,7 +298,7 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
     for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
         size = max(1, round(slow_s * run.rate_hz))
         hat = np.hanning(size + 2)[1:-1]
-        slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, predicted)]
+        slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, run.main(predicted))]
         pairs.append((run, slow[0], slow[1]))
 
     def alike(scale: float, delay_s: float) -> float:
@@ -307,7 +307,7 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
         for run, measured, predicted in pairs:
             time_s = np.arange(run.count) / run.rate_hz
             rising = np.maximum.accumulate(run.distance_m) + 1e-9 * time_s
-            at_s = np.interp(run.distance_m / scale, rising, time_s) - delay_s
+            at_s = (time_s if run.timed else np.interp(run.distance_m / scale, rising, time_s)) - delay_s
             moved_mps2 = np.interp(at_s, time_s, predicted)[run.first:]
             kept = measured[run.first:]
             both += float(kept @ moved_mps2)

@@ -7,8 +7,9 @@ as records and profiles are. Columns of other names are not read.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +17,20 @@ import numpy.typing as npt
 
 from logger.errors import BadInput
 from logger.files import naming, read_bounded
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, UNKNOWN, RecordFacts
 from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.excitation_file import COLUMNS as EXCITATION_COLUMNS
+from logger.store.formats.excitation_file import read_excitation
 from logger.store.formats.profile_file import COLUMNS as PROFILE_COLUMNS
 from logger.store.formats.profile_file import Profile, read_profile
 from logger.store.formats.record_file import MAX_BYTES, MAX_MPS2, TIME, VERTICAL, check_times, even_rate_hz
-from logger.store.formats.run_file import read_run_facts
+from logger.store.formats.run_file import check_columns, read_run_facts
 
 Array = npt.NDArray[np.float64]
 
-DRIVE, PROFILE = "drive.csv", "profile.csv"
+DRIVE, PROFILE, EXCITATION = "drive.csv", "profile.csv", "excitation.csv"
 SPEED, DISTANCE = "speed_mps", "distance_m"
 COLUMNS = (TIME, VERTICAL, SPEED, DISTANCE)
 PLACE = ("lat_deg", "lon_deg")
@@ -34,7 +38,7 @@ USABLE = "usable"
 MAX_SPEED_MPS = 150.0
 _MAX_TIME_S = 1e5  # a day and more; of later times the ten digits of a drive do not tell samples apart
 _LINES_AT_ONCE = 50_000
-_HEADER = f"a header with {','.join(COLUMNS)}[,{','.join(PLACE)}][,{USABLE}], each once"
+_HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +49,12 @@ class Drive:
     rate_hz        samples a second
     time_s         evenly spaced [s]
     accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
-    speed_mps      [m/s]
-    distance_m     where the front tires stand on the track [m]
+    speed_mps      [m/s]; on a rig 0
+    distance_m     where the front tires stand on the track [m]; on a rig 0
     lat_deg, lon_deg    None where they were not recorded
     usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
     facts          what is known of the record
+    more           columns (n,) of the signals that ``facts`` has, by name
     """
 
     path: Path
@@ -62,17 +67,19 @@ class Drive:
     lon_deg: Array | None
     usable: Array | None = field(default=None, kw_only=True)
     facts: RecordFacts = field(default=UNKNOWN, kw_only=True)
+    more: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
 class DriveOnRoad(Drive):
-    """A drive over a known road, ``track``."""
+    """A drive over a known road, ``track``, or on a rig that is driven by time."""
 
-    track: Track
+    track: Track | Excitation
 
 
 def read_run(folder: Path | str) -> DriveOnRoad:
-    """Read a folder with ``drive.csv`` and ``profile.csv``, and ``run.yaml`` if there is one.
+    """Read a folder with ``drive.csv`` and ``profile.csv`` or, of a rig, ``excitation.csv``, and ``run.yaml`` if there
+    is one.
 
     Times come back on the even grid that their digits are a rounding of.
 
@@ -80,15 +87,56 @@ def read_run(folder: Path | str) -> DriveOnRoad:
     """
     path = Path(folder)
     if not path.is_dir():
-        raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE}")
-    drive = replace(read_drive(path / DRIVE), path=path, facts=read_run_facts(path))
-    return DriveOnRoad(**vars(drive), track=track_of(read_profile(path / PROFILE)))
+        raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE} (or {EXCITATION})")
+    timed = driven_by_time(path)
+    drive = drive_in(path, timed)
+    track = excitation_beside(drive) if timed else track_of(read_profile(path / PROFILE))
+    return DriveOnRoad(**vars(drive), track=track)
 
 
-def read_drive(path: Path | str) -> Drive:
-    """Read a ``drive.csv``. Times and errors as in ``read_run``."""
-    columns = read_columns(path)
-    return drive_of(path, even_rate_hz(columns[TIME], str(path)), columns)
+def drive_in(folder: Path, timed: bool) -> Drive:
+    """The drive of a run's folder, on a rig (``timed``) or over a road, with what its ``run.yaml`` says. BadInput as
+    ``read_run``."""
+    facts = read_run_facts(folder)
+    names = tuple(one.name for one in facts.signals)
+    if names:
+        check_columns(folder, header_of(folder / DRIVE), (*COLUMNS, *PLACE, USABLE))
+    return replace(read_drive(folder / DRIVE, timed, names), path=folder, facts=facts)
+
+
+def header_of(path: Path) -> tuple[str, ...]:
+    """The names of a table's columns. BadInput for a file that cannot be read."""
+    first = read_bounded(path, MAX_BYTES).removeprefix(b"\xef\xbb\xbf").split(b"\n", 1)[0]
+    return tuple(name.strip() for name in first.decode("utf-8", "replace").split(","))
+
+
+def driven_by_time(folder: Path) -> bool:
+    """Whether a run's folder has an excitation. BadInput where it has a profile as well."""
+    timed = (folder / EXCITATION).exists()
+    if timed and (folder / PROFILE).exists():
+        raise BadInput(f"{folder}: expected {PROFILE} or {EXCITATION}, found both: a run is driven over a road or by "
+                       "time")
+    return timed
+
+
+def excitation_beside(drive: Drive) -> Excitation:
+    """What drives a rig, out of the run's folder, on the drive's clock. BadInput as ``read_excitation``, and where it
+    moves nothing while the drive lasts."""
+    path = drive.path / EXCITATION
+    found = read_excitation(path)
+    first_s, last_s = float(drive.time_s[0]), float(drive.time_s[-1])
+    if found.end_s < first_s or found.start_s > last_s:
+        raise BadInput(f"{path}: expected times of the same clock as in {DRIVE}, {first_s:g} to {last_s:g} s, found "
+                       f"{found.start_s:g} to {found.end_s:g} s")
+    return replace(found, start_s=found.start_s - first_s)
+
+
+def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> Drive:
+    """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns. Times
+    and errors as in ``read_run``."""
+    columns = read_columns(path, timed, more)
+    return replace(drive_of(path, even_rate_hz(columns[TIME], str(path)), columns),
+                   more={name: columns[name] for name in more})
 
 
 def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> Drive:
@@ -99,14 +147,20 @@ def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> 
                  usable=columns.get(USABLE))
 
 
-def read_columns(path: Path | str) -> dict[str, Array]:
+def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()) -> dict[str, Array]:
     """The columns (n,) of a ``drive.csv`` by name, as they are written: their times may be uneven. Errors as in
-    ``read_run``."""
-    file = str(path)
-    names, table = parse_columns(read_bounded(file, MAX_BYTES), file, _choose, _HEADER)
+    ``read_run``.
+
+    timed    it is a rig's: speed and distance are 0, whatever it says of them
+    more     columns that are read as well
+    """
+    file, needed = str(path), (COLUMNS[:2] if timed else COLUMNS) + tuple(more)
+    names, table = parse_columns(read_bounded(file, MAX_BYTES), file, partial(_choose, needed=needed),
+                                 _HEADER.format(",".join(needed)))
     if len(table) < 2:
         raise BadInput(f"{file}:3: expected at least two samples, found the end of the file")
     columns = dict(zip(names, table.T.copy(), strict=True))
+    columns |= {name: np.zeros(len(table)) for name in COLUMNS if name not in columns}
     check_times(columns[TIME], file)
     _check_size(columns[VERTICAL], VERTICAL, MAX_MPS2, "m/s2", file)
     _check_size(columns[SPEED], SPEED, MAX_SPEED_MPS, "m/s", file)
@@ -163,6 +217,13 @@ def write_profile(path: Path, track: Track) -> None:
     _write(path, names, np.column_stack([distance, elevations]), "%.7f")
 
 
+def write_excitation(path: Path, excitation: Excitation) -> None:
+    """Write what drives a rig, with its own times, to ten digits. OSError if that fails."""
+    columns = excitation.elevation_m.reshape(len(excitation.elevation_m), -1).T
+    time_s = excitation.start_s + np.arange(len(columns[0])) / excitation.rate_hz
+    write_drive(path, dict(zip(EXCITATION_COLUMNS, (time_s, *columns), strict=False)))
+
+
 def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
     line = ",".join([form] * len(names)) + "\n"
     with naming(path), path.open("w", encoding="ascii", newline="\n") as file:
@@ -172,9 +233,9 @@ def _write(path: Path, names: tuple[str, ...], table: Array, form: str) -> None:
             file.write(line * len(block) % tuple(block.ravel().tolist()))
 
 
-def _choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
+def _choose(names: tuple[str, ...], needed: tuple[str, ...]) -> tuple[str, ...] | None:
     """The columns to read; None when one of them is missing or there twice."""
-    wanted = COLUMNS + (PLACE if any(name in names for name in PLACE) else ())
+    wanted = needed + (PLACE if any(name in names for name in PLACE) else ())
     wanted += (USABLE,) if USABLE in names else ()
     return wanted if all(names.count(name) == 1 for name in wanted) else None
 

@@ -18,6 +18,7 @@ from logger.errors import BadInput
 from logger.plugins import blamed_on, catalogue, offered_by
 from logger.store.formats.yaml_nodes import Node
 from logger.vehicle.effect import Chosen, Effect, Parameter, VehicleEffect, chosen
+from logger.vehicle.effect_sizes import sized
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.vehicle import Vehicle
 from logger.vehicle.watched_effect import watched
@@ -53,10 +54,10 @@ def effect_named(text: str) -> tuple[Effect, str | None]:
     return shipped_effects()[text], None
 
 
-def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool) -> None:
-    """Raise BadInput if the effect cannot be there in this car on this road, or makes a car of it that would tip over
-    an axle; a user's own is tried on the car."""
-    obstacle = one.effect.obstacle(vehicle, two_tracks)
+def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool, timed: bool = False) -> None:
+    """Raise BadInput if the effect cannot be there in this car on this road, or rig (``timed``), or makes a car of it
+    that would tip over an axle; a user's own is tried on the car."""
+    obstacle = one.effect.obstacle_on(vehicle, two_tracks, timed)
     if obstacle is not None:
         raise BadInput(f"{one.effect.name}: {obstacle}")
     if one.file is not None:
@@ -76,7 +77,7 @@ def read_effects(node: Node, vehicle: Vehicle) -> tuple[Chosen, ...]:
     """The effects in a vehicle's file. Raises BadInput (``file:line: expected ...``) for what is wrong with them."""
     found: list[Chosen] = []
     for item in node.items():
-        one = _read_effect(item)
+        one = _read_effect(item, vehicle)
         if one.effect.name in [other.effect.name for other in found]:
             raise item.mapping()["name"].wrong("each effect once")
         try:
@@ -87,7 +88,7 @@ def read_effects(node: Node, vehicle: Vehicle) -> tuple[Chosen, ...]:
     return tuple(found)
 
 
-def _read_effect(node: Node) -> Chosen:
+def _read_effect(node: Node, vehicle: Vehicle) -> Chosen:
     said = node.mapping()
     if "name" not in said:
         raise BadInput(f"{node.file}:{node.line}: expected the key 'name' here, it is missing")
@@ -101,7 +102,7 @@ def _read_effect(node: Node) -> Chosen:
         if effect.name != name.text():
             raise name.wrong(f"{effect.name!r}, as EFFECT in {file} is named")
     elif name.text() in shipped_effects():
-        effect = shipped_effects()[name.text()]
+        effect = sized(shipped_effects()[name.text()], vehicle)
     else:
         raise name.wrong(f"one of {', '.join(shipped_effects())}, or your own with file: my_effect.py beside it")
     parameters = {one.name: one for one in effect.parameters}

@@ -6,15 +6,16 @@ know how coarse the one is and how far off the other. Solution: a small file say
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Collection, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from logger.errors import BadInput
 from logger.files import write_text
-from logger.runs import UNKNOWN, RecordFacts
+from logger.runs import UNKNOWN, RecordFacts, Signal
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
 RUN = "run.yaml"
@@ -22,7 +23,17 @@ RUN = "run.yaml"
 
 _SENSOR = ("step_mps2", "range_mps2", "noise_mps2")
 _RECEIVER = ("delay_s", "delay_std_s")
-_KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places")
+_KEYS = ("sensor", "place_std_m", "pass_band_hz", "source", "receiver", "places", "signals")
+# What signals measure: the unit that their columns end in, and the parts that they are of.
+_CORNERS = ("front", "rear", "front_left", "front_right", "rear_left", "rear_right")
+_MEASURES: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "acceleration": ("_mps2", ("body", *(f"{one}_wheel" for one in _CORNERS))),
+    "travel": ("_m", tuple(f"{one}_suspension" for one in _CORNERS)),
+    "pitch_rate": ("_rad_per_s", ("body",)),
+    "roll_rate": ("_rad_per_s", ("body",)),
+}
+_PLACE = ("ahead_m", "left_m")
+_FARTHEST_M = 20.0
 
 
 def write_run_facts(folder: Path, facts: RecordFacts) -> None:
@@ -30,7 +41,8 @@ def write_run_facts(folder: Path, facts: RecordFacts) -> None:
     places = {"by": facts.places_by, "vehicle": facts.vehicle}
     said: dict[str, Any] = {"sensor": _some(facts, _SENSOR), "place_std_m": facts.place_std_m,
                             "pass_band_hz": list(facts.pass_band_hz or ()) or None, "source": facts.source,
-                            "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None}
+                            "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None,
+                            "signals": {one.name: _signal_keys(one) for one in facts.signals}}
     write_text(folder / RUN, yaml.safe_dump({key: value for key, value in said.items() if value not in (None, {})},
                                             sort_keys=False, allow_unicode=True))
 
@@ -47,14 +59,52 @@ def read_run_facts(folder: Path) -> RecordFacts:
     sensor, receiver = (said[key].mapping(optional=names) if key in said else {}
                         for key, names in (("sensor", _SENSOR), ("receiver", _RECEIVER)))
     places = said["places"].mapping(("by",), ("vehicle",)) if "places" in said else {}
-    return RecordFacts(
-        **{name: node.number(above=0) for name, node in sensor.items()},
-        **{name: node.number() for name, node in receiver.items()},
+    numbers = {**{name: node.number(above=0) for name, node in sensor.items()},
+               **{name: node.number() for name, node in receiver.items()}}
+    return replace(
+        UNKNOWN, **numbers,
         place_std_m=said["place_std_m"].number(0) if "place_std_m" in said else None,
         pass_band_hz=_band(said["pass_band_hz"]) if "pass_band_hz" in said else None,
         places_by=places["by"].choice("road", "receiver") if places else None,
         vehicle=places["vehicle"].text() if "vehicle" in places else None,
-        source=said["source"].text() if "source" in said else None)
+        source=said["source"].text() if "source" in said else None,
+        signals=tuple(_signal(name, node) for name, node in said["signals"].mapping().items()
+                      ) if "signals" in said else ())
+
+
+def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]) -> None:
+    """Raise BadInput, with the line, for a signal in a run's ``run.yaml`` that is no column of its drive, or one of
+    those that are ``taken`` for something else."""
+    path = folder / RUN
+    said = load_mapping(path).mapping(optional=_KEYS) if path.exists() else {}
+    for name, node in said["signals"].mapping().items() if "signals" in said else ():
+        if name in taken:
+            raise BadInput(f"{node.file}:{node.line}: expected a signal beside the columns {', '.join(taken)}, found "
+                           f"{name}")
+        if name not in columns:
+            raise BadInput(f"{node.file}:{node.line}: expected a signal that is a column of the drive.csv beside it, "
+                           f"found {name}, which is none")
+
+
+def _signal(name: str, node: Node) -> Signal:
+    keys = node.mapping(("measures",), ("of", *_PLACE))
+    measures = keys["measures"].choice(*_MEASURES)
+    unit, parts = _MEASURES[measures]
+    if not name.endswith(unit):
+        raise BadInput(f"{node.file}:{node.line}: expected a column of {measures.replace('_', ' ')} whose name ends in "
+                       f"{unit}, its unit, found {name}")
+    if "of" not in keys and parts[0] != "body":
+        raise BadInput(f"{node.file}:{node.line}: expected the key 'of' with one of {', '.join(parts)}")
+    of = keys["of"].choice(*parts) if "of" in keys else "body"
+    place = {key: keys[key].number(-_FARTHEST_M, _FARTHEST_M) for key in _PLACE if key in keys}
+    if place and (measures, of) != ("acceleration", "body"):
+        raise keys[next(iter(place))].wrong("no place: only an acceleration of the body has one")
+    return Signal(name, measures, of, **place)
+
+
+def _signal_keys(one: Signal) -> dict[str, object]:
+    place = {key: float(f"{getattr(one, key):.6g}") for key in _PLACE if getattr(one, key)}
+    return {"measures": one.measures, "of": one.of, **place}
 
 
 def _band(node: Node) -> tuple[float, float]:

@@ -24,6 +24,7 @@ class Roll(VehicleEffect):
     source = "the full car of the models; 4.1 of Blum 2015 leaves it out"
     signature = "much of the motion has nothing to do with the left track, the more the shorter the waves are"
     shown_by = "measure both tracks, and drive with the sensor away from the middle as well"
+    needs_road = True
     stage = 9
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

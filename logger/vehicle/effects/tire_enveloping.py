@@ -24,6 +24,7 @@ class TireEnveloping(VehicleEffect):
     shown_by = "drive a rough road slowly, at 4 to 8 m/s"
 
     replaces = ("contact_patch_m",)
+    needs_road = True
 
     def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
         return replace(vehicle, contact_patch_m=p.contact_patch_m)

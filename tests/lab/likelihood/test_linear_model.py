@@ -93,8 +93,7 @@ def test_the_most_likely_records_are_those_of_least_squares() -> None:
     rng = np.random.default_rng(2)
     predictions = [each + rng.normal(0, 0.02, len(each)) for each in one.state.predictions]
     found = one.linear.eliminated(predictions)
-    white = np.concatenate(one.linear.whitened([measured - each for measured, each in zip(
-        one.posterior.measured, predictions, strict=True)]))
+    white = np.concatenate(one.linear.whitened(one.posterior.left_by(predictions)))
     columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]
     here = np.concatenate(one.state.record)
     root = np.linalg.cholesky(precision).T

@@ -61,7 +61,7 @@ def test_what_bounds_leave_is_as_certain_as_their_information(noise: float) -> N
     assert left.mean() == pytest.approx(0.0, abs=4 * left.std() / np.sqrt(len(left)))  # the offset is gone
     assert left.std() == pytest.approx(information(noise) ** -0.5, rel=0.03)
     assert read.share == pytest.approx(noise**2 * information(noise), rel=0.05)
-    assert read.noise_in(left).std() == pytest.approx(noise, rel=0.05)
+    assert left.std() * np.sqrt(read.share) == pytest.approx(noise, rel=0.05)
 
 
 @pytest.mark.parametrize("noise", [0.03, 0.1, 0.2])

@@ -16,9 +16,10 @@ from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.standard_errors import standard_errors, with_errors
 from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.effect_parameters import moves_of
+from logger.vehicle.effect_sizes import grows_with_mass
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
-from ...support.lab.secret_runs import EFFECTS
+from ...support.lab.secret_runs import EFFECTS, hidden
 
 Array = npt.NDArray[np.float64]
 NAME = "tire_damping_n_s_per_m"
@@ -105,3 +106,17 @@ def test_an_error_at_a_bound_is_not_halved(name: str, key: str, value: float | N
     one = chosen(effect, {**effect.usual, key: value})
     (with_error,) = with_errors((one,), moves_of((one,)), np.full(len(effect.parameters), 50.0))
     assert with_error.standard_errors[key] == pytest.approx(error, rel=1e-3)
+
+
+def test_how_heavy_a_car_that_rubs_is_only_its_prior_tells() -> None:
+    """Masses, springs, dampers and forces that are larger by one factor move alike, so that the deviation of that
+    factor is the prior's: that of the mean of so many numbers."""
+    friction = hidden("dry_friction", friction_force_n=60.0, transition_velocity_m_per_s=0.02)
+    posterior = posterior_of(noisy_runs([friction]))
+    state = posterior.start([friction])
+    found = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
+    effects, deviations = standard_errors(found)
+    masses = [grows_with_mass(name) for name in posterior.prior.names]
+    least = posterior.prior.deviations[masses][0] / np.sqrt(np.count_nonzero(masses))
+    assert (deviations[masses] > 0.99 * least).all()
+    assert effects[0].standard_errors["friction_force_n"] > 0.99 * 60.0 * least

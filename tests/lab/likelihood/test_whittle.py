@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import welch
 
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands, deviance
+from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import Run
 
@@ -135,3 +136,14 @@ def test_where_nothing_but_zeros_was_measured_nothing_is_divided_by_nothing() ->
     bands = Bands(run_of(2000))
     assert np.isfinite(bands.deviance(np.zeros(2000)))
     assert np.isfinite(bands.whitener(np.zeros(2000))(white(2000))).all()
+
+
+def test_bands_of_a_rig_go_on_above_those_of_cars() -> None:
+    rate_hz, count = 400.0, 4000
+    nothing = np.zeros(count)
+    rig = Run("rig", rate_hz, np.ones(count), nothing, nothing, Excitation(rate_hz, nothing))
+    edges = Bands(rig).edges_hz
+    assert edges[-1] == pytest.approx(0.37 * rate_hz)
+    assert (np.diff(edges)[edges[:-1] > 30.0] < 0.15 * edges[1:][edges[:-1] > 30.0]).all()
+    car = Run("car", rate_hz, np.ones(count), nothing, nothing, Track(1.0, np.zeros(2)))
+    assert Bands(car).edges_hz[-2:] == pytest.approx([37.0, 0.37 * rate_hz])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
-from logger.runs import UNKNOWN, RecordFacts
+from logger.runs import UNKNOWN, RecordFacts, Signal
 from logger.store.formats.run_file import RUN, read_run_facts, write_run_facts
 
 SIZES = st.none() | st.floats(1e-3, 1e3).map(lambda one: float(f"{one:.6g}"))
@@ -25,6 +25,15 @@ def test_what_is_written_comes_back(tmp_path_factory: pytest.TempPathFactory, st
     assert read_run_facts(folder) == facts
 
 
+def test_signals_come_back(tmp_path: Path) -> None:
+    facts = RecordFacts(signals=(Signal("seat_mps2", "acceleration", ahead_m=-1.2, left_m=0.3),
+                                 Signal("wheel_mps2", "acceleration", "front_left_wheel"),
+                                 Signal("travel_m", "travel", "rear_suspension"),
+                                 Signal("pitch_rad_per_s", "pitch_rate")))
+    write_run_facts(tmp_path, facts)
+    assert read_run_facts(tmp_path) == facts
+
+
 def test_a_folder_without_it_says_nothing(tmp_path: Path) -> None:
     assert read_run_facts(tmp_path) == UNKNOWN
 
@@ -35,6 +44,12 @@ def test_a_folder_without_it_says_nothing(tmp_path: Path) -> None:
     ("pass_band_hz: [25, 0.5]\n", ":1: expected two frequencies"),
     ("place_std_m: -1\n", ":1: expected a number"),
     ("places: {by: guess}\n", ":1: expected one of road, receiver"),
+    ("signals:\n  a_mps2: {measures: sound}\n", ":2: expected one of acceleration, travel, pitch_rate"),
+    ("signals:\n  a_mps2: {of: body}\n", ":2: expected the key 'measures' here, it is missing"),
+    ("signals:\n  a_mm: {measures: travel, of: front_suspension}\n", ":2: expected .* whose name ends in _m, its unit"),
+    ("signals:\n  a_m: {measures: travel}\n", ":2: expected the key 'of' with one of front_suspension"),
+    ("signals:\n  a_m: {measures: travel, of: front_wheel}\n", ":2: expected one of front_suspension"),
+    ("signals:\n  w_mps2: {measures: acceleration, of: front_wheel, ahead_m: 1}\n", ":2: expected no place"),
 ])
 def test_what_cannot_be_is_refused_with_its_line(tmp_path: Path, text: str, complaint: str) -> None:
     (tmp_path / RUN).write_text(text)

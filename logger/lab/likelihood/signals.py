@@ -1,0 +1,107 @@
+"""Several measured signals of one run, each with its own noise.
+
+Problem: a travel sensor and an accelerometer on a wheel have other units and other noise than the sensor on the body,
+and where the car was is the same for all of them. Solution: signals are joined, one after the other; each has bands of
+its own (``whittle``), so that its level is free, and what is whitened is joined again. All that is done with whitened
+columns, the elimination of the distance error above all, does not ask how many signals there were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.readings import Readings
+from logger.lab.likelihood.whittle import Bands, Whitener
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+
+def bands_of(run: Run) -> Bands | JointBands:
+    """The bands of all that was measured in a run."""
+    if not run.signals:
+        return Bands(run)
+    return JointBands([Bands(run), *(Bands(run, index) for index in range(len(run.signals)))])
+
+
+class JointBands:
+    """The bands of several signals of one run, as ``Bands`` of the signals joined."""
+
+    def __init__(self, each: Sequence[Bands]) -> None:
+        self.each = list(each)
+        self.freedom = np.concatenate([one.freedom for one in each])
+        self.floor = np.concatenate([one.floor for one in each])
+
+    def parts(self, joined: Array) -> list[Array]:
+        """Signals that are joined (..., (1 + s) n), one by one (..., n)."""
+        return np.split(joined, len(self.each), axis=-1)
+
+    def power(self, residual: Array) -> Array:
+        """As ``Bands``, of all bands (b,)."""
+        return np.concatenate([one.power(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
+
+    def levels(self, residual: Array) -> Array:
+        """As ``Bands``."""
+        return np.maximum(self.power(residual), self.floor)
+
+    def deviance(self, residual: Array) -> float:
+        """As ``Bands``."""
+        return sum(one.deviance(part) for one, part in zip(self.each, self.parts(residual), strict=True))
+
+    def whitener(self, residual: Array) -> JointWhitener:
+        """As ``Bands``."""
+        return JointWhitener([one.whitener(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
+
+
+@dataclass(frozen=True, eq=False)
+class JointWhitener:
+    """Weighs each band of each signal of one run by its level."""
+
+    each: list[Whitener]
+
+    def __call__(self, samples: Array) -> Array:
+        """As ``Whitener``, of signals that are joined."""
+        parts = np.split(samples, len(self.each), axis=-1)
+        return np.concatenate([one(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
+
+    def in_time(self, samples: Array) -> Array:
+        """As ``Whitener``, of signals that are joined."""
+        parts = np.split(samples, len(self.each), axis=-1)
+        return np.concatenate([one.in_time(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class SignalResiduals:
+    """What a model leaves of one signal in the runs that have it.
+
+    name         of the signal; empty: the sensor's acceleration
+    bands, residuals (n,), shares    per run; the last as of ``Readings``
+    size         r.m.s. of what was measured in all
+    """
+
+    name: str
+    bands: list[Bands]
+    residuals: list[Array]
+    shares: list[float]
+    size: float
+
+
+def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
+              residuals: Sequence[Array]) -> list[SignalResiduals]:
+    """Residuals of joined signals ((1 + s) n,), per run, by signal, the sensor's acceleration first."""
+    found: dict[str, list[tuple[Bands, Array, float, Array]]] = {}
+    for one, own, residual in zip(readings, bands, residuals, strict=True):
+        run = one.run
+        counts = run.read & (np.arange(run.count) >= run.first)
+        each = own.each if isinstance(own, JointBands) else [own]
+        names = ["", *(signal.name for signal in run.signals)]
+        measured = [run.measured_mps2, *run.more]
+        for name, band, part, of in zip(names, each, np.split(residual, len(each)), measured, strict=True):
+            found.setdefault(name, []).append((band, part, 1.0 if name else one.share, of[counts]))
+    return [SignalResiduals(name, [one for one, *_ in rows], [one for _, one, *_ in rows], [row[2] for row in rows],
+                            float(np.sqrt(np.mean(np.concatenate([row[3] for row in rows])**2))))
+            for name, rows in found.items()]

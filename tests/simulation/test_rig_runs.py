@@ -1,0 +1,76 @@
+"""A half car on two actuators, against equations of motion written here and solved by scipy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import StateSpace, lsim
+
+from logger.profiles.excitation import Excitation
+from logger.runs import RecordFacts, Run, Signal
+from logger.simulation.simulated_runs import SimulatedRuns, steps_hz
+from logger.vehicle.compose import compose
+from logger.vehicle.vehicle import Axle, Vehicle
+
+M, INERTIA, MU, K, C, KT, A, B = 5.0, 0.12, 0.4, 900.0, 12.0, 5400.0, 0.14, 0.18
+BENCH = Vehicle("bench", "half_car", M, INERTIA, Axle(A, MU, K, C, KT), Axle(B, MU, K, C, KT), 0.2)
+RATE_HZ, EXCITED_HZ, FINE = 200.0, 250.0, 20
+SIGNALS = (Signal("pitch_rad_per_s", "pitch_rate"), Signal("rear_mps2", "acceleration", "rear_wheel"),
+           Signal("front_m", "travel", "front_suspension"))
+
+
+def tables(lasts_s: float) -> np.ndarray:
+    """Heights under the front and the rear wheel (n, 2) [m], random up to 20 Hz, rising from rest."""
+    n = round(lasts_s * EXCITED_HZ)
+    f_hz, rng = np.fft.rfftfreq(n, 1 / EXCITED_HZ), np.random.default_rng(4)
+    size = np.where((f_hz > 0.5) & (f_hz < 20.0), 1 / np.maximum(f_hz, 0.5), 0.0)
+    z = np.fft.irfft(size * np.exp(2j * np.pi * rng.random((2, len(f_hz)))), n)
+    return np.asarray((0.002 * z / z.std() * np.minimum(np.arange(n) / EXCITED_HZ, 1.0)).T)
+
+
+def by_hand(heights: np.ndarray, at_s: np.ndarray) -> np.ndarray:
+    """Accelerations of the body and of the rear wheel, pitch rate and front travel (4, n)."""
+    mass = np.diag([M, INERTIA, MU, MU])
+    ends = np.array([[1, A, -1, 0], [1, -B, 0, -1]], dtype=float)  # extension of the suspensions
+    stiffness = K * ends.T @ ends + np.diag([0, 0, KT, KT])
+    damping = C * ends.T @ ends
+    a = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+    b = np.vstack([np.zeros((6, 2)), np.eye(2) * KT / MU])
+    rows = np.vstack([a[4], a[7], np.eye(8)[5], np.append(ends[0], np.zeros(4))])
+    direct = np.vstack([b[4], b[7], np.zeros((2, 2))])
+    time_s = np.arange((len(heights) - 1) * FINE + 1) / EXCITED_HZ / FINE
+    under = CubicSpline(np.arange(len(heights)) / EXCITED_HZ, heights)(time_s)
+    _, found, _ = lsim(StateSpace(a, b, rows, direct), under, time_s)
+    return np.asarray(CubicSpline(time_s, found)(at_s).T)
+
+
+@pytest.mark.parametrize("begins_s", [0.0, 0.73])
+def test_each_axle_stands_on_its_own_table_and_every_signal_is_right(begins_s: float) -> None:
+    heights = tables(8.0)
+    time_s = begins_s + np.arange(round(6.5 * RATE_HZ)) / RATE_HZ
+    nothing = np.zeros(len(time_s))
+    run = Run("bench", RATE_HZ, nothing + 1.0, nothing, nothing, Excitation(EXCITED_HZ, heights, -begins_s),
+              facts=RecordFacts(signals=SIGNALS), more=np.ones((3, len(time_s))))
+    (joined,) = SimulatedRuns([run], steps_hz(BENCH)).predict(compose(BENCH))
+    body, rear, pitch, travel = by_hand(heights, time_s)
+    expected = np.stack([body, *(one - one.mean() for one in (pitch, rear, travel))])
+    for one, other in zip(joined.reshape(4, -1), expected, strict=True):
+        assert one[40:-40] == pytest.approx(other[40:-40], abs=4e-3 * float(np.abs(other).max()))
+
+
+def test_one_table_moves_both_axles_at_once() -> None:
+    heights = tables(6.0)
+    run = Run("bench", RATE_HZ, *np.zeros((3, 1000)), Excitation(EXCITED_HZ, heights[:, 0]))
+    both = replace(run, track=Excitation(EXCITED_HZ, np.stack([heights[:, 0]] * 2, axis=1)))
+    one, other = SimulatedRuns([run, both]).predict(compose(BENCH))
+    assert one == pytest.approx(other, abs=1e-12)
+
+
+def test_a_quicker_vehicle_is_stepped_more_finely_and_a_car_as_ever() -> None:
+    assert steps_hz(BENCH) == 2000.0
+    assert steps_hz(replace(BENCH, front=replace(BENCH.front, tire_stiffness_n_per_m=60.0 * KT))) == 8000.0
+    car = Vehicle("car", "quarter_car", 400.0, None, Axle(0.0, 40.0, 2e4, 1500.0, 2e5), None, 0.2)
+    assert steps_hz(car) == 1000.0
