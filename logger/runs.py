@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.pass_band import in_band
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
@@ -47,6 +48,21 @@ UNKNOWN = RecordFacts()
 """Nothing is known of the record."""
 
 
+@dataclass(frozen=True)
+class LowPass:
+    """A low-pass that a record seems to have gone through.
+
+    cutoff_hz, order    of Butterworth's filter that is likest
+    causal              it delayed the record; else it was run forth and back
+    ends_band           the pass band ends where it begins
+    """
+
+    cutoff_hz: float
+    order: float
+    causal: bool = False
+    ends_band: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """One drive over one road, evenly sampled: arrays (n,).
@@ -59,6 +75,7 @@ class Run:
     track            the road
     skip_s           how much of the beginning is left out [s]
     facts            what is known of the record
+    low_pass         what was found of it; None: nothing
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -71,6 +88,7 @@ class Run:
     track: Track
     skip_s: float = SKIP_S
     facts: RecordFacts = UNKNOWN
+    low_pass: LowPass | None = None
 
     def __post_init__(self) -> None:
         if not len(self.measured_mps2) == len(self.distance_m) == len(self.speed_mps) > self.first + 1:
@@ -95,6 +113,17 @@ class Run:
     def kept_mps2(self) -> Array:
         """What was measured, without the beginning [m/s2]."""
         return self.measured_mps2[self.first:]
+
+    @property
+    def pass_band_hz(self) -> tuple[float, float]:
+        """Frequencies between which the record is compared; up to half the rate where nothing is known [Hz]."""
+        low_hz, high_hz = self.facts.pass_band_hz or (0.0, self.rate_hz / 2)
+        return low_hz, min(high_hz, self.rate_hz / 2)
+
+    def in_band(self, samples: Array) -> Array:
+        """Samples like the record's (n,) without what lies outside of the pass band; as they are where there is none.
+        """
+        return samples if self.facts.pass_band_hz is None else in_band(samples, self.rate_hz, *self.pass_band_hz)
 
     @property
     def two_tracks(self) -> bool:

@@ -19,6 +19,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit
 from logger.lab.likelihood.noise_floor import UNEXPLAINED, Noise, excess, floor_error, noise_of
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
@@ -26,7 +27,7 @@ from logger.lab.selection.detectability import Undetectable, undetectable_effect
 from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Search, Selection
+from logger.lab.selection.stepwise import Search, Selection, out_of_sight
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
@@ -82,6 +83,7 @@ class Diagnosis:
     undetectable         effects that these runs could not show at their usual strength
     shape                of what no candidate explains; None where no more than noise is left
     distance_error_m     by how much a distance is off at most, if that is more than usual; else 0
+    band                 what of the runs was compared; None: all of it
     """
 
     runs: tuple[str, ...]
@@ -100,6 +102,7 @@ class Diagnosis:
     undetectable: tuple[Undetectable, ...]
     shape: Shape | None
     distance_error_m: float
+    band: ComparedBand | None = None
 
     @property
     def left_over(self) -> bool:
@@ -156,7 +159,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         obstacles=obstacles, verdict=tuple(selection.gains), excess=above, conflicts=_conflicts(fine, state),
         steps=_steps(selection, posterior.error(nominal)), effects=with_errors, undetectable=hidden,
         shape=shape_of(fine, state) if above > UNEXPLAINED else None,
-        distance_error_m=unusual_m(fine.record_errors, state.record),
+        distance_error_m=unusual_m(fine.record_errors, state.record), band=compared_band(fine.runs.runs),
     )
 
 
@@ -185,7 +188,7 @@ def _finely_fitted(posterior: Posterior, search: Search, selection: Selection) -
         state = selection.now.state
         start = fine.at(state.effects, state.logs, state.record, state.size)
         after = fit(aligned(fine, start), selection.now.linear.numbers)
-        ended = [one.effect.name for one in after.state.effects[search.present:] if one.at_an_end]
+        ended = [one.effect.name for one in after.state.effects[search.present:] if out_of_sight(fine, one)]
         if not ended:
             return selection, after
         selection = search.left_out(selection, ended[0])

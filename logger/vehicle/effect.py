@@ -36,6 +36,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _AT_END = 1e-3
+_RESONANCE = "frequency_hz"  # what effects that resonate call it
 
 
 class Scale(Enum):
@@ -68,6 +69,7 @@ class Parameter:
     choices    if not empty, the only values there are; a fit tries each
     default    what it is when nothing is said; None: it must be said
     step       slopes are taken over so much of it, on its scale; None: a small share of it
+    held       no fit moves it
     """
 
     name: str
@@ -81,6 +83,7 @@ class Parameter:
     choices: tuple[float, ...] = ()
     default: float | None = None
     step: float | None = None
+    held: bool = False
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""
@@ -101,7 +104,7 @@ class Parameter:
     @property
     def moves(self) -> bool:
         """Whether a fit may move it."""
-        return not self.choices and self.low < self.high
+        return not self.choices and not self.held and self.low < self.high
 
     def usual_way(self, origin: float = 0.0) -> float:
         """How far the values that it usually has lie from a coordinate: that of its start or, where that is there, the
@@ -129,10 +132,14 @@ class Misalignment:
 
     scale      distance recorded over distance driven, were that all
     delay_s    how late the acceleration is, were that all [s]
+    low_pass   cut-off [Hz] and order of a filter that the record seems to have gone through; None: none
+    rate_hz    samples a second of the record; 0: it does not matter
     """
 
     scale: float
     delay_s: float
+    low_pass: tuple[float, int] | None = None
+    rate_hz: float = 0.0
 
 
 class Effect(ABC):
@@ -175,6 +182,10 @@ class Effect(ABC):
         """Values of all its parameters that a search begins at; some effects look at how the runs are misaligned."""
         names = [one.name for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
+
+    def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
+        """Whether something else than the model's error speaks for it at these values."""
+        return False
 
     def checked(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with defaults filled in. ValueError for an unknown or missing name, or a value out of bounds."""
@@ -257,6 +268,10 @@ class Chosen:
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
+
+    def resonates_above(self, high_hz: float) -> bool:
+        """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing."""
+        return any(one.name == _RESONANCE and self.values[one.name] > high_hz for one in self.effect.parameters)
 
     @property
     def p(self) -> SimpleNamespace:
