@@ -20,8 +20,6 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
         ("", found.error_refitted, "the car's numbers and distances refitted within their tolerance"),
         ("after", found.error_after, f"with {' and '.join(found.names)}, all refitted in the same way"),
         ("", found.error_as_written, "as the new file says, distances as recorded: where compare begins with it"),
-        ("unseen", found.unseen_before.error, "without it, on stretches that no fit saw"),
-        ("", found.unseen_after.error, "with it, on the same"),
         ("of noise", found.noise_floor_error, "about, from the sensor's noise alone"),
     ]
 
@@ -39,7 +37,7 @@ def judgement(found: AddedEffects) -> list[str]:
             lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
     if found.helps:
         lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
-    elif found.gains:
+    elif found.gains and found.unseen_before is not None and found.unseen_after is not None:
         lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but on stretches "
                      f"that no fit saw the error rises from {found.unseen_before.error:.4f} to "
                      f"{found.unseen_after.error:.4f}: it imitates something else.")
@@ -91,7 +89,8 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
-        "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error,
+        **({} if found.unseen_before is None or found.unseen_after is None else {
+            "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error}),
         **band_json(found.band),
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,

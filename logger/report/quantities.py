@@ -50,10 +50,7 @@ def measured(value: float, error: float | None) -> str:
 
 def numbers_of(one: Chosen) -> str:
     """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none."""
-    usual = {parameter.name for parameter in one.effect.parameters
-             if parameter.held and one.values.get(parameter.name) == parameter.default}
-    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items()
-                     if name not in usual)
+    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items())
 
 
 def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:

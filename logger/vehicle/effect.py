@@ -69,7 +69,6 @@ class Parameter:
     choices    if not empty, the only values there are; a fit tries each
     default    what it is when nothing is said; None: it must be said
     step       slopes are taken over so much of it, on its scale; None: a small share of it
-    held       no fit moves it
     """
 
     name: str
@@ -83,7 +82,6 @@ class Parameter:
     choices: tuple[float, ...] = ()
     default: float | None = None
     step: float | None = None
-    held: bool = False
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""
@@ -104,7 +102,7 @@ class Parameter:
     @property
     def moves(self) -> bool:
         """Whether a fit may move it."""
-        return not self.choices and not self.held and self.low < self.high
+        return not self.choices and self.low < self.high
 
     def usual_way(self, origin: float = 0.0) -> float:
         """How far the values that it usually has lie from a coordinate: that of its start or, where that is there, the

@@ -58,6 +58,9 @@ STEEPEST_EFFECT = 2.5
 # on 211 unfiltered runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the
 # factor is 3 at most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
 _BETTER, _BETTER_DB = 3.5, 1.0
+# One filter for all runs has cut-offs that are so alike in each (their logarithms), and leaves of none more than
+# without it, but for a rounding.
+_ALIKE, _SAME = 0.1, 0.02
 _LOSS = 0.05
 _HIGHEST_ORDER = 8
 _WINDOW = 256  # samples
@@ -88,7 +91,7 @@ def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[L
     """
     fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
     common = _seen(fits, runs[0].rate_hz)
-    if common is not None:
+    if common is not None and all(_goes_with(one, common, runs[0].rate_hz) for one in fits):
         common = replace(common, causal=_is_causal(runs, predictions, common))
         return [common] * len(fits)
     each = [_seen([one], runs[0].rate_hz) for one in fits]
@@ -196,6 +199,13 @@ def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Co
         model = np.fft.rfft(taper * prediction[first - steps : first - steps + _WINDOW])
         late = np.exp(2j * np.pi * f_hz * (lag_s - steps / run.rate_hz))
         yield model, np.fft.rfft(taper * run.measured_mps2[first : first + _WINDOW]) * late
+
+
+def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
+    """Whether a run looks no worse with a filter, of about this cut-off and order, than without."""
+    near = np.abs(np.log(_cutoffs_hz(rate_hz) / seen.cutoff_hz)) < _ALIKE
+    alike = np.abs(np.log(_ORDERS / seen.order)) < 2 * _ALIKE
+    return bool(fits.filtered[np.ix_(near, alike)].min() <= fits.plain + _SAME)
 
 
 @dataclass(frozen=True, eq=False)

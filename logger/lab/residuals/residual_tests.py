@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
 from logger.lab.residuals.block_statistics import (
@@ -151,7 +152,9 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
     names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
-        found = loudest(periodogram(residual), reach=round(width_hz * len(residual) / residuals.rate_hz))
+        low_hz, high_hz = run.pass_band_hz
+        inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
+        found = loudest(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
         if found is not None:
             tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), names[run.name]))
     if not tones:

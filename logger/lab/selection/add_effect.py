@@ -79,7 +79,7 @@ class AddedEffects:
     error_as_written    of that model on the distances as recorded: what a comparison with it begins at
     noise_floor_error   the error that the sensor's noise makes
     p_value             how often, at most, noise alone would gain as much
-    unseen_before, unseen_after    the model without and with the effects on what its fit did not see
+    unseen_before, unseen_after    the model without and with the effects on what its fit did not see; None: not known
     band                what of the runs was compared; None: all of it
     distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
     errors              of the numbers of vehicle and effects together
@@ -97,8 +97,8 @@ class AddedEffects:
     p_value: float
     distance_error_m: float
     errors: NumberErrors
-    unseen_before: HoldOut
-    unseen_after: HoldOut
+    unseen_before: HoldOut | None = None
+    unseen_after: HoldOut | None = None
     band: ComparedBand | None = None
 
     @property
@@ -109,7 +109,8 @@ class AddedEffects:
     @property
     def raises(self) -> bool:
         """Whether the error on what no fit saw is larger with them."""
-        return self.unseen_after.raises(self.unseen_before)
+        before, after = self.unseen_before, self.unseen_after
+        return before is not None and after is not None and after.raises(before)
 
     @property
     def helps(self) -> bool:

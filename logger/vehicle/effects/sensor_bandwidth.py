@@ -18,7 +18,9 @@ from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 Complex = npt.NDArray[np.complex128]
 
 _HIGHEST = 8
-_NEAR = 1.25  # a cut-off that a spectrum tells and one that a delay tells differ by no larger factor
+# A cut-off that a spectrum tells and one that a delay tells differ by no larger factor: of a filter run on 100 samples
+# a second with 30 Hz, by tan(0.3 pi) / (0.3 pi) = 1.46.
+_NEAR = 1.5
 
 
 class SensorBandwidth(SensorEffect):
@@ -30,8 +32,6 @@ class SensorBandwidth(SensorEffect):
         Parameter("order", 1.0, 1.0, 8.0, None, Scale.LINEAR, (1.0, 2.0),
                   "1, or 2 to 8 for Butterworth's of that order",
                   choices=tuple(map(float, range(1, _HIGHEST + 1))), default=1.0),
-        Parameter("sampled_hz", 0.0, 0.0, 1e5, None, Scale.LINEAR, (0.0,),
-                  "samples a second that the filter was run on; 0: none, it is a sensor's", default=0.0, held=True),
     )
     source = "S. Butterworth, On the Theory of Filter Amplifiers (1930)"
     signature = "the measurement falls behind the model more and more as the frequency rises, and comes later"
@@ -40,14 +40,15 @@ class SensorBandwidth(SensorEffect):
     stage = 3
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        """Also those of the filter that the record seems to have gone through: as a sensor's and as one run on its
-        samples, and of the orders beside it."""
+        """Also those of the filter that the record seems to have gone through, and of the orders beside it. One that
+        was run on samples, with 3 dB at the cut-off, delays as a sensor's with a higher one does (bilinear transform).
+        """
         found = super().trials(seen)
         if seen is not None and seen.low_pass is not None:
             cutoff_hz, order = seen.low_pass
-            found += [{"cutoff_hz": cutoff_hz, "order": float(one), "sampled_hz": rate_hz}
-                      for one in range(max(order - 1, 1), min(order + 1, _HIGHEST) + 1)
-                      for rate_hz in (0.0, seen.rate_hz)]
+            delays_as_hz = seen.rate_hz / np.pi * np.tan(np.pi * cutoff_hz / seen.rate_hz)
+            found += [{"cutoff_hz": float(one_hz), "order": float(one)} for one_hz in (cutoff_hz, delays_as_hz)
+                      for one in range(max(order - 1, 1), min(order + 1, _HIGHEST) + 1)]
         return found
 
     def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
@@ -55,7 +56,7 @@ class SensorBandwidth(SensorEffect):
         return seen.low_pass is not None and abs(np.log(values["cutoff_hz"] / seen.low_pass[0])) < np.log(_NEAR)
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
-        return butterworth(int(p.order), s, p.cutoff_hz, p.sampled_hz)
+        return butterworth(int(p.order), s, p.cutoff_hz)
 
 
 EFFECT = SensorBandwidth()
