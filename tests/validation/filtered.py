@@ -4,9 +4,9 @@
     python -m tests.validation.filtered --cases 10 --kind one
 
 Each case is one of the examination's, with nothing missing or with one effect, filtered as ``cases.filtered_case``
-says. Printed are what was done and hidden, and what was said; then the shares beside the goals. A name is wrong unless it is
-the hidden effect's, or ``sensor_bandwidth`` for a filter that delays, with a cut-off within 15 %. Seeds as in
-``examine``.
+says. Printed are what was done and hidden, and what was said; then the shares beside the goals. A name is wrong unless
+it is the hidden effect's, or ``sensor_bandwidth`` for a filter that delays, with a cut-off within 15 % of where the
+filter has taken 3 dB. Seeds as in ``examine``.
 """
 
 from __future__ import annotations
