@@ -185,6 +185,11 @@ class Effect(ABC):
         """Whether something else than the model's error speaks for it at these values."""
         return False
 
+    def is_trifle(self, values: Mapping[str, float], seen: Misalignment) -> bool:
+        """Whether it is no more than what is uncertain of a filter that the record went through, and so no finding beside
+        it."""
+        return False
+
     def checked(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with defaults filled in. ValueError for an unknown or missing name, or a value out of bounds."""
         known = {one.name: one for one in self.parameters}

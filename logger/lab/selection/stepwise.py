@@ -259,7 +259,15 @@ class Search:
             now = others[least]
             names.remove(least)
             gains.pop(least)
-        return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
+        return now, self._findings(now, dict(sorted(gains.items(), key=lambda pair: -pair[1])))
+
+    def _findings(self, now: Baseline, gains: dict[str, float]) -> dict[str, float]:
+        """Without those that only mend what is uncertain of a filter, where that is found as well."""
+        by_name = {one.effect.name: one for one in now.state.effects}
+        if not any(by_name[name].effect.is_seen(by_name[name].values, self.seen) for name in gains):
+            return gains
+        return {name: gain for name, gain in gains.items()
+                if not by_name[name].effect.is_trifle(by_name[name].values, self.seen)}
 
 
 def out_of_sight(posterior: Posterior, one: Chosen) -> bool:
