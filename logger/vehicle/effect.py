@@ -186,8 +186,8 @@ class Effect(ABC):
         return False
 
     def is_trifle(self, values: Mapping[str, float], seen: Misalignment) -> bool:
-        """Whether it is no more than what is uncertain of a filter that the record went through, and so no finding beside
-        it."""
+        """Whether it is no more than what is uncertain of a filter that the record went through, and so no finding
+        beside it."""
         return False
 
     def checked(self, values: Mapping[str, float]) -> dict[str, float]:

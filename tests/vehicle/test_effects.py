@@ -22,7 +22,7 @@ from logger.store.formats.effect_file import check_on, shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import effects
 from logger.vehicle.compose import compose, recorded
-from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Scale, chosen
+from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Misalignment, Scale, chosen
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.passage import Passage
