@@ -85,7 +85,7 @@ def whole_below_hz(seen: LowPass, rate_hz: float) -> float:
 
 def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[LowPass | None]:
     """The filter that each run went through; None: none. Runs of one recorder share theirs, so that one for all is
-    asked for first, and then one of each alone.
+    asked for first, and then one of each alone; a run that tells nothing has that of another which it goes with.
 
     predictions    (n,) per run, of a model that is about right; where the runs lie does not matter
     """
@@ -95,8 +95,11 @@ def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[L
         common = replace(common, causal=_is_causal(runs, predictions, common))
         return [common] * len(fits)
     each = [_seen([one], runs[0].rate_hz) for one in fits]
-    return [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
-            for one, run, prediction in zip(each, runs, predictions, strict=True)]
+    found = [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
+             for one, run, prediction in zip(each, runs, predictions, strict=True)]
+    steep = [one for one in found if one is not None and is_steep(one)]
+    return [one or next((other for other in steep if _goes_with(fit, other, runs[0].rate_hz)), None)
+            for one, fit in zip(found, fits, strict=True)]
 
 
 def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_hz: float | None = None) -> list[Run]:
