@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.pass_band import in_band
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 
@@ -71,6 +72,21 @@ UNKNOWN = RecordFacts()
 """Nothing is known of the record."""
 
 
+@dataclass(frozen=True)
+class LowPass:
+    """A low-pass that a record seems to have gone through.
+
+    cutoff_hz, order    of Butterworth's filter that is likest
+    causal              it delayed the record; else it was run forth and back
+    ends_band           the pass band ends where it begins
+    """
+
+    cutoff_hz: float
+    order: float
+    causal: bool = False
+    ends_band: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """One drive over one road, or one time on a rig, evenly sampled: arrays (n,).
@@ -85,6 +101,7 @@ class Run:
     facts            what is known of the record
     usable           what each sample is (``NO_READING``, ``READING``, ``CLIPPED``); None: all are readings
     more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
+    low_pass         what was found of it; None: nothing
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -99,6 +116,7 @@ class Run:
     facts: RecordFacts = UNKNOWN
     usable: Array | None = None
     more: Array = field(default_factory=lambda: np.empty((0, 0)))
+    low_pass: LowPass | None = None
 
     def __post_init__(self) -> None:
         if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):
@@ -164,6 +182,26 @@ class Run:
     def counted(self) -> Bools:
         """Which of the samples that are joined ((1 + s) n,) are not left out."""
         return np.tile(np.arange(self.count) >= self.first, 1 + len(self.signals))
+
+    @property
+    def pass_band_hz(self) -> tuple[float, float]:
+        """Frequencies between which the record is compared; up to half the rate where nothing is known [Hz]."""
+        low_hz, high_hz = self.facts.pass_band_hz or (0.0, self.rate_hz / 2)
+        return low_hz, min(high_hz, self.rate_hz / 2)
+
+    @property
+    def share_passed(self) -> float:
+        """Of the power of white noise, what the pass band leaves."""
+        low_hz, high_hz = self.pass_band_hz
+        return (high_hz - low_hz) / (0.5 * self.rate_hz)
+
+    def in_band(self, samples: Array) -> Array:
+        """Samples like the sensor's (n,), or more signals joined to them, which have no such band: without what lies
+        outside of the pass band; as they are where there is none."""
+        if self.facts.pass_band_hz is None:
+            return samples
+        found = in_band(self.main(samples), self.rate_hz, *self.pass_band_hz)
+        return np.concatenate([found, samples[self.count :]]) if len(samples) > self.count else found
 
     @property
     def two_tracks(self) -> bool:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from logger.lab.diagnosis import Diagnosis
     from logger.lab.likelihood.posterior import Posterior
     from logger.lab.selection.add_effect import AddedEffects
+    from logger.runs import Array
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
@@ -199,13 +200,16 @@ class Bench:
 
 
 def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequence[str], numbers: float,
-             searches: str | None = None, warn: Tell = unsaid, anyway: bool = False) -> Bench:
-    """The model, runs and effects together. Raises BadInput for whatever is wrong with them.
+             searches: str | None = None, warn: Tell = unsaid, low_pass_hz: float | None = None,
+             anyway: bool = False) -> Bench:
+    """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
+    low-passed, or that say so, what is left is compared.
 
     word        by which the user knows the vehicle
     numbers     as ``deviation_of``
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
     warn        told where it will take long, and what was wrong where the user goes on ``anyway``
+    low_pass_hz what lies above is not compared; None: all is that the records hold
     """
     effects, files = known_effects(model, effect_files, all(run.timed for run in runs.runs))
     if searches is not None:
@@ -213,9 +217,9 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     found = Bench(word, model, runs, effects, files, numbers)
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
-    check_model(word, model, runs, warn, anyway)
+    predictions = check_model(word, model, runs, warn, anyway)
     _try_own(found, effect_files)
-    return found
+    return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
 
 def deviation_of(tolerance: float) -> float:
@@ -274,6 +278,22 @@ def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[
     if unknown := set(names) - set(effects):
         raise BadInput(f"no effect {sorted(unknown)[0]!r}: expected one of {', '.join(effects)}")
     return {name: effects[name] for name in sorted(names)}
+
+
+def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_hz: float | None) -> SimulatedRuns:
+    """The runs as they are compared. BadInput where next to nothing would be."""
+    from logger.lab.likelihood.record_band import with_pass_bands
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    half_hz = runs.runs[0].rate_hz / 2
+    if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
+        raise BadInput(f"low-pass {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the sample rate")
+    try:
+        found = with_pass_bands(runs.runs, predictions, low_pass_hz)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    same = all(one.low_pass is None and one.facts.pass_band_hz is None for one in found)
+    return runs if same else SimulatedRuns(found)
 
 
 def slow(effects: Iterable[Effect]) -> list[str]:

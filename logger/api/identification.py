@@ -125,7 +125,8 @@ def identify(
                   without ``start_m`` it is looked for
     noise         what the model leaves: white (output error), ar (innovations form), road (roughness that the profile
                   does not contain, through the car), or auto, the likeliest
-    low_pass_hz   what lies above is left out [Hz]; ``skip_s`` the beginning of each run [s]
+    low_pass_hz   what lies above is left out [Hz], and what lies above the ``pass_band_hz`` of a run's run.yaml;
+                  ``skip_s`` the beginning of each run [s]
     robust        let single wild readings count less (Huber's loss); ``tries`` so many further starts
     road          "measured"; "unmeasured": each run has a road of its own, of ``waviness``; or "same": all are over one
     anyway        go on where a run does not seem to be of its road
@@ -156,12 +157,23 @@ def identify(
     if bare := [drive for drive in drives if drive.track is None and not flat_will_do]:
         raise BadInput(f"{bare[0].path}: expected a run with the profile that it was driven on")
     records = records_of([(drive, drive.track) for drive in drives], skip_s, question)
+    if road == "measured":
+        question = narrowed(question, drives)
     found = (on_measured_roads(model, word, records, question) if road == "measured" else
              on_unmeasured_roads(model, word, records, question, one_road=road == "same"))
     summary = found.as_json
     return Identification("\n".join(found.lines), summary, summary["parameters"], summary["standard_errors"],
                           summary["error_before"], summary["error_after"], summary["converged"],
                           tuple(summary["cannot_tell"]), model_of(found.model))
+
+
+def narrowed(question: Question, drives: Sequence[Drive]) -> Question:
+    """The question without what lies above the pass band of a drive (``run.yaml``), as ``low_pass_hz`` asks for it."""
+    ends_hz = [drive.facts.pass_band_hz[1] for drive in drives
+               if drive.facts.pass_band_hz is not None and drive.facts.pass_band_hz[1] < drive.rate_hz / 2]
+    if question.low_pass_hz is not None:
+        ends_hz.append(question.low_pass_hz)
+    return replace(question, low_pass_hz=min(ends_hz, default=None))
 
 
 def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s: float,

@@ -55,12 +55,14 @@ class Comparison(CommandResult):
 
 
 def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL_TOLERANCE,
-            anyway: bool = False) -> Comparison:
+            low_pass_hz: float | None = None, anyway: bool = False) -> Comparison:
     """Compare a model with measurements: the error, where it sits, and what kind of thing is missing.
 
     vehicle      a model, or a name or file as in ``read_vehicle``
     runs         5 s or longer, of one sample rate of 50 Hz or more, each with a profile and a name of its own
     tolerance    how far off the car's masses, springs and dampers may well be, as a share, 0.001 to 0.5
+    low_pass_hz  what lies above is not compared [Hz]; None: all is that the records hold. Errors are then of the
+                 measurement and the model without it
     anyway       go on where a run does not seem to be of this road, or in these units
 
     Raises BadInput where these do not fit together, and as ``read_vehicle`` and ``read_run``.
@@ -69,7 +71,8 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     >>> found.refitted_error < found.error, found.missing
     (True, True)
     """
-    return comparison_of(bench_with(vehicle, runs, (), tolerance, thin=False, anyway=anyway).compared())
+    return comparison_of(
+        bench_with(vehicle, runs, (), tolerance, thin=False, low_pass_hz=low_pass_hz, anyway=anyway).compared())
 
 
 def comparison_of(found: compare_results.Comparison) -> Comparison:
@@ -131,13 +134,13 @@ class Diagnosis(CommandResult):
 
 def diagnose(
     vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid,
-    anyway: bool = False,
+    effect_files: Sequence[Path | str] = (), tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None,
+    progress: Tell = unsaid, anyway: bool = False,
 ) -> Diagnosis:
     """Which physical effect a model lacks: each that is known is tried, and judged on what no fit saw. It takes from
     seconds to minutes, and the compiler of the ``lab`` extra.
 
-    vehicle, runs, tolerance, anyway    as in ``compare``
+    vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     candidates      names of the effects to be tried; None: all
     effect_files    Python files, each with an effect of your own to be tried as well
     progress        told what is under way, such as ``print``
@@ -151,7 +154,7 @@ def diagnose(
     ('sensor_gain', 1.1)
     """
     bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "diagnose",
-                       anyway=anyway)
+                       low_pass_hz=low_pass_hz, anyway=anyway)
     return diagnosis_of(replace(bench, effects=among(bench.effects, candidates)).diagnosed(progress))
 
 
@@ -201,7 +204,7 @@ class AddedEffect(CommandResult):
     error_after         of the model with the effect, refitted likewise
     noise_floor_error   that the sensor's noise alone makes
     p_value             how often noise alone would improve the fit as much
-    helps               whether that is improbable
+    helps               whether that is improbable, and the error on what no fit saw does not rise
     numbers             of the car, those that the effect moved most first
     model               with the effect
     """
@@ -229,12 +232,13 @@ class AddedEffect(CommandResult):
 
 def add_effect(
     name: Path | str, vehicle: Model | Path | str, runs: Runs, *, start: Mapping[str, float] | None = None,
-    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid, anyway: bool = False,
+    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+    anyway: bool = False,
 ) -> AddedEffect:
     """Add a physical effect to a model: fitted with the car's numbers on all of the runs.
 
     name         of an effect that comes with ridelog, or the path of a Python file with one of your own
-    vehicle, runs, tolerance, anyway    as in ``compare``
+    vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     start        where the fit of its parameters begins, by name; the rest is searched for
     progress     told what is under way, such as ``print``
 
@@ -247,7 +251,7 @@ def add_effect(
     ['sensor_gain']
     """
     values = dict(start or {})
-    bench = bench_with(vehicle, runs, (), tolerance, anyway=anyway)
+    bench = bench_with(vehicle, runs, (), tolerance, low_pass_hz=low_pass_hz, anyway=anyway)
     effect, file = bench.asked_for(str(name), values, str(name))
     bench = bench.with_effect(effect, file)
     is_given = set(values) >= {one.name for one in effect.parameters}
@@ -272,13 +276,13 @@ def addition_of(found: add_results.AddedEffects, model: Model) -> AddedEffect:
 
 def bench_with(
     vehicle: Model | Path | str, runs: Runs, effect_files: Sequence[Path | str], tolerance: float,
-    searches: str | None = None, thin: bool = True, anyway: bool = False,
+    searches: str | None = None, thin: bool = True, low_pass_hz: float | None = None, anyway: bool = False,
 ) -> Bench:
     """All that a question needs, checked together."""
     numbers, model = deviation_of(tolerance), model_of(vehicle)
     drives = [_on_a_road(one) for one in given_runs(runs)]
     return bench_of(word_of(vehicle, model), model, checked_runs(drives, thin, model.vehicle),
-                    list(map(str, effect_files)), numbers, searches, anyway=anyway)
+                    list(map(str, effect_files)), numbers, searches, low_pass_hz=low_pass_hz, anyway=anyway)
 
 
 def word_of(vehicle: Model | Path | str, model: Model) -> str:

@@ -84,12 +84,13 @@ class LabStory(CommandResult):
 def lab(
     vehicle: Model | Path | str, runs: Runs, out: Path | str, *, ask: Callable[[str], str | None] = str,
     candidates: Collection[str] | None = None, effect_files: Sequence[Path | str] = (),
-    tolerance: float = USUAL_TOLERANCE, progress: Tell = unsaid, anyway: bool = False,
+    tolerance: float = USUAL_TOLERANCE, low_pass_hz: float | None = None, progress: Tell = unsaid,
+    anyway: bool = False,
 ) -> LabStory:
     """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is, six effects at
     most. It takes minutes, and the compiler of the ``lab`` extra.
 
-    vehicle, runs, tolerance, anyway    as in ``compare``
+    vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     out             folder for a vehicle file of each step (``vehicle-1.yaml``) and the page ``story.html``
     ask             given the name of an effect that was found missing, gives that of the one to be added, or None for
                     none; without it all that is missing is added
@@ -108,7 +109,7 @@ def lab(
 
     place = Path(out)
     bench = bench_with(vehicle, runs, effect_files, tolerance, None if candidates is not None else "lab",
-                       anyway=anyway)
+                       low_pass_hz=low_pass_hz, anyway=anyway)
     bench = replace(bench, effects=among(bench.effects, candidates))
     make_ready(bench, place)
     story, model = walk(bench, place, _asking(ask), unsaid_lines, lambda: nullcontext(progress))

@@ -34,10 +34,11 @@ ANYWAY = "--anyway goes on"
 
 
 def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None],
-                anyway: bool = False) -> None:
-    """Raise BadInput where an effect of the model cannot be on one of the runs, the model's motion grows without bound,
-    or the road moves no car; and where the sensor was upside down, a run or its profile is in another unit, or the road
-    is another one, unless the user wants to go on ``anyway`` (then it is a warning).
+                anyway: bool = False) -> list[Array]:
+    """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
+    the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
+    profile is in another unit, or the road is another one, unless the user wants to go on ``anyway`` (then it is a
+    warning).
 
     word    by which the user knows the vehicle
     """
@@ -57,6 +58,7 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     matches, band_hz = _matches(runs, predictions, car)
     _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
          warn, anyway)
+    return predictions
 
 
 def check_roads(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:

@@ -18,7 +18,7 @@ import json
 from pathlib import Path
 
 from logger.api.outputs import check_out
-from logger.commands.lab_model import add_anyway, add_tolerance, warned
+from logger.commands.lab_model import add_anyway, add_low_pass, add_tolerance, warned
 from logger.errors import EXIT_DONE
 from logger.files import write_text
 
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
+    add_low_pass(parser)
     add_anyway(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         check_out(args.out, args.runs, [path, *(Path(one.file) for one in model.effects if one.file is not None)])
     runs = lab_runs(args.runs, thin=False, vehicle=model.vehicle)  # an error is that of all samples
     found = bench_of(args.vehicle, model, runs, (), deviation_of(args.tolerance), warn=warned,
-                     anyway=args.anyway).compared()
+                     low_pass_hz=args.low_pass, anyway=args.anyway).compared()
     if args.out is not None:
         from logger.report.lab_page import page
 

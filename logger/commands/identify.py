@@ -86,7 +86,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--noise", choices=NOISE_MODELS, default="auto",
                         help="what the model leaves: white (output error), ar (innovations form), road (roughness that "
                              "the profile does not contain, through the car); auto: the likeliest (default)")
-    parser.add_argument("--low-pass", type=float, metavar="HZ", help="leave out what lies above, for example 20")
+    parser.add_argument("--low-pass", type=float, metavar="HZ",
+                        help="leave out what lies above, for example 20; so does the pass_band_hz of a run.yaml")
     parser.add_argument("--robust", action="store_true", help="let single wild readings count less (Huber's loss)")
     parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
                         help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
@@ -117,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _found(args: argparse.Namespace) -> FittedNumbers:
-    from logger.api.identification import on_measured_roads, on_unmeasured_roads, records_of
+    from logger.api.identification import narrowed, on_measured_roads, on_unmeasured_roads, records_of
     from logger.commands.lab_model import warned
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
@@ -126,9 +127,11 @@ def _found(args: argparse.Namespace) -> FittedNumbers:
     given = read_model(vehicle_path(args.vehicle))
     unmeasured = args.unmeasured_road or args.same_road
     flat_will_do = bool(question.obstacles) or unmeasured
-    records = records_of([_drive(path, flat_will_do) for path in args.runs], args.skip, question)
+    drives = [_drive(path, flat_will_do) for path in args.runs]
+    records = records_of(drives, args.skip, question)
     if unmeasured:
         return on_unmeasured_roads(given, args.vehicle, records, question, args.same_road)
+    question = narrowed(question, [drive for drive, _ in drives])
     return on_measured_roads(given, args.vehicle, records, question, warned)
 
 

@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
-    """RUN..., --vehicle, --tolerance, --effect-file, --anyway and --json."""
+    """RUN..., --vehicle, --tolerance, --low-pass, --effect-file, --anyway and --json."""
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
                         help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     add_tolerance(parser)
+    add_low_pass(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
                         help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
                              "tried only where they are named; may repeat")
@@ -45,13 +46,22 @@ def add_tolerance(parser: argparse.ArgumentParser) -> None:
                     f"{USUAL_TOLERANCE:g}, 4 %%)")
 
 
+def add_low_pass(parser: argparse.ArgumentParser) -> None:
+    """--low-pass, for ``bench_of``."""
+    parser.add_argument("--low-pass", type=float, metavar="HZ",
+                        help="leave out what lies above, for example 20, of the record and of the model alike; errors "
+                             "are then of what is left (default: all that the record holds; a record that somebody "
+                             "has low-passed is found, and said)")
+
+
 def bench(args: argparse.Namespace, searches: str | None = None) -> Bench:
     """The model, runs and effects of a command line, as ``bench_of``."""
-    return bench_from(args.vehicle, args.runs, args.effect_file, args.tolerance, searches, args.anyway)
+    return bench_from(args.vehicle, args.runs, args.effect_file, args.tolerance, searches, args.low_pass, args.anyway)
 
 
 def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str] = (),
-               tolerance: float = USUAL_TOLERANCE, searches: str | None = None, anyway: bool = False) -> Bench:
+               tolerance: float = USUAL_TOLERANCE, searches: str | None = None, low_pass_hz: float | None = None,
+               anyway: bool = False) -> Bench:
     """The same, where they are not of a command line."""
     from logger.api.bench import bench_of, deviation_of
     from logger.api.run_checks import lab_runs
@@ -60,7 +70,7 @@ def bench_from(vehicle: str, folders: Sequence[Path], effect_files: Sequence[str
 
     numbers, model = deviation_of(tolerance), read_model(vehicle_path(vehicle))
     return bench_of(vehicle, model, lab_runs(folders, vehicle=model.vehicle), effect_files, numbers, searches, warned,
-                    anyway)
+                    low_pass_hz, anyway)
 
 
 def warned(words: str) -> None:

@@ -297,7 +297,6 @@ def _parameter_json(one: Parameter) -> dict[str, Any]:
 def _effect_in_words(effect: Effect) -> str:
     lines = [f"{effect.name}: {effect.title}"]
     for one in effect.parameters:
-        allowed = " or ".join(f"{choice:g}" for choice in one.choices) or f"{one.low:g} to {one.high:g}"
-        lines.append(f"  {one.name}={one.start:g}  ({allowed})  {one.meaning}")
+        lines.append(f"  {one.name}={one.start:g}  ({one.allowed})  {one.meaning}")
     return "\n".join([*lines, f"  leaves: {effect.signature}", f"  to see it: {effect.shown_by}",
                       f"  source: {effect.source}"])

@@ -18,6 +18,7 @@ from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests
@@ -73,6 +74,11 @@ class Comparison:
     far: tuple[str, ...]
     distance_error_m: float
     tests: ResidualTests
+
+    @property
+    def band(self) -> ComparedBand | None:
+        """What of the runs was compared; None: all of it."""
+        return compared_band(self.plain.residuals.runs)
 
     @property
     def tells(self) -> bool:

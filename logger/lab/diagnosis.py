@@ -28,6 +28,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
@@ -35,7 +36,7 @@ from logger.lab.selection.detectability import Undetectable, undetectable_effect
 from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Search, Selection
+from logger.lab.selection.stepwise import Search, Selection, out_of_sight
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
@@ -93,6 +94,7 @@ class Diagnosis:
     shape                of what no candidate explains; None where no more than noise is left
     distance_error_m     by how much a distance is off at most, if that is more than usual; else 0
     signals              errors of signals beside the sensor's acceleration, by name
+    band                 what of the runs was compared; None: all of it
     """
 
     runs: tuple[str, ...]
@@ -112,6 +114,7 @@ class Diagnosis:
     shape: Shape | None
     distance_error_m: float
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
+    band: ComparedBand | None = None
 
     @property
     def left_over(self) -> bool:
@@ -168,7 +171,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         obstacles=obstacles, verdict=tuple(selection.gains), excess=above, conflicts=_conflicts(fine, state),
         steps=_steps(selection, posterior.error(nominal)), effects=with_errors, undetectable=hidden,
         shape=shape_of(fine, state) if above > UNEXPLAINED else None,
-        distance_error_m=unusual_m(fine.record_errors, state.record),
+        distance_error_m=unusual_m(fine.record_errors, state.record), band=compared_band(fine.runs.runs),
         signals=signal_errors_of(fine, fine.start(present), state),
     )
 
@@ -199,7 +202,7 @@ def _finely_fitted(search: Search, selection: Selection) -> tuple[Selection, Lin
         state = selection.now.state
         start = fine.at(state.effects, state.logs, state.record, state.size)
         after = read_beside(fit(aligned(fine, start), selection.now.linear.numbers))
-        ended = [one.effect.name for one in after.state.effects[search.present:] if one.at_an_end]
+        ended = [one.effect.name for one in after.state.effects[search.present:] if out_of_sight(fine, one)]
         if not ended:
             return selection, after
         selection = search.left_out(selection, ended[0])

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from logger.lab.selection.add_effect import BIASED, AddedEffects, Number
+from logger.report.band_text import band_json, band_words
 from logger.report.quantities import chance, distance_error, finite, numbers_of, signal_errors
 
 _AT_BOUND = 1e-6
@@ -25,7 +26,8 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
 
 def judgement(found: AddedEffects) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
-    lines = [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
+    lines = band_words(found.band)
+    lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, its noise alone about {}")
     lines += distance_error(found.distance_error_m)
@@ -37,6 +39,10 @@ def judgement(found: AddedEffects) -> list[str]:
             lines.append(f"At its bound: {', '.join(at)}. That is where the fit was stopped, not what was measured.")
     if found.helps:
         lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
+    elif found.gains and found.unseen_before is not None and found.unseen_after is not None:
+        lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but on stretches "
+                     f"that no fit saw the error rises from {found.unseen_before.error:.4f} to "
+                     f"{found.unseen_after.error:.4f}: it imitates something else.")
     else:
         lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
                      f"{chance(found.p_value)}; these runs are no reason to keep it.")
@@ -85,6 +91,9 @@ def as_json(found: AddedEffects) -> dict[str, Any]:
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
+        **({} if found.unseen_before is None or found.unseen_after is None else {
+            "error_unseen_before": found.unseen_before.error, "error_unseen_after": found.unseen_after.error}),
+        **band_json(found.band),
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "numbers": [{"name": one.name, "nominal": one.nominal, "without": one.without,
                      "without_standard_error": one.without_standard_error, "with": one.found,

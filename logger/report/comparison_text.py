@@ -10,6 +10,7 @@ from logger.lab.compare import FAR_SIGMA, Comparison, Standing
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
+from logger.report.band_text import band_json, band_words
 from logger.report.quantities import distance_error, signal_errors
 from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error
@@ -22,8 +23,9 @@ def headline(found: Comparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
-    lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: error "
-             f"{plain.error:.3f}."]
+    lines = band_words(found.band)
+    lines.append(f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
+                 f"error {plain.error:.3f}.")
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += " (and the numbers of its effects)"
@@ -76,7 +78,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
     return {
         **_standing_json(found.plain),
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
-        "missing": found.missing,
+        "missing": found.missing, **band_json(found.band),
         "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
         "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
     }

@@ -10,6 +10,7 @@ from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
+from logger.report.band_text import band_json, band_words
 from logger.report.quantities import chance, distance_error, finite, numbers_of, signal_errors
 from logger.vehicle.effect import Chosen
 
@@ -21,12 +22,13 @@ _MOST_HIDDEN = 6
 def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = [_missing(found, one) for one in found.missing]
-    if not lines and not found.unexplained:
+    lines = [*band_words(found.band), *lines]
+    if not found.missing and not found.unexplained:
         lines.append("Nothing is missing: with the car's numbers refitted within their tolerance, the residual is "
                      "hardly more than the sensor's noise.")
     if found.left_over:
-        lines.append(f"Something {'more ' * bool(lines)}is missing that no candidate explains: in the worst run "
-                     f"the residual is {1 + found.excess:.3g} times the sensor's noise.")
+        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
+                     f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"Candidates that improve the fit by less than {IMITATION:.0%} of what a full explanation "
                          "would are not named: they may only imitate what is missing.")
@@ -127,6 +129,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
+        **band_json(found.band),
         "sentences": [*summary(found), *looks_like(found)],
     }
 

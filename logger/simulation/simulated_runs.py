@@ -55,7 +55,8 @@ class SimulatedRuns:
 
     def predict(self, car: Car, moved_m: Sequence[Array] | None = None, rough: bool = False,
                 tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
-        """What would have been recorded in each run, whole (n,) [m/s2]; of one with more signals all ((1 + s) n,).
+        """What would have been recorded in each run, whole, in its pass band (n,) [m/s2]; of one with more signals all
+        ((1 + s) n,).
 
         moved_m    (n,) per run, by how much the car was farther than its distance signal said; None: nothing
         rough      step a car that rubs no finer than others: what a change does is told well enough by that
@@ -65,7 +66,7 @@ class SimulatedRuns:
             passages = self._laid_out(car, moved_m, rough, tracks)
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
             partial(_recorded, car), passages, [run.signals for run in self.runs])
-        return list(each)
+        return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
     def respond(self, car: Car, moved_m: Sequence[Array] | None = None) -> list[Response]:
         """The same with the motions of suspensions and tires."""

@@ -38,6 +38,7 @@ Complex = npt.NDArray[np.complex128]
 _AT_END = 1e-3
 ON_A_RIG = "it needs a road and a speed, and the run is driven by time"
 """Why some effects cannot be tried on a rig."""
+_RESONANCE = "frequency_hz"  # what effects that resonate call it
 
 
 class Scale(Enum):
@@ -83,6 +84,13 @@ class Parameter:
     choices: tuple[float, ...] = ()
     default: float | None = None
     step: float | None = None
+
+    @property
+    def allowed(self) -> str:
+        """What it may be, in words: "1 or 2", "0.2 to 5"."""
+        if len(self.choices) > 2:
+            return "one of " + ", ".join(f"{choice:g}" for choice in self.choices)
+        return " or ".join(f"{choice:g}" for choice in self.choices) or f"{self.low:g} to {self.high:g}"
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""
@@ -131,10 +139,14 @@ class Misalignment:
 
     scale      distance recorded over distance driven, were that all
     delay_s    how late the acceleration is, were that all [s]
+    low_pass   cut-off [Hz] and order of a filter that the record seems to have gone through; None: none
+    rate_hz    samples a second of the record; 0: it does not matter
     """
 
     scale: float
     delay_s: float
+    low_pass: tuple[float, int] | None = None
+    rate_hz: float = 0.0
 
 
 class Effect(ABC):
@@ -184,6 +196,15 @@ class Effect(ABC):
         names = [one.name for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
 
+    def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
+        """Whether something else than the model's error speaks for it at these values."""
+        return False
+
+    def is_trifle(self, values: Mapping[str, float], seen: Misalignment) -> bool:
+        """Whether it is no more than what is uncertain of a filter that the record went through, and so no finding
+        beside it."""
+        return False
+
     def checked(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with defaults filled in. ValueError for an unknown or missing name, or a value out of bounds."""
         known = {one.name: one for one in self.parameters}
@@ -197,8 +218,7 @@ class Effect(ABC):
             if value is None:
                 raise ValueError(f"{self.name}: expected a value of {name} ({one.meaning})")
             if not one.low <= value <= one.high or (one.choices and value not in one.choices):
-                allowed = " or ".join(f"{choice:g}" for choice in one.choices) or f"{one.low:g} to {one.high:g}"
-                raise ValueError(f"{self.name}: expected {name} of {allowed}, found {value:g}")
+                raise ValueError(f"{self.name}: expected {name} of {one.allowed}, found {value:g}")
             found[name] = float(value)
         return found
 
@@ -267,6 +287,10 @@ class Chosen:
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
+
+    def resonates_above(self, high_hz: float) -> bool:
+        """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing."""
+        return any(one.name == _RESONANCE and self.values[one.name] > high_hz for one in self.effect.parameters)
 
     @property
     def p(self) -> SimpleNamespace:

@@ -22,7 +22,7 @@ from logger.store.formats.effect_file import check_on, shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import effects
 from logger.vehicle.compose import compose, recorded
-from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Scale, chosen
+from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Misalignment, Scale, chosen
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.own_effect import look_through, try_out
 from logger.vehicle.passage import Passage
@@ -324,3 +324,16 @@ def test_what_a_full_car_carries_is_carried_by_the_whole_car() -> None:
     full = CARS["full"]
     made = compose(full, [usual(EFFECTS["payload"], mass_kg=100.0), usual(EFFECTS["occupant"], mass_kg=70.0)]).structure
     assert (made.mass[0, 0], made.mass[-1, -1]) == (full.sprung_mass_kg + 100.0, 70.0)
+
+
+def test_a_seen_filter_is_tried_and_its_delay_is_no_clocks() -> None:
+    """Butterworth's fourth order at 10 Hz is late by 2.613 / (2 pi 10) = 41.6 ms."""
+    seen = Misalignment(1.0, 0.04, (10.0, 4), 100.0)
+    bandwidth, offset = EFFECTS["sensor_bandwidth"], EFFECTS["time_offset"]
+    tried = [one for one in bandwidth.trials(seen) if one not in bandwidth.trials()]
+    assert {one["order"] for one in tried} == {3.0, 4.0, 5.0} and tried[0]["cutoff_hz"] == 10.0
+    assert bandwidth.is_seen({"cutoff_hz": 11.0}, seen) and not bandwidth.is_seen({"cutoff_hz": 40.0}, seen)
+    assert offset.is_trifle({"delay_s": -0.013}, seen) and not offset.is_trifle({"delay_s": 0.015}, seen)
+    still = Misalignment(1.0, 0.04)
+    assert not bandwidth.is_seen({"cutoff_hz": 10.0}, still) and not offset.is_trifle({"delay_s": 1e-4}, still)
+    assert bandwidth.trials(still) == bandwidth.trials()

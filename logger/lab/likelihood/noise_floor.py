@@ -3,7 +3,8 @@
 Problem: an error means little without the error below which no model comes. Solution: at the highest frequencies a car
 moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
 well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more, the
-quietest first.
+quietest first. Where the highest frequencies are outside of the pass band, because somebody filtered the record, the
+quietest of the bands that are left begins.
 """
 
 from __future__ import annotations
@@ -89,13 +90,13 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
     """
     quiet = [one.quiet(residual) for one, residual in zip(bands, residuals, strict=True)]
     freedom = sum(n for _, n in quiet)
-    power = sum(level * n for level, n in quiet) / freedom
-    highest = power, freedom
+    power = sum(level * n for level, n in quiet) / freedom if freedom else 0.0
     powers = [one.power(residual) for one, residual in zip(bands, residuals, strict=True)]
     places = range(min(map(len, powers)))
     freedoms = [sum(float(one.freedom[place]) for one in bands) for place in places]
     levels = [sum(float(one.freedom[place] * own[place]) for one, own in zip(bands, powers, strict=True))
               / freedoms[place] for place in places]
+    highest = (power, freedom) if freedom else (levels[-1], freedoms[-1])
     by_level = sorted(zip(levels, freedoms, strict=True))
     louder = _LOUDER
     if power < _FILTERED * by_level[0][0]:
@@ -148,5 +149,7 @@ def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> f
 
 
 def floor_error(posterior: Posterior, noise: Noise) -> float:
-    """rms(noise) / rms(measured) over all samples that count."""
-    return noise.deviation_mps2 / posterior.size_mps2
+    """rms(noise) / rms(measured) over all samples that count, both in the pass band."""
+    runs = posterior.runs.runs
+    share = np.average([one.share_passed for one in runs], weights=[one.count - one.first for one in runs])
+    return float(noise.deviation_mps2 * np.sqrt(share) / posterior.size_mps2)

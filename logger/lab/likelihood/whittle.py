@@ -4,7 +4,8 @@ Problem: the noise that a model leaves differs between runs and between frequenc
 Solution: residual power is measured by Welch's method in bands. With a free level in each, minus twice the logarithm of
 the likelihood is the sum of n ln P over the bands (P. Whittle 1953, concentrated), n = 2 B T being the degrees of
 freedom of bandwidth B in the time T. No level is below the discrepancy between two right simulations of a car, which is
-a share of what was measured in the same band.
+a share of what was measured in the same band. Bands end where the run's pass band does: what was filtered away by
+somebody, or shall not be compared, tells nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.runs import READING, Run
 
 Array = npt.NDArray[np.float64]
@@ -60,11 +62,12 @@ class Bands:
         starts = np.ceil(np.arange(0, kept, 0.5 * _BLOCK_S * rate) - _ROUNDED).astype(int)
         self._starts = starts[starts <= kept - size]
         f_hz = np.fft.rfftfreq(size, 1 / rate)
-        ends_hz = (*_EDGES_HZ, *_MORE_EDGES_HZ) if run.timed else _EDGES_HZ
-        edges = np.array([one for one in ends_hz if one < HIGHEST_OF_RATE * rate - 0.5] + [HIGHEST_OF_RATE * rate])
+        band_hz = run.pass_band_hz if signal is None else (0.0, rate / 2)
+        edges = _edges_hz(run, band_hz)
         self.edges_hz = edges
         self._members = [np.flatnonzero((f_hz >= low) & (f_hz < high)) for low, high in pairwise(edges)]
-        self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate))
+        passed = band_hz[1] >= rate / 2
+        self._quiet = np.flatnonzero((f_hz >= _QUIET_OF_RATE[0] * rate) & (f_hz < _QUIET_OF_RATE[1] * rate) & passed)
         # What was not read, or clipped, leaves zeros.
         self._share = 1.0 if run.usable is None else max(float(np.mean(run.usable[run.first:] == READING)), 1 / kept)
         self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept * self._share
@@ -88,7 +91,10 @@ class Bands:
         return float(self.freedom @ (np.log(level) + power / level - 1))
 
     def quiet(self, residual: Array) -> tuple[float, float]:
-        """Mean power of a residual where nothing but the sensor's noise is, as if it were white, and its freedom."""
+        """Mean power of a residual where nothing but the sensor's noise is, as if it were white, and its freedom; both
+        0 where that is outside of the pass band."""
+        if not len(self._quiet):
+            return 0.0, 0.0
         freedom = 2 * len(self._quiet) / self._size * (self.count - self.first) * self._share
         return float(self._spectrum(residual)[self._quiet].mean()), freedom
 
@@ -101,6 +107,17 @@ class Bands:
         blocks = np.lib.stride_tricks.sliding_window_view(residual[self.first:], self._size)[self._starts]
         power = (np.abs(np.fft.rfft(blocks * self._taper, axis=1)) ** 2).mean(axis=0)
         return np.asarray(power / (self._size * self._share))
+
+
+def _edges_hz(run: Run, band_hz: tuple[float, float]) -> Array:
+    """Ends of a run's bands (b + 1,) within its pass band, one band at least [Hz]. At an end of the pass band the
+    filter that ends it takes something away already."""
+    ends_hz = (*_EDGES_HZ, *_MORE_EDGES_HZ) if run.timed else _EDGES_HZ
+    low_hz, high_hz = band_hz
+    high_hz = min(high_hz - HALF_WIDTH_HZ if high_hz < run.rate_hz / 2 else high_hz, HIGHEST_OF_RATE * run.rate_hz)
+    low_hz = max(low_hz + min(HALF_WIDTH_HZ, 0.5 * low_hz), ends_hz[0])
+    inside = [one for one in ends_hz if low_hz + 0.5 < one < high_hz - 0.5]
+    return np.array([low_hz, *inside, max(high_hz, low_hz + 1.0)])
 
 
 class Whitener:

@@ -88,6 +88,16 @@ class ModelResiduals:
         """Samples a second, the same in all runs."""
         return self.runs[0].rate_hz
 
+    @property
+    def top_hz(self) -> float:
+        """Up to where any of the runs is compared."""
+        return max(run.pass_band_hz[1] for run in self.runs)
+
+    @property
+    def whole(self) -> bool:
+        """Whether the runs are compared at all frequencies."""
+        return all(run.facts.pass_band_hz is None for run in self.runs)
+
     @cached_property
     def residual(self) -> list[Array]:
         """measured - model, the samples that count, per run [m/s2]."""
@@ -110,12 +120,12 @@ class ModelResiduals:
     @cached_property
     def bands(self) -> tuple[Band, ...]:
         """Body and wheels of this car, about as wide as their damping makes them, and what lies below, between and
-        above, up to half the sample rate."""
+        above, up to where the runs' pass bands end, half the sample rate if they do not."""
         structure = structure_of(self.car.vehicle)
         own_hz = undamped_frequencies_hz(structure)
         body_hz, wheels_hz = own_hz[: -len(structure.wheels)], own_hz[-len(structure.wheels):]
         between = np.sqrt(body_hz[-1] * wheels_hz[0])
-        top, above = self.rate_hz / 2, wheels_hz[-1] * 1.3
+        top, above = self.top_hz, wheels_hz[-1] * 1.3
         kept = max(PASS_OF_RATE * self.rate_hz, above)
         bands = (("below body bounce", body_hz[0] / 1.35), ("body bounce", min(body_hz[-1] * 1.35, between)),
                  ("between", max(wheels_hz[0] / 1.3, between)), ("wheel hop", above),

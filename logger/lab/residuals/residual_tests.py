@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from logger.dsp.pass_band import HALF_WIDTH_HZ
 from logger.identification.residual_whiteness import LAGS, autocorrelation
 from logger.lab.likelihood.lag import Lags, constant, drift, lags
 from logger.lab.residuals.block_statistics import (
@@ -104,7 +105,10 @@ def run_residual_tests(residuals: ModelResiduals, where: Breakdown, unmoved: Mod
 
 
 def _whiteness(residuals: ModelResiduals) -> ResidualTest:
-    """The largest correlation of samples; one of 0.1 tells a hundredth of the power from a sample before."""
+    """The largest correlation of samples; one of 0.1 tells a hundredth of the power from a sample before. What was
+    filtered is not white, whatever it was."""
+    if not residuals.whole:
+        return ResidualTest("whiteness")
     rho = autocorrelations(residuals.residual, LAGS)
     largest = int(np.abs(rho).argmax())
     return ResidualTest("whiteness", float(rho[largest]), "1", sum(map(len, residuals.residual)) ** -0.5,
@@ -148,7 +152,9 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
     names, tones = short_names(residuals.runs), []
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
-        found = loudest(periodogram(residual), reach=round(width_hz * len(residual) / residuals.rate_hz))
+        low_hz, high_hz = run.pass_band_hz
+        inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
+        found = loudest(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
         if found is not None:
             tones.append((found[1] * len(residuals.runs), float(f_hz[found[0]]), names[run.name]))
     if not tones:
@@ -162,7 +168,7 @@ def _tone(residuals: ModelResiduals, width_hz: float = 0.4) -> ResidualTest:
 
 def _follows_road(residuals: ModelResiduals) -> ResidualTest:
     """Coherence with the road, at the frequencies that the recorder passes."""
-    coherence, top = with_road(residuals), PASS_OF_RATE * residuals.rate_hz
+    coherence, top = with_road(residuals), min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
     share, p_value = coherence.explained(0.0, top)
     bands = [band for band in residuals.bands if band.from_hz < top]
     most = max(bands, key=lambda band: coherence.explained(band.from_hz, min(band.to_hz, top))[0]
@@ -204,7 +210,8 @@ def _proportion(residuals: ModelResiduals) -> ResidualTest:
     """measured / model where a band is weak and where it is strong, with Welch's test of the difference."""
     found = []
     for band in residuals.bands[1:]:
-        gains = _two_gains(residuals, band.from_hz, min(band.to_hz, PASS_OF_RATE * residuals.rate_hz))
+        top_hz = min(PASS_OF_RATE * residuals.rate_hz, residuals.top_hz)
+        gains = _two_gains(residuals, band.from_hz, min(band.to_hz, top_hz))
         if gains is not None:
             found.append((*gains, band.name))
     if not found:

@@ -3,9 +3,10 @@
 Problem: whoever adds an effect wants its numbers with their errors, and wants to see what else changed: a missing
 effect biases the car's own numbers, and adding it removes the bias; and a fit always gains a little when it gets one
 more number. Solution: the car is fitted with and without the effect on all of the runs, each number comes with its
-standard error from the information matrix, and the gain in evidence says how often noise would do as much. What is
-written holds on to the numbers that were given; what is compared side by side does not, on either side, so that nothing
-but the effect makes the difference.
+standard error from the information matrix, and the gain in evidence says how often noise would do as much. Evidence
+weighs frequencies by their noise: where it gains and the error on what no fit saw rises, the effect does not help. What
+is written holds on to the numbers that were given; what is compared side by side does not, on either side, so that
+nothing but the effect makes the difference.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.map_fit import aligned, fit, own_slopes, read_beside
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, noise_as_read, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.holdout import HoldOut, held_out
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
@@ -76,6 +79,8 @@ class AddedEffects:
     error_as_written    of that model on the distances as recorded: what a comparison with it begins at
     noise_floor_error   the error that the sensor's noise makes
     p_value             how often, at most, noise alone would gain as much
+    unseen_before, unseen_after    the model without and with the effects on what its fit did not see; None: not known
+    band                what of the runs was compared; None: all of it
     distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
     errors              of the numbers of vehicle and effects together
     signals             errors of signals beside the sensor's acceleration, by name: refitted without and with
@@ -94,11 +99,25 @@ class AddedEffects:
     distance_error_m: float
     errors: NumberErrors
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
+    unseen_before: HoldOut | None = None
+    unseen_after: HoldOut | None = None
+    band: ComparedBand | None = None
+
+    @property
+    def gains(self) -> bool:
+        """Whether the effects gain more than noise would."""
+        return self.p_value < FALSE_ALARM
+
+    @property
+    def raises(self) -> bool:
+        """Whether the error on what no fit saw is larger with them."""
+        before, after = self.unseen_before, self.unseen_after
+        return before is not None and after is not None and after.raises(before)
 
     @property
     def helps(self) -> bool:
-        """Whether the effects gain more than noise would."""
-        return self.p_value < FALSE_ALARM
+        """Whether the effects gain more than noise would, and not only where the fit looked."""
+        return self.gains and not self.raises
 
     @property
     def new(self) -> tuple[Chosen, ...]:
@@ -148,7 +167,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         noise_floor_error=floor_error(posterior, noise_as_read(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
         distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after),
-        signals=signal_errors_of(posterior, before.state, state))
+        unseen_before=held_out(before, own_slopes(before)), unseen_after=held_out(after, own_slopes(after)),
+        band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state))
 
 
 def _with(posterior: Posterior, before: LinearModel, beside: tuple[Chosen, ...],

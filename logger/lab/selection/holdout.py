@@ -21,6 +21,8 @@ from logger.runs import Run
 
 Array = npt.NDArray[np.float64]
 
+# Half of the last digit of three: an error of 0.060 that is said to fall to 0.060.
+_ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
 """Stretches are longer than a car remembers its road, some seconds, and each run has some of every set."""
 
@@ -32,6 +34,10 @@ class HoldOut:
 
     error: float
     deviance: float
+
+    def raises(self, without: HoldOut) -> bool:
+        """Whether the error is larger than that of the model without something, by more than a rounding."""
+        return self.error > (1 + _ROUNDING) * without.error
 
 
 def folds(run: Run) -> npt.NDArray[np.intp]:

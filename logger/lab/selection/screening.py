@@ -288,7 +288,7 @@ def misalignment_of_record(base: Baseline) -> Misalignment:
         (error.run.distance_m - error.run.distance_m[0], error.run.speed_mps, error.moved_m(k))
         for error, k in zip(base.posterior.record_errors, base.state.record, strict=True)), strict=True))
     (longer, earlier_s), *_ = np.linalg.lstsq(np.stack([way, speed], axis=1), moved_m, rcond=None)
-    return Misalignment(float(1 / (1 + longer)), float(-earlier_s))
+    return Misalignment(float(1 / (1 + longer)), float(-earlier_s), *_filter_of(base.posterior))
 
 
 def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Misalignment:
@@ -317,7 +317,15 @@ def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Mis
     still = alike(1.0, 0.0)
     scales = 1 + _scanned(lambda off: alike(1 + off, 0.0), 0.08, 5e-4)
     delay_s = _scanned(lambda off: alike(1.0, off), 1.5, 0.02)
-    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0)
+    return Misalignment(scales if alike(scales, 0.0) > still else 1.0, delay_s if alike(1.0, delay_s) > still else 0.0,
+                        *_filter_of(posterior))
+
+
+def _filter_of(posterior: Posterior) -> tuple[tuple[float, int] | None, float]:
+    """The filter that the records seem to have gone through, and their rate."""
+    runs = posterior.runs.runs
+    causal = [run.low_pass for run in runs if run.low_pass is not None and run.low_pass.causal]
+    return (causal[0].cutoff_hz, round(causal[0].order)) if causal else None, runs[0].rate_hz
 
 
 def _scanned(alike: Callable[[float], float], reach: float, step: float) -> float:

@@ -17,11 +17,12 @@ import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit
+from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import Baseline, Screened, as_recorded, misalignment_of_record, screened
-from logger.vehicle.effect import Effect, Misalignment
+from logger.vehicle.effect import Chosen, Effect, Misalignment
 from logger.vehicle.effect_parameters import moves_of
 
 Progress = Callable[[str], None]
@@ -108,7 +109,7 @@ class Search:
             if best is None:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
-            self._rivals[best.effect.name] = self._alike(best.gain, best.effect.name, tried)
+            self._rivals[best.effect.name] = self._alike(now, best.gain, best.effect.name, tried)
             now = self._refit(best)
             earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
             steps.append((best.effect.name, now.hold_out))
@@ -171,8 +172,9 @@ class Search:
         return [one for one in promises[: self.effort.fitted] if one.gain > least]
 
     def accepted(self, now: Baseline, one: CandidateFit) -> bool:
-        """Whether an effect is there: neither by chance nor by imitation, and not at an end of its range."""
-        return self._is_evident(now, one.gain) and not one.chosen.at_an_end
+        """Whether an effect is there: neither by chance nor by imitation, not at an end of its range, and nowhere that
+        the record does not show."""
+        return self._is_evident(now, one.gain) and not out_of_sight(now.posterior, one.chosen)
 
     def _is_evident(self, without: Baseline, gain: float) -> bool:
         """Whether so much is gained over a model neither by chance nor by imitation."""
@@ -183,10 +185,12 @@ class Search:
         return max(least_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
-        """Of those that are there and cannot be told from the likeliest, the one with the fewest numbers."""
+        """Of those that are there and cannot be told from the likeliest, one that the records show anyhow, or the one
+        with the fewest numbers."""
         there = [one for one in tried.fits if self.accepted(now, one)]
         return min((one for one in there if one.gain > there[0].gain - CONFUSED),
-                   key=lambda one: len(moves_of([one.chosen])), default=None)
+                   key=lambda one: (not one.effect.is_seen(one.chosen.values, self.seen), len(moves_of([one.chosen]))),
+                   default=None)
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted; kept as long as this is the model."""
@@ -223,18 +227,22 @@ class Search:
             now, gain = self._refit(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
-        self._rivals[name] = self._alike(gain, name, tried)
+        self._rivals[name] = self._alike(without, gain, name, tried)
         return now, gain
 
-    def _alike(self, gain: float, name: str, tried: Round) -> tuple[str, ...]:
+    def _alike(self, without: Baseline, gain: float, name: str, tried: Round) -> tuple[str, ...]:
         """Effects that explain as well as one that gains so much."""
         return tuple(one.effect.name for one in tried.fits
-                     if one.effect.name != name and abs(one.gain - gain) < CONFUSED and not one.chosen.at_an_end)
+                     if one.effect.name != name and abs(one.gain - gain) < CONFUSED
+                     and not out_of_sight(without.posterior, one.chosen))
 
     def _needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
-        """The model without effects that are not needed beside the others, and what each of these gains."""
+        """The model without effects that are not needed beside the others, or with which the error on what no fit saw
+        is larger than without; and what each of those that stay gains."""
         names = list(now.state.names[self.present:])
         if len(names) == 1:
+            if now.hold_out.raises(before.hold_out):
+                return before, {}
             return now, {names[0]: before.score - now.score}
         gains: dict[str, float] = {}
         while names:
@@ -243,11 +251,28 @@ class Search:
                 others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in others.items()}
             least = min(gains, key=lambda name: gains[name])
-            if len(names) == 1 or self._is_evident(others[least], gains[least]):
+            raising = [name for name in names if now.hold_out.raises(others[name].hold_out)]
+            if raising:
+                least = min(raising, key=lambda name: gains[name])
+            elif len(names) == 1 or self._is_evident(others[least], gains[least]):
                 break
             now = others[least]
             names.remove(least)
-        return now, dict(sorted(gains.items(), key=lambda pair: -pair[1]))
+            gains.pop(least)
+        return now, self._findings(now, dict(sorted(gains.items(), key=lambda pair: -pair[1])))
+
+    def _findings(self, now: Baseline, gains: dict[str, float]) -> dict[str, float]:
+        """Without those that only mend what is uncertain of a filter, where that is found as well."""
+        by_name = {one.effect.name: one for one in now.state.effects}
+        if not any(by_name[name].effect.is_seen(by_name[name].values, self.seen) for name in gains):
+            return gains
+        return {name: gain for name, gain in gains.items()
+                if not by_name[name].effect.is_trifle(by_name[name].values, self.seen)}
+
+
+def out_of_sight(posterior: Posterior, one: Chosen) -> bool:
+    """Whether an effect is at an end of its range, or resonates above all that the records hold."""
+    return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in posterior.runs.runs))
 
 
 def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:

@@ -122,7 +122,7 @@ def _read_effect(node: Node, vehicle: Vehicle) -> Chosen:
 def _value(node: Node, parameter: Parameter) -> float:
     value = node.number(low=parameter.low, high=parameter.high)
     if parameter.choices and value not in parameter.choices:
-        raise node.wrong(" or ".join(f"{choice:g}" for choice in parameter.choices))
+        raise node.wrong(parameter.allowed)
     return value
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ Complex = npt.NDArray[np.complex128]
 
 # So little moves all waves alike: a search can tell from it how much it takes. Runs lie wrong from the second on.
 _LITTLE_S, _WRONG_S = 2e-4, 0.002
+_THIRD = 1 / 3
 
 
 class TimeOffset(SensorEffect):
@@ -33,6 +35,14 @@ class TimeOffset(SensorEffect):
             return [{"delay_s": -_WRONG_S}, {"delay_s": _WRONG_S}]
         wrong_s = [seen.delay_s] if abs(seen.delay_s) > _WRONG_S else []
         return [{"delay_s": delay_s} for delay_s in (_LITTLE_S, *wrong_s)]
+
+    def is_trifle(self, values: Mapping[str, float], seen: Misalignment) -> bool:
+        """Less than a third of the delay of the filter that the record went through, 1 / (sin(pi / 2 n) 2 pi cutoff) of
+        Butterworth's order n: as a sensor's it delays by another third or so than as one run on samples."""
+        if seen.low_pass is None:
+            return False
+        cutoff_hz, order = seen.low_pass
+        return abs(values["delay_s"]) < _THIRD / (np.sin(np.pi / (2 * order)) * 2 * np.pi * cutoff_hz)
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         return np.exp(-s * p.delay_s)

@@ -1,0 +1,255 @@
+"""Up to which frequency a record is to be believed: whether somebody has low-passed it, and where.
+
+Problem: the lab takes a record for what the recorder's own filter left, flat to 0.38 of its rate. A phone's app, a
+logger or an engineer may have filtered it once more. Then nothing is left above the cut-off, neither the car nor the
+sensor's noise; a model that has both there seems to be wrong, and some effect imitates the loss.
+
+Solution: the spectrum that was measured is laid beside four things that it is made of,
+
+    S(f) = B(f) (c M(f) + N) + n,    B(f) = 1 / (1 + x^(2 m)),    x = tan(pi f / rate) / tan(pi cutoff / rate)
+
+M the spectrum that the model predicts, c a gain, N white noise that went through the filter, n white noise that was
+added behind it (no more than the quietest band of the record holds), and B Butterworth's low-pass as it is computed
+on samples (S. Butterworth 1930; A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2). Spectra know
+neither phases nor places: distances that are off by metres do not matter here. Whether B = 1 does as well is then
+asked of the sizes of log S(f): an effect that the model lacks bends a spectrum by some dB, here up, there down, and
+no B makes that good; a filter takes away tens of dB, and with the right B next to nothing is left.
+
+What is a filter, and what a slow sensor? No part of a car or of a sensor falls faster than with the fourth power of
+the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); a rubber mount or a tire's contact
+patch fall less, or come back. So a B of order m = 3 or more is somebody's filter: above it nothing is compared. One
+of lower order is left to the effects: its delay tells whether it is a sensor's.
+
+Was the filter causal, or run forth and back, without delay (then m is the sum of both ways)? Near its cut-off the
+phase of a causal one is off a straight line by half a radian and more. In short windows, each laid on the model as it
+fits best, the mean cross-spectrum tells which of both phases goes better with it, whatever constant delay there is
+besides. Where a filter takes away 5 % of the amplitude the pass band ends: of a causal one sqrt(1 + x^(2 m)) - 1, of
+one that was run forth and back x^m. What a causal filter does below that, a delay that grows towards the cut-off, is
+``sensor_bandwidth`` of the order that was found; one without delay leaves nothing there that the lab does not grant
+any recorder (``Tolerance.droop``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.dsp.butterworth import butterworth
+from logger.dsp.pass_band import in_band
+from logger.lab.likelihood.lag import lags
+from logger.runs import LowPass, Run
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_BLOCK_S = 3.0
+_WIDTH_HZ, _LOWEST_HZ, _HIGHEST_OF_RATE = 1.5, 1.0, 0.37
+# Cut-offs, orders, gains and shares of the spectrum that may be noise: finer ones change a cut-off by less than 2 %.
+_CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
+_ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
+_GAINS, _NOISES = np.array([0.4, 0.7, 1.0, 1.4, 2.0]), 8
+STEEPEST_EFFECT = 2.5
+"""A filter of a higher order than this is none that a car or a sensor has."""
+# Mean size of what is left of log S, without a filter: so many times as much as with it, and so many dB more. Measured
+# on 221 unfiltered runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the
+# factor is 3 at most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
+_BETTER, _BETTER_DB = 3.5, 1.0
+# One filter for all runs has cut-offs that are so alike in each (their logarithms), and leaves of none more than
+# without it, but for a rounding.
+_ALIKE, _SAME = 0.1, 0.02
+_LOSS = 0.05
+_HIGHEST_ORDER = 8
+_WINDOW = 256  # samples
+_REACH = 1.2  # times the cut-off, up to where phases are read
+_DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
+LEAST_WIDTH_HZ = 3.0
+"""A narrower band holds the body's bounce at most, and no model of a car can be told from another."""
+_DB = 10 / np.log(10)
+
+
+def is_steep(seen: LowPass) -> bool:
+    """Whether a filter is none that a sensor has."""
+    return seen.order > STEEPEST_EFFECT
+
+
+def whole_below_hz(seen: LowPass, rate_hz: float) -> float:
+    """Where a filter begins to take something away, at so many samples a second [Hz]."""
+    power = 1 / (2 * seen.order) if seen.causal else 1 / seen.order
+    loss = (1 - _LOSS) ** -2 - 1 if seen.causal else _LOSS
+    return float(rate_hz / np.pi * np.arctan(loss**power * np.tan(np.pi * seen.cutoff_hz / rate_hz)))
+
+
+def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[LowPass | None]:
+    """The filter that each run went through; None: none. Runs of one recorder share theirs, so that one for all is
+    asked for first, and then one of each alone; a run that tells nothing has that of another which it goes with.
+
+    predictions    (n,) per run, of a model that is about right; where the runs lie does not matter
+    """
+    fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
+    common = _seen(fits, runs[0].rate_hz)
+    if common is not None and all(_goes_with(one, common, runs[0].rate_hz) for one in fits):
+        common = replace(common, causal=_is_causal(runs, predictions, common))
+        return [common] * len(fits)
+    each = [_seen([one], runs[0].rate_hz) for one in fits]
+    found = [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
+             for one, run, prediction in zip(each, runs, predictions, strict=True)]
+    steep = [one for one in found if one is not None and is_steep(one)]
+    return [one or next((other for other in steep if _goes_with(fit, other, runs[0].rate_hz)), None)
+            for one, fit in zip(found, fits, strict=True)]
+
+
+def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_hz: float | None = None) -> list[Run]:
+    """The runs as they are compared: of each what lies in its pass band. That ends where its facts say, where a filter
+    was found, and at ``low_pass_hz``.
+
+    ValueError where nothing is left.
+    """
+    found = []
+    for run, seen in zip(runs, seen_low_passes(runs, predictions), strict=True):
+        low_hz, high_hz = run.pass_band_hz
+        if low_pass_hz is not None:
+            high_hz = min(high_hz, low_pass_hz)
+        if seen is not None and is_steep(seen) and (ends_hz := whole_below_hz(seen, run.rate_hz)) < high_hz:
+            high_hz, seen = ends_hz, replace(seen, ends_band=True)
+        if high_hz - low_hz < LEAST_WIDTH_HZ:
+            raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
+                             f"to {high_hz:.3g} Hz")
+        cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
+        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut))
+        found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2)))
+    return found
+
+
+@dataclass(frozen=True)
+class ComparedBand:
+    """What of some runs is compared.
+
+    low_hz, high_hz    the lowest and the highest frequency, of the run that has least
+    cutoff_hz          of the filter that ends the band there; None: it was asked for, or is the record's by its facts
+    some               only some of the runs were filtered
+    """
+
+    low_hz: float
+    high_hz: float
+    cutoff_hz: float | None
+    some: bool
+
+
+def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
+    """That of runs that know their pass bands; None where all of each is compared."""
+    cut = [run for run in runs if run.facts.pass_band_hz is not None]
+    if not cut:
+        return None
+    least = min(cut, key=lambda run: run.pass_band_hz[1])
+    filtered = [run.low_pass for run in cut if run.low_pass is not None and run.low_pass.ends_band]
+    cutoff_hz = least.low_pass.cutoff_hz if least.low_pass is not None and least.low_pass.ends_band else None
+    return ComparedBand(max(run.pass_band_hz[0] for run in cut), least.pass_band_hz[1], cutoff_hz,
+                        0 < len(filtered) < len(runs))
+
+
+def _seen(fits: Sequence[_Fits], rate_hz: float) -> LowPass | None:
+    plain = sum(one.plain * one.size for one in fits)
+    table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
+    place = np.unravel_index(int(table.argmin()), table.shape)
+    size, left = sum(one.size for one in fits), float(table[place])
+    if plain < _BETTER * left or _DB * (plain - left) < _BETTER_DB * size:
+        return None
+    return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
+
+
+def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass) -> bool:
+    """Whether the phase of the measurement against the model is that of a causal filter rather than a straight line."""
+    rate_hz = runs[0].rate_hz
+    f_hz = np.fft.rfftfreq(_WINDOW, 1 / rate_hz)
+    cross, own, other = np.zeros(len(f_hz), complex), np.zeros(len(f_hz)), np.zeros(len(f_hz))
+    for run, prediction in zip(runs, predictions, strict=True):
+        for model, measured in _windows(run, prediction, seen.cutoff_hz):
+            cross += model.conj() * measured
+            own, other = own + np.abs(model) ** 2, other + np.abs(measured) ** 2
+    like = np.divide(np.abs(cross) ** 2, own * other, out=np.zeros(len(f_hz)), where=own * other > 0)
+    inside = (f_hz > _LOWEST_HZ) & (f_hz < _REACH * seen.cutoff_hz)
+    turned = (like * np.exp(1j * np.angle(cross)))[inside]
+    delays = np.exp(2j * np.pi * f_hz[inside] * _DELAYS_S[:, None])
+
+    def goes_with(filtered: Complex) -> float:
+        return float((delays @ (turned * filtered.conj() / np.abs(filtered))).real.max())
+
+    s = np.asarray(2j * np.pi * f_hz[inside], complex)
+    if seen.order > _HIGHEST_ORDER + 1:
+        return False
+    least = round(STEEPEST_EFFECT) + 1 if is_steep(seen) else 1
+    orders = range(max(least, round(seen.order) - 1), min(round(seen.order) + 1, _HIGHEST_ORDER) + 1)
+    causal = max(goes_with(butterworth(order, s, seen.cutoff_hz, sampled)) for order in orders
+                 for sampled in (0.0, rate_hz))
+    return causal > goes_with(np.ones_like(s))
+
+
+def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Complex, Complex]]:
+    """Spectra of the model and of the measurement in windows, the model laid where it fits best."""
+    found = lags([run], [in_band(prediction, run.rate_hz, 0.0, cutoff_hz)])
+    taper = np.hanning(_WINDOW + 1)[:-1]
+    f_hz = np.fft.rfftfreq(_WINDOW, 1 / run.rate_hz)
+    way = np.maximum.accumulate(run.distance_m - run.distance_m[0])
+    for along_m, lag_s in zip(found.along_m, found.lag_s, strict=True):
+        first = int(np.searchsorted(way, along_m)) - _WINDOW // 2
+        steps = round(lag_s * run.rate_hz)
+        if first < 0 or first - steps < 0 or max(first, first - steps) + _WINDOW > run.count:
+            continue
+        model = np.fft.rfft(taper * prediction[first - steps : first - steps + _WINDOW])
+        late = np.exp(2j * np.pi * f_hz * (lag_s - steps / run.rate_hz))
+        yield model, np.fft.rfft(taper * run.measured_mps2[first : first + _WINDOW]) * late
+
+
+def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
+    """Whether a run looks no worse with a filter, of about this cut-off and order, than without."""
+    near = np.abs(np.log(_cutoffs_hz(rate_hz) / seen.cutoff_hz)) < _ALIKE
+    alike = np.abs(np.log(_ORDERS / seen.order)) < 2 * _ALIKE
+    return bool(fits.filtered[np.ix_(near, alike)].min() <= fits.plain + _SAME)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fits:
+    """Mean sizes of what is left of log S of a run: without a filter, and with each (cut-offs, orders); samples."""
+
+    plain: float
+    filtered: Array
+    size: int
+
+
+def _fits(run: Run, prediction: Array) -> _Fits:
+    measured, model = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
+    middles = _LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5)
+    behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
+    gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
+    through = np.append(0.0, np.geomspace(behind, np.median(measured), _NOISES))
+    made = (gains[:, None, None] * model + through[:, None]).reshape(-1, len(model))
+    target = np.log(measured)
+
+    def left(power: Array) -> Array:
+        return np.asarray(np.abs(np.log(power + behind) - target).mean(axis=-1).min(axis=-1))
+
+    x = np.tan(np.pi * middles / run.rate_hz) / np.tan(np.pi * _cutoffs_hz(run.rate_hz)[:, None] / run.rate_hz)
+    tables = [left(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
+    return _Fits(float(left(made)), np.stack(tables, axis=1), run.count - run.first)
+
+
+def _cutoffs_hz(rate_hz: float) -> Array:
+    return np.asarray(np.exp(np.arange(np.log(_LEAST_HZ), np.log(_MOST_OF_RATE * rate_hz), _CUTOFF_STEP)))
+
+
+def _spectrum(run: Run, samples: Array) -> Array:
+    """Mean powers in bands of one width (b,), by Welch's method [m2/s4]."""
+    kept = samples[run.first:]
+    size = min(round(_BLOCK_S * run.rate_hz), len(kept))
+    taper = np.hanning(size + 1)[:-1]
+    blocks = np.lib.stride_tricks.sliding_window_view(kept, size)[:: max(1, size // 2)]
+    power = (np.abs(np.fft.rfft(blocks * (taper / np.sqrt((taper**2).mean())), axis=1)) ** 2).mean(axis=0) / size
+    f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
+    edges = np.arange(_LOWEST_HZ, _HIGHEST_OF_RATE * run.rate_hz + 0.1, _WIDTH_HZ)
+    floor = np.finfo(float).eps * power.max() + np.finfo(float).tiny
+    means = [np.log(power[(f_hz >= low) & (f_hz < high)] + floor).mean() for low, high in pairwise(edges)]
+    return np.asarray(np.exp(means))
