@@ -295,8 +295,6 @@ def _parameter_json(one: Parameter) -> dict[str, Any]:
 
 
 def _effect_in_words(effect: Effect) -> str:
-    lines = [f"{effect.name}: {effect.title}"]
-    for one in effect.parameters:
-        lines.append(f"  {one.name}={one.start:g}  ({one.allowed})  {one.meaning}")
-    return "\n".join([*lines, f"  leaves: {effect.signature}", f"  to see it: {effect.shown_by}",
-                      f"  source: {effect.source}"])
+    numbers = [f"  {one.name}={one.start:g}  ({one.allowed})  {one.meaning}" for one in effect.parameters]
+    return "\n".join([f"{effect.name}: {effect.title}", *numbers, f"  leaves: {effect.signature}",
+                      f"  to see it: {effect.shown_by}", f"  source: {effect.source}"])
