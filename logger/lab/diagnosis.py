@@ -24,7 +24,6 @@ from logger.lab.likelihood.noise_floor import (
     excess,
     floor_error,
     noise_as_read,
-    noise_of,
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
@@ -158,11 +157,11 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     progress("fitting it finely")
     selection, after = _finely_fitted(search, selection)
     fine, state = after.posterior, after.state
-    noise, read = noise_of(fine, state), noise_as_read(fine, state)
+    read = noise_as_read(fine, state)
     progress("how certain the numbers are")
     with_errors, _ = standard_errors(after)
     progress("what these runs could not show")
-    above = excess(fine, state, noise, FALSE_ALARM)
+    above = excess(fine, state, FALSE_ALARM)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,

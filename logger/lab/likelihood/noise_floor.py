@@ -53,11 +53,15 @@ class SignalErrors:
 
 
 def noise_of(posterior: Posterior, state: State) -> Noise:
-    """The sensor's noise under the residuals of a fitted state; without its rounding where the readings' bounds are
-    taken for what they say."""
-    main = _by_signal(posterior, state)[0]
-    scaled = [residual * np.sqrt(share) for residual, share in zip(main.residuals, main.shares, strict=True)]
-    return sensor_noise(main.bands, scaled, DISCREPANCY * posterior.size_mps2)
+    """The noise of the sensor under the residuals of a fitted state, or the r.m.s. of several sensors'; without their
+    rounding where the readings' bounds are taken for what they say."""
+    sensors = [one for one in _by_signal(posterior, state) if not one.name]
+    each = [_noise_of(one) for one in sensors]
+    weights = np.array([sum(map(len, one.residuals)) for one in sensors], float)
+    deviation = float(np.sqrt(np.average([one.deviation_mps2**2 for one in each], weights=weights)))
+    parts = [weight / weights.sum() * one.deviation_mps2 / deviation * one.standard_error_mps2
+             for weight, one in zip(weights, each, strict=True)]
+    return Noise(deviation, float(np.linalg.norm(parts)))
 
 
 def noise_as_read(posterior: Posterior, state: State) -> Noise:
@@ -68,18 +72,18 @@ def noise_as_read(posterior: Posterior, state: State) -> Noise:
 def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[str, SignalErrors]:
     """Errors of the signals beside the sensor's acceleration, by name, under one model and under another."""
     was, now = (signal_errors(posterior.runs.runs, one.predictions) for one in (before, after))
-    _, *others = _by_signal(posterior, after)
     return {one.name: SignalErrors(was[one.name], now[one.name], _noise_of(one).deviation_mps2 / one.size)
-            for one in others}
+            for one in _by_signal(posterior, after) if one.name}
 
 
 def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
-    """What a state leaves of each signal, the sensor's acceleration first."""
+    """What a state leaves of each signal and sensor."""
     return by_signal(posterior.readings, posterior.bands, posterior.residuals(state))
 
 
 def _noise_of(one: SignalResiduals) -> Noise:
-    return sensor_noise(one.bands, one.residuals, DISCREPANCY * one.size)
+    scaled = [residual * np.sqrt(share) for residual, share in zip(one.residuals, one.shares, strict=True)]
+    return sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
 
 
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:
@@ -117,28 +121,24 @@ def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2:
 def gain_of_an_explanation(posterior: Posterior, state: State) -> float:
     """By how much minus twice the log-likelihood would fall if the residuals were just not enough to be unexplained; at
     least 0. Bands that are quiet make up for those that are not."""
-    main, *others = _by_signal(posterior, state)
     found = 0.0
-    for signal, own in [(main, noise_of(posterior, state)), *((one, _noise_of(one)) for one in others)]:
-        noise = ((1 + UNEXPLAINED) * own.deviation_mps2) ** 2
+    for signal in _by_signal(posterior, state):
+        noise = ((1 + UNEXPLAINED) * _noise_of(signal).deviation_mps2) ** 2
         found += sum(float(one.freedom @ np.log(one.levels(residual) / np.maximum(noise / share, one.floor)))
                      for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True))
     return max(0.0, found)
 
 
-def excess(posterior: Posterior, state: State, noise: Noise, chance: float) -> float:
+def excess(posterior: Posterior, state: State, chance: float) -> float:
     """By what share the residual is above the noise, and above what two right simulations differ by, in the run and of
     the signal where it is most. A run so short that noise alone may do the same with this probability counts only as
-    far as asks for no explanation.
-
-    noise    of the sensor's acceleration
-    """
+    far as asks for no explanation."""
     from scipy.special import gammainccinv
 
-    main, *others = _by_signal(posterior, state)
-    signals = [(main, noise), *((one, _noise_of(one)) for one in others)]
-    count, found = sum(len(one.bands) for one, _ in signals), []
-    for signal, own in signals:
+    signals = _by_signal(posterior, state)
+    count, found = sum(len(one.bands) for one in signals), []
+    for signal in signals:
+        own = _noise_of(signal)
         for one, residual, share in zip(signal.bands, signal.residuals, signal.shares, strict=True):
             freedom = float(one.freedom.sum())
             expected = one.freedom @ (own.deviation_mps2**2 / share + one.floor)

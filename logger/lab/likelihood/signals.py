@@ -76,7 +76,8 @@ class JointWhitener:
 
 @dataclass(frozen=True, eq=False)
 class SignalResiduals:
-    """What a model leaves of one signal in the runs that have it.
+    """What a model leaves of one signal in the runs that have it, or of the acceleration of one sensor: runs whose
+    readings have other steps or another range are of another.
 
     name         of the signal; empty: the sensor's acceleration
     bands, residuals (n,), shares    per run; the last as of ``Readings``
@@ -92,8 +93,8 @@ class SignalResiduals:
 
 def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
               residuals: Sequence[Array]) -> list[SignalResiduals]:
-    """Residuals of joined signals ((1 + s) n,), per run, by signal, the sensor's acceleration first."""
-    found: dict[str, list[tuple[Bands, Array, float, Array]]] = {}
+    """Residuals of joined signals ((1 + s) n,), per run, by signal and sensor."""
+    found: dict[tuple[str, float | None, float | None], list[tuple[Bands, Array, float, Array]]] = {}
     for one, own, residual in zip(readings, bands, residuals, strict=True):
         run = one.run
         counts = run.read & (np.arange(run.count) >= run.first)
@@ -101,7 +102,8 @@ def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
         names = ["", *(signal.name for signal in run.signals)]
         measured = [run.measured_mps2, *run.more]
         for name, band, part, of in zip(names, each, np.split(residual, len(each)), measured, strict=True):
-            found.setdefault(name, []).append((band, part, 1.0 if name else one.share, of[counts]))
+            sensor = (None, None) if name else (run.facts.step_mps2, run.facts.range_mps2)
+            found.setdefault((name, *sensor), []).append((band, part, 1.0 if name else one.share, of[counts]))
     return [SignalResiduals(name, [one for one, *_ in rows], [one for _, one, *_ in rows], [row[2] for row in rows],
                             float(np.sqrt(np.mean(np.concatenate([row[3] for row in rows])**2))))
-            for name, rows in found.items()]
+            for (name, *_), rows in found.items()]

@@ -3,6 +3,8 @@ what is above it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +14,6 @@ from scipy.signal import firwin
 
 from logger.lab.likelihood.noise_floor import (
     UNEXPLAINED,
-    Noise,
     excess,
     floor_error,
     gain_of_an_explanation,
@@ -21,6 +22,7 @@ from logger.lab.likelihood.noise_floor import (
 )
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.runs import UNKNOWN, RecordFacts
 
 from ...support.lab.noisy_runs import posterior_of
 from ...support.lab.runs_with_residual import a_run, measuring
@@ -36,12 +38,18 @@ def predicted(samples: int) -> tuple[Posterior, State]:
     return posterior, posterior.start()
 
 
-def leaving(residual: Array) -> tuple[Posterior, State]:
-    """A model that leaves this residual (n,)."""
-    posterior, state = predicted(len(residual))
-    (run,), (prediction,) = posterior.runs.runs, state.predictions
-    there = posterior_of([measuring(run, prediction + residual)])
-    return there, State((), state.logs, state.record, state.size, [prediction])
+def leaving(*residuals: Array, facts: Sequence[RecordFacts] = ()) -> tuple[Posterior, State]:
+    """A model that leaves these residuals (n,), each of a run."""
+    runs, predictions = [], []
+    for number, residual in enumerate(residuals):
+        posterior, state = predicted(len(residual))
+        (run,), (prediction,) = posterior.runs.runs, state.predictions
+        measured = measuring(run, prediction + residual)
+        runs.append(replace(measured, name=f"run{number}", facts=facts[number] if facts else UNKNOWN))
+        predictions.append(prediction)
+    there = posterior_of(runs)
+    start = there.start()
+    return there, replace(start, predictions=predictions)
 
 
 def white(samples: int = 6000, seed: int = 1, level: float = LEVEL) -> Array:
@@ -111,7 +119,7 @@ def test_what_is_above_the_noise_is_told_by_its_share(share: float, unexplained:
     """White noise and more of it in the bands below 20 Hz, about half of them."""
     more = in_band(white(6000, 2, share * LEVEL), 0.5, 20.0)
     posterior, state = leaving(white() + more)
-    above = excess(posterior, state, noise_of(posterior, state), 1e-3)
+    above = excess(posterior, state, 1e-3)
     expected = np.sqrt(1 + share**2 * 19.5 / 37.0) - 1
     assert above == pytest.approx(expected, abs=0.04)
     assert (above > UNEXPLAINED) == unexplained
@@ -119,15 +127,27 @@ def test_what_is_above_the_noise_is_told_by_its_share(share: float, unexplained:
 
 
 def test_noise_alone_is_hardly_ever_unexplained_however_short_a_run_is() -> None:
+    """Beside a long one, which tells the noise."""
     times = 0
     for seed in range(40):
-        posterior, state = leaving(white(500, seed))
-        times += excess(posterior, state, Noise(LEVEL, 0.0), 1e-3) > UNEXPLAINED
+        posterior, state = leaving(white(500, seed), white(6000, seed + 100))
+        times += excess(posterior, state, 1e-3) > UNEXPLAINED
     assert times == 0
+
+
+def test_each_sensor_has_a_noise_of_its_own() -> None:
+    """A coarse, loud sensor beside a quiet one: neither leaves more than its noise; one kind of both would."""
+    residuals = [white(level=0.25), white(seed=2)]
+    posterior, state = leaving(*residuals, facts=[RecordFacts(range_mps2=20.0), RecordFacts(range_mps2=40.0)])
+    assert excess(posterior, state, 1e-3) < UNEXPLAINED
+    assert noise_of(posterior, state).deviation_mps2 == pytest.approx(np.sqrt((0.25**2 + LEVEL**2) / 2), rel=0.05)
+    assert gain_of_an_explanation(posterior, state) == 0
+    posterior, state = leaving(*residuals)
+    assert excess(posterior, state, 1e-3) > UNEXPLAINED
 
 
 def test_what_two_right_simulations_differ_by_is_not_above_the_noise() -> None:
     _, state = predicted(6000)
     signal = state.predictions[0]
     posterior, there = leaving(0.9 * DISCREPANCY * signal + white(level=1e-3 * float(signal.std())))
-    assert excess(posterior, there, noise_of(posterior, there), 1e-3) < UNEXPLAINED
+    assert excess(posterior, there, 1e-3) < UNEXPLAINED
