@@ -45,7 +45,8 @@ def measured(value: float, error: float | None) -> str:
     if _SMALL <= size < _LARGE:
         return " ± ".join(f"{round(one, decimals):.{max(decimals, 0)}f}" for one in (value, error))
     power = floor(log10(size))
-    return " ± ".join(f"{one / 10.0**power:.{max(decimals + power, 0)}f}e{power}" for one in (value, error))
+    digits = (f"{one / 10.0**power:.{max(decimals + power, 0)}f}" for one in (value, error))
+    return " ± ".join(f"{one}e{power}" if float(one) else "0" for one in digits)
 
 
 def numbers_of(one: Chosen) -> str:
