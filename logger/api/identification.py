@@ -128,8 +128,8 @@ def identify(
     low_pass_hz   what lies above is left out [Hz], and what lies above the ``pass_band_hz`` of a run's run.yaml;
                   ``skip_s`` the beginning of each run [s]
     robust        let single wild readings count less (Huber's loss); ``tries`` so many further starts
-    road          "measured"; "unmeasured": each run has a road of its own, of ``waviness``; or "same": all are over one
-    anyway        go on where a run does not seem to be of its road
+    road          "measured" (``anyway``: go on where a run does not seem to be of its road); "unmeasured": each run has
+                  a road of its own, of ``waviness``; or "same": all are over one
 
     Raises BadInput for what does not fit together, ``NotIdentifiable`` for numbers that the runs do not tell. Source:
     L. Ljung, System Identification (1999), chapters 7 and 9.
@@ -147,9 +147,8 @@ def identify(
     WAVINESS.check("waviness", waviness)
     model = model_of(vehicle)
     word = str(vehicle) if isinstance(vehicle, Path | str) else model.vehicle.name
-    given = [runs] if isinstance(runs, Run | Path | str) else list(runs)
-    drives = [one if isinstance(one, Run) else read_run(one) for one in given]
-    if not drives:
+    given = [runs] if isinstance(runs, Run | Path | str) else runs
+    if not (drives := [one if isinstance(one, Run) else read_run(one) for one in given]):
         raise BadInput("identify: expected a run, found none")
     question = Question(free, start or {}, bounds or {}, obstacles or {}, noise, low_pass_hz, robust, tries, waviness,
                         anyway)
@@ -169,11 +168,9 @@ def identify(
 
 def narrowed(question: Question, drives: Sequence[Drive]) -> Question:
     """The question without what lies above the pass band of a drive (``run.yaml``), as ``low_pass_hz`` asks for it."""
-    ends_hz = [drive.facts.pass_band_hz[1] for drive in drives
-               if drive.facts.pass_band_hz is not None and drive.facts.pass_band_hz[1] < drive.rate_hz / 2]
-    if question.low_pass_hz is not None:
-        ends_hz.append(question.low_pass_hz)
-    return replace(question, low_pass_hz=min(ends_hz, default=None))
+    bands = [(drive.facts.pass_band_hz, drive.rate_hz) for drive in drives]
+    ends_hz = [question.low_pass_hz, *(band[1] for band, rate_hz in bands if band and band[1] < rate_hz / 2)]
+    return replace(question, low_pass_hz=min((one for one in ends_hz if one is not None), default=None))
 
 
 def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s: float,

@@ -18,22 +18,15 @@ import json
 from pathlib import Path
 
 from logger.api.outputs import check_out
-from logger.commands.lab_model import add_anyway, add_low_pass, add_tolerance, warned
+from logger.commands.lab_model import add_model_and_runs, warned
 from logger.errors import EXIT_DONE
 from logger.files import write_text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog compare``."""
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
-                        help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
-    parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
-                        help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
-    add_tolerance(parser)
-    add_low_pass(parser)
-    add_anyway(parser)
+    add_model_and_runs(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,16 +19,21 @@ if TYPE_CHECKING:
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
-    """RUN..., --vehicle, --tolerance, --low-pass, --effect-file, --anyway and --json."""
+    """Those of ``add_model_and_runs``, and --effect-file."""
+    add_model_and_runs(parser)
+    parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
+                        help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
+                             "tried only where they are named; may repeat")
+
+
+def add_model_and_runs(parser: argparse.ArgumentParser) -> None:
+    """RUN..., --vehicle, --tolerance, --low-pass, --anyway and --json."""
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
                         help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
-    add_tolerance(parser)
-    add_low_pass(parser)
-    parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
-                        help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
-                             "tried only where they are named; may repeat")
+    _add_tolerance(parser)
+    _add_low_pass(parser)
     add_anyway(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
@@ -39,14 +44,14 @@ def add_anyway(parser: argparse.ArgumentParser) -> None:
                         help="go on where a run does not seem to be of this road, or in these units")
 
 
-def add_tolerance(parser: argparse.ArgumentParser) -> None:
+def _add_tolerance(parser: argparse.ArgumentParser) -> None:
     """--tolerance, for ``deviation_of``."""
     add_number(parser, "--tolerance", *TOLERANCE, default=USUAL_TOLERANCE, metavar="SHARE",
                help="how far off the vehicle's masses, springs and dampers may well be (default: "
                     f"{USUAL_TOLERANCE:g}, 4 %%)")
 
 
-def add_low_pass(parser: argparse.ArgumentParser) -> None:
+def _add_low_pass(parser: argparse.ArgumentParser) -> None:
     """--low-pass, for ``bench_of``."""
     parser.add_argument("--low-pass", type=float, metavar="HZ",
                         help="leave out what lies above, for example 20, of the record and of the model alike; errors "
