@@ -241,7 +241,7 @@ class Search:
         is larger than without; and what each of those that stay gains."""
         names = list(now.state.names[self.present:])
         if len(names) == 1:
-            if now.hold_out.raises(before.hold_out):
+            if _raises(now, before, names[0]):
                 return before, {}
             return now, {names[0]: before.score - now.score}
         gains: dict[str, float] = {}
@@ -251,7 +251,7 @@ class Search:
                 others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
             gains = {name: other.score - now.score for name, other in others.items()}
             least = min(gains, key=lambda name: gains[name])
-            raising = [name for name in names if now.hold_out.raises(others[name].hold_out)]
+            raising = [name for name in names if _raises(now, others[name], name)]
             if raising:
                 least = min(raising, key=lambda name: gains[name])
             elif len(names) == 1 or self._is_evident(others[least], gains[least]):
@@ -268,6 +268,13 @@ class Search:
             return gains
         return {name: gain for name, gain in gains.items()
                 if not by_name[name].effect.is_trifle(by_name[name].values, self.seen)}
+
+
+def _raises(now: Baseline, without: Baseline, name: str) -> bool:
+    """Whether the error on what no fit saw is larger with one of a model's effects. Of an effect that does no more than
+    move runs nothing is asked: without it the distance errors do the same, and these are known on all of a run."""
+    effect = next(one.effect for one in now.state.effects if one.effect.name == name)
+    return effect.reshapes and now.hold_out.raises(without.hold_out)
 
 
 def out_of_sight(posterior: Posterior, one: Chosen) -> bool:

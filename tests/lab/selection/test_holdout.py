@@ -66,7 +66,7 @@ def unseen_when_refitted(found: LinearModel) -> tuple[float, float]:
     def residuals(x: Array) -> list[Array]:
         there: tuple[Chosen, ...] = moved(state.effects, moves, x[p:])
         predicted = posterior.predict(there, x[:p], state.record)
-        return [y - one for y, one in zip(posterior.measured, predicted, strict=True)]
+        return posterior.left_by(predicted)
 
     unseen = residuals(here)
     for held in range(SETS):
