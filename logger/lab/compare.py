@@ -19,6 +19,7 @@ from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
+from logger.lab.likelihood.repeats import Repeats, repeats_among
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests
@@ -79,6 +80,11 @@ class Comparison:
     def band(self) -> ComparedBand | None:
         """What of the runs was compared; None: all of it."""
         return compared_band(self.plain.residuals.runs)
+
+    @property
+    def repeats(self) -> Repeats | None:
+        """What runs that repeat each other differ by; None where none does."""
+        return repeats_among(self.plain.residuals.runs)
 
     @property
     def tells(self) -> bool:

@@ -38,6 +38,10 @@ def headline(found: Comparison) -> list[str]:
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
     lines += distance_error(found.distance_error_m)
+    if found.repeats is not None:
+        apart = found.repeats.deviation_mps2
+        lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} m/s2 r.m.s. "
+                     f"from their mean: no model can have an error below {apart / measured:.2g} on them.")
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
         lines.append(f"The refit moved {named}, more than {FAR_SIGMA:g} standard deviations of their tolerance. An "
@@ -80,6 +84,8 @@ def as_json(found: Comparison) -> dict[str, Any]:
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
         "missing": found.missing, **band_json(found.band),
         "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
+        "repeats": None if found.repeats is None else {
+            "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
         "marks": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
     }
 

@@ -4,7 +4,7 @@ Problem: an error means little without the error below which no model comes. Sol
 moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter as
 well: then the quietest of the bands that pass tells of it. From there every band that is no louder tells more, the
 quietest first. Where the highest frequencies are outside of the pass band, because somebody filtered the record, the
-quietest of the bands that are left begins.
+quietest of the bands that are left begins. And what runs that repeat each other differ by is noise.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.repeats import repeats_among
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.runs import signal_errors
@@ -83,7 +84,11 @@ def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
 
 def _noise_of(one: SignalResiduals) -> Noise:
     scaled = [residual * np.sqrt(share) for residual, share in zip(one.residuals, one.shares, strict=True)]
-    return sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
+    found = sensor_noise(one.bands, scaled, DISCREPANCY * one.size)
+    repeats = None if one.name else repeats_among(one.runs)
+    if repeats is None or repeats.deviation_mps2 <= found.deviation_mps2:
+        return found
+    return Noise(repeats.deviation_mps2, repeats.deviation_mps2 / float(np.sqrt(2 * repeats.freedom)))
 
 
 def sensor_noise(bands: Sequence[Bands], residuals: Sequence[Array], least_mps2: float, fitted: bool = True) -> Noise:

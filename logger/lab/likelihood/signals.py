@@ -80,11 +80,12 @@ class SignalResiduals:
     readings have other steps or another range are of another.
 
     name         of the signal; empty: the sensor's acceleration
-    bands, residuals (n,), shares    per run; the last as of ``Readings``
+    runs, bands, residuals (n,), shares    the last as of ``Readings``
     size         r.m.s. of what was measured in all
     """
 
     name: str
+    runs: list[Run]
     bands: list[Bands]
     residuals: list[Array]
     shares: list[float]
@@ -94,7 +95,7 @@ class SignalResiduals:
 def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
               residuals: Sequence[Array]) -> list[SignalResiduals]:
     """Residuals of joined signals ((1 + s) n,), per run, by signal and sensor."""
-    found: dict[tuple[str, float | None, float | None], list[tuple[Bands, Array, float, Array]]] = {}
+    found: dict[tuple[str, float | None, float | None], list[tuple[Run, Bands, Array, float, Array]]] = {}
     for one, own, residual in zip(readings, bands, residuals, strict=True):
         run = one.run
         counts = run.read & (np.arange(run.count) >= run.first)
@@ -103,7 +104,7 @@ def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
         measured = [run.measured_mps2, *run.more]
         for name, band, part, of in zip(names, each, np.split(residual, len(each)), measured, strict=True):
             sensor = (None, None) if name else (run.facts.step_mps2, run.facts.range_mps2)
-            found.setdefault((name, *sensor), []).append((band, part, 1.0 if name else one.share, of[counts]))
-    return [SignalResiduals(name, [one for one, *_ in rows], [one for _, one, *_ in rows], [row[2] for row in rows],
-                            float(np.sqrt(np.mean(np.concatenate([row[3] for row in rows])**2))))
-            for (name, *_), rows in found.items()]
+            found.setdefault((name, *sensor), []).append((run, band, part, 1.0 if name else one.share, of[counts]))
+    return [SignalResiduals(
+        name, [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows], [row[3] for row in rows],
+        float(np.sqrt(np.mean(np.concatenate([row[4] for row in rows])**2)))) for (name, *_), rows in found.items()]
