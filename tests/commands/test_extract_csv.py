@@ -74,6 +74,7 @@ def refused(*words: object) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_at_any_angle_gives_what_the_car_did(
         layout: str, drive: Drive, phone: Phone, tmp_path: Path) -> None:
@@ -135,6 +136,7 @@ def test_a_phone_that_slips_is_cut_there_and_levelled_anew(drive: Drive, phone: 
         assert (found["accel_z_mps2"] - truth(drive, found["t_s"])).std() < 0.15
 
 
+@pytest.mark.slow
 def test_repeated_samples_are_dropped_and_the_true_rate_is_told(drive: Drive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     taken = phone_in(drive, rng, rotation(rng), rate_hz=102.0, jitter=0.0)
@@ -148,6 +150,7 @@ def test_repeated_samples_are_dropped_and_the_true_rate_is_told(drive: Drive, tm
     assert off.std() < 0.1 * truth(drive, found["t_s"]).std()
 
 
+@pytest.mark.slow
 def test_a_slow_phone_is_told_of_and_a_slower_one_refused(drive: Drive, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     done = call("--csv", *phyphox(phone_in(drive, rng, rotation(rng), rate_hz=51.0), tmp_path / "fifty"),
@@ -174,6 +177,7 @@ def test_holes_and_clipped_samples_are_marked(drive: Drive, phone: Phone, tmp_pa
     assert (found["usable"] == 1).mean() > 0.98
 
 
+@pytest.mark.slow
 def test_gravity_taken_out_needs_the_axis_that_points_up(drive: Drive, phone: Phone, tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     flat = phone_in(drive, rng, np.eye(3))
@@ -206,6 +210,7 @@ def test_one_axis_and_a_steady_speed_are_enough(drive: Drive, tmp_path: Path) ->
     assert np.allclose(found["accel_z_mps2"], truth(drive, found["t_s"]), atol=1e-5)  # on the grid: as it was read
 
 
+@pytest.mark.slow
 def test_what_cannot_be_used_is_refused_in_one_line(drive: Drive, phone: Phone, line: Path, tmp_path: Path) -> None:
     phyphox(phone, tmp_path / "good")
     accel, places = tmp_path / "good" / "Accelerometer.csv", tmp_path / "good" / "Location.csv"

@@ -57,6 +57,7 @@ def words(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_a_comparison_says_where_the_record_ends_and_finds_nothing(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "compare", *drives["filtered"])
@@ -73,6 +74,7 @@ def test_a_record_as_it_was_recorded_is_compared_whole(
     assert "pass_band_hz" not in found and "low_passed_at_hz" not in found
 
 
+@pytest.mark.slow
 def test_what_is_asked_is_left_out_of_the_record_and_of_the_model(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     """Of white noise of 0.05 m/s2 two fifths lie below 20 Hz of 50."""

@@ -180,6 +180,7 @@ def test_runs_are_laid_where_they_were_driven(wrong: tuple[float, float, int]) -
     assert posterior.error(state) < 1.05 * undisturbed.error(undisturbed.start())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("true", [0.0, 300.0])
 def test_a_distance_that_wanders_hides_no_physics_and_makes_none(wrong: tuple[float, float, int], true: float) -> None:
     runs = [wrong_speed(run, wrong, i) for i, run in enumerate(noisy_runs([tire_damping(true)]))]
@@ -199,6 +200,7 @@ def test_runs_that_do_not_wander_stay_where_they_were_recorded() -> None:
 WHEEL = chosen(SPEED_SCALE, {"scale": 1.01})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "start"), [
     (WHEEL, chosen(SPEED_SCALE, {"scale": 1.0098})),
     (chosen(SPEED_SCALE, {"scale": 1.04}), chosen(SPEED_SCALE, {"scale": 1.0398})),
