@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -19,7 +19,7 @@ from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_columns
-from logger.store.formats.run_file import write_run_facts
+from logger.store.formats.run_file import read_run_facts, write_run_facts
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
@@ -122,7 +122,10 @@ def checked_run(run: Run | Path | str, asked: Asked) -> tuple[Run, EvenRecord]:
         return run, found
     even = {drive_file.TIME: np.array([found.start_s]), **found.accel_mps2, **found.others}
     drive = drive_file.drive_of(place, found.rate_hz, even)
-    return Run(**vars(drive), profile=profile), found
+    # What was laid on other times, or written in another unit, is on none of the steps that its facts say.
+    as_written = found.resampled is None and asked.unit is None and place.is_dir()
+    facts = replace(read_run_facts(place), signals=()) if as_written else UNKNOWN
+    return Run(**{**vars(drive), "facts": facts}, profile=profile), found
 
 
 def write_run(folder: Path | str, run: Run) -> None:
@@ -296,7 +299,8 @@ class Estimate(CommandResult):
 
 def estimate(
     run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] = NOISE_MPS2,
-    step_mps2: float = 0.0, window_m: float = WINDOW_M, unit: str | None = None, resample_hz: float | None = None,
+    step_mps2: float | None = None, window_m: float = WINDOW_M, unit: str | None = None,
+    resample_hz: float | None = None,
 ) -> Estimate:
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
@@ -305,7 +309,7 @@ def estimate(
     vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
                   its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
-    step_mps2     step that readings are rounded to; 0: none [m/s2]
+    step_mps2     step that readings are rounded to; 0: none; None: what the run's ``run.yaml`` says, or none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
     unit, resample_hz    as ``comfort``
 
@@ -325,10 +329,11 @@ def estimate(
     learns = noise_mps2 == "auto"
     given_mps2 = NOISE_MPS2 if noise_mps2 == "auto" else noise_mps2
     NOISE.check("noise_mps2", given_mps2)
-    ADDED.check("step_mps2", step_mps2)
+    if step_mps2 is not None:
+        ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
-    found = assessed(drive, model, Sensor(given_mps2, step_mps2), window_m, learns)
+    found = assessed(drive, model, Sensor(given_mps2, step_of(drive, step_mps2)), window_m, learns)
     summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
@@ -338,6 +343,11 @@ def estimate(
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),
                     tuple(doubt.words for doubt in checked.doubts))
+
+
+def step_of(run: Run, said_mps2: float | None) -> float:
+    """The step that readings are rounded to, as somebody said it, or as the run's facts say; 0: none [m/s2]."""
+    return (run.facts.step_mps2 or 0.0) if said_mps2 is None else said_mps2
 
 
 def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False

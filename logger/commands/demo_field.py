@@ -98,8 +98,8 @@ class _Commands:
         return (f"ridelog extract {' '.join(map(str, self._first))} --out {runs} --profile {self._out / LINE}",
                 f"ridelog extract {self._fourth} --out {runs} --profile {self._out / BEYOND}")
 
-    def estimate(self, folder: Path, step_mps2: float, vehicle: str) -> str:
-        return f"ridelog estimate {folder} --vehicle {vehicle} --noise auto --step {step_mps2:g}"
+    def estimate(self, folder: Path, vehicle: str) -> str:
+        return f"ridelog estimate {folder} --vehicle {vehicle} --noise auto"
 
     def explain(self, chapter: str, effect: str, vehicle: str) -> str:
         """Of the steps of ``lab_loop.go_through``."""
@@ -144,20 +144,19 @@ def _run(folder: Path) -> Run:
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import assessed
+    from logger.api.drives import assessed, step_of
     from logger.api.ranges import NOISE_MPS2
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines
     from logger.shipped import vehicle_path
-    from logger.store.formats.run_file import read_run_facts
     from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
 
-    step_mps2 = read_run_facts(folder).step_mps2 or 0.0
-    tell(_headed(title, why, commands.estimate(folder, step_mps2, vehicle)))
+    tell(_headed(title, why, commands.estimate(folder, vehicle)))
     with progress() as told:
         told("estimating the road")
-        found = assessed(_run(folder), read_model(vehicle_path(vehicle)), Sensor(NOISE_MPS2, step_mps2), WINDOW_M,
+        drive = _run(folder)
+        found = assessed(drive, read_model(vehicle_path(vehicle)), Sensor(NOISE_MPS2, step_of(drive, None)), WINDOW_M,
                          learns_noise=True)
     tell(_essential(lines(found, as_json(str(folder), found))))
     return found

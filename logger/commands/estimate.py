@@ -34,7 +34,7 @@ from logger.files import write_text
 if TYPE_CHECKING:
     from logger.estimation.assessment import Assessment
 
-AUTO, STEP_MPS2 = "auto", 0.0
+AUTO = "auto"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--noise", type=_noise, default=NOISE_MPS2, metavar="auto|MPS2",
                         help="r.m.s. noise of one reading before rounding [m/s2] "
                              f"(default: {NOISE_MPS2:g}); auto: learnt from the drive, with a standard error")
-    add_number(parser, "--step", *ADDED, default=STEP_MPS2, metavar="MPS2",
-               help="step that readings are rounded to [m/s2] (default: 0, none)")
+    add_number(parser, "--step", *ADDED, metavar="MPS2",
+               help="step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)")
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
@@ -69,7 +69,7 @@ _noise.__name__ = "auto or float"  # argparse names it when a text is neither
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
-    from logger.api.drives import assessed, checked_run
+    from logger.api.drives import assessed, checked_run, step_of
     from logger.estimation.sensor_noise import Sensor
     from logger.report.estimate_text import as_json, lines, window_lines
     from logger.report.record_checks_text import checks_json, checks_lines
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     _check_files(args, vehicle_yaml)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
     learns = args.noise is None
-    sensor = Sensor(NOISE_MPS2 if learns else args.noise, args.step)
+    sensor = Sensor(NOISE_MPS2 if learns else args.noise, step_of(drive, args.step))
     found = assessed(drive, model, sensor, window_m, learns)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:

@@ -17,9 +17,11 @@ from logger.estimation.road_profile import band_passed
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import iri
+from logger.runs import RecordFacts
 from logger.shipped import vehicle_file
 from logger.store.formats.drive_file import write_profile
 from logger.store.formats.profile_file import read_profile
+from logger.store.formats.run_file import write_run_facts
 
 ROAD = Track(0.05, iso8608.generate(iso8608.gd_n0_from_iri(4.0), 800, 0.05, 12), 100.0)
 CAR = "rav4-2009"
@@ -149,6 +151,17 @@ def test_the_noise_is_learnt_from_the_drive(
     assert lines[1] == (f"Learnt from the drive: noise of {result['noise_mps2']:.3g} +- "
                         f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
     assert lines[2].startswith("Taken for granted: ")
+
+
+def test_the_step_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("drive.csv", "profile.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    write_run_facts(tmp_path, RecordFacts(step_mps2=0.613))
+    assert told(capsys, tmp_path)["step_mps2"] == 0.613
+    assert told(capsys, tmp_path, "--step", 0.0)["step_mps2"] == 0.0
+    assert told(capsys, tmp_path, "--resample", "100")["step_mps2"] == 0.0  # laid on other times
+    assert told(capsys, folder)["step_mps2"] == 0.0
 
 
 @pytest.mark.parametrize("step", [0.0, 0.03, 0.613])
