@@ -145,6 +145,11 @@ class Run:
         return self.measured_mps2[self.first:]
 
     @property
+    def kept_readings_mps2(self) -> Array:
+        """The same, zeros where nothing was read [m/s2]."""
+        return (self.measured_mps2 * self.read)[self.first:]
+
+    @property
     def read(self) -> Bools:
         """Of which samples (n,) something was read."""
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
@@ -222,7 +227,7 @@ def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> f
     NaN where nothing but zeros was measured."""
     pairs = zip(runs, predictions, strict=True)
     return normalised_rms([run.left_by(run.main(one))[run.first:] for run, one in pairs],
-                          [(run.measured_mps2 * run.read)[run.first:] for run in runs])
+                          [run.kept_readings_mps2 for run in runs])
 
 
 def signal_errors(runs: Sequence[Run], predictions: Sequence[Array]) -> dict[str, float]:

@@ -287,13 +287,14 @@ def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_
 
     half_hz = runs.runs[0].rate_hz / 2
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
-        raise BadInput(f"low-pass {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the sample rate")
+        raise BadInput(f"--low-pass {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the sample rate")
     try:
-        found = with_pass_bands(runs.runs, predictions, low_pass_hz)
+        found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)],
+                                low_pass_hz)
     except ValueError as error:
         raise BadInput(str(error)) from None
     same = all(one.low_pass is None and one.facts.pass_band_hz is None for one in found)
-    return runs if same else SimulatedRuns(found)
+    return runs if same else SimulatedRuns(found, runs.fine_hz)
 
 
 def slow(effects: Iterable[Effect]) -> list[str]:

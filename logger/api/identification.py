@@ -17,7 +17,7 @@ from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.errors import BadInput
-from logger.runs import READING, SKIP_S
+from logger.runs import SKIP_S
 from logger.runs import Run as Record
 from logger.store.formats import vehicle_file
 
@@ -187,8 +187,7 @@ def records_of(drives: Sequence[tuple[Drive, Track | Excitation | None]], skip_s
             raise BadInput(f"{drive.path}: expected at least {LEAST_SAMPLES} samples after the first {skip_s:g} s, "
                            f"which are left out ({question.said.format('skip')}), found {lasts_s:g} s in all")
         records.append(Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if track is None else track, skip_s, drive.facts,
-                              None if drive.usable is None or (drive.usable == READING).all() else drive.usable))
+                              Track(1.0, np.zeros(2)) if track is None else track, skip_s, drive.facts, drive.marks()))
     try:
         check_records(records)
     except UnusableRun as error:

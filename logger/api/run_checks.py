@@ -88,16 +88,15 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     """The parts of a drive in which the car moved, or stood on a rig, and there were readings (``driven_parts``), each
     a run; of one that stood or had none nowhere the whole. A part says in its name which seconds it is of. BadInput as
     ``driven_parts``."""
-    from logger.runs import READING, Run
+    from logger.runs import Run
 
-    parts, usable = driven_parts(drive, drive.track.timed), drive.usable
+    parts = driven_parts(drive, drive.track.timed)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, drive.accel_z_mps2[part], drive.distance_m[part], drive.speed_mps[part],
                 drive.track.begun(part.start / drive.rate_hz), facts=drive.facts,
-                usable=None if usable is None or (usable[part] == READING).all() else usable[part],
-                more=_more(drive, part))
+                usable=drive.marks(part), more=_more(drive, part))
             for part in parts]
 
 
@@ -111,29 +110,23 @@ def driven_parts(drive: Drive, on_rig: bool = False) -> list[slice]:
     """
     import numpy as np
 
+    from logger.dsp.stretches import stretches_of
     from logger.lab.likelihood.lag import SLOWEST_MPS
     from logger.runs import NO_READING, SKIP_S
 
     driven = (drive.speed_mps >= SLOWEST_MPS) | on_rig
     read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
     kept = read.copy()
-    for gap in _stretches(driven & ~read):
+    for gap in map(slice, *stretches_of(driven & ~read)):
         between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
         kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
-    parts = [part for part in _stretches(kept) if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
+    parts = [part for part in map(slice, *stretches_of(kept))
+             if np.count_nonzero(read[part]) >= LEAST_S * drive.rate_hz]
     if not parts:
         moving = "" if on_rig else f" at {SLOWEST_MPS:g} m/s or faster"
         raise BadInput(f"{drive.path}: expected {LEAST_S:g} s with readings{moving}, without a break of more than "
                        f"{SKIP_S:g} s")
     return parts
-
-
-def _stretches(which: Bools) -> list[slice]:
-    """Where samples (n,) follow each other that are meant."""
-    import numpy as np
-
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], which.astype(int), [0]])))
-    return [slice(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)]
 
 
 def _more(drive: Drive, part: slice) -> Array:

@@ -48,8 +48,8 @@ LINES_M: Mapping[str, tuple[float, float]] = {LINE: (60.0, 560.0), BEYOND: (600.
 _PLACE_EVERY = 200  # rows of a line
 _STREET = (Stretch(220, 300), Stretch(160, 700), Stretch(210, 250), Stretch(150, 80), Stretch(150, 200),
            Stretch(150, 50), Stretch(130, 300), Stretch(300, 100))
-# A console that shakes. The serial sensor is no better than a BMA220 with its steps (0.18 m/s2) and less noise: the lab
-# takes one noise for all drives, and calls what is louder in one of them unexplained.
+# A console that shakes. The serial sensor is no better than a BMA220 with its steps (0.18 m/s2) and less noise, so that
+# no drive decides alone.
 _NOISE_MPS2 = {DEFAULT: 0.17, LINES: 0.22}
 _LENGTH_M, _SEED = 1300.0, 1927
 

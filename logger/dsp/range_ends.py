@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.repeated_samples import resolution, stretches_of
+from logger.dsp.repeated_samples import resolution
+from logger.dsp.stretches import stretches_inside
 
 Array = npt.NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def range_ends(values: Array) -> list[RangeEnd]:
 def _upper_end(values: Array, step: float) -> RangeEnd | None:
     top = float(values.max())
     at_top = values > top - 0.5 * step
-    first, end = stretches_of(at_top)
+    first, end = stretches_inside(at_top)
     stands = end - first >= _LEAST_SAMPLES
     first, end = first[stands], end[stands]
     jumps = np.minimum(values[first] - values[first - 1], values[end - 1] - values[end]) > JUMP * step

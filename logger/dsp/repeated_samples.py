@@ -21,6 +21,8 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.stretches import stretches_inside
+
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
@@ -84,15 +86,6 @@ def fresh_samples(samples: Array) -> Bools:
     return fresh
 
 
-def stretches_of(mask: Bools) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """First places and ends (k,), half open, of the stretches in which a mask (n,) holds, those without the first and
-    the last place alone."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
-    first, end = edges[::2], edges[1::2]
-    inside = (first > 0) & (end < len(mask))
-    return first[inside], end[inside]
-
-
 def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> Repeats | None:
     """Repeated samples (n, axes), all axes at once; None where there are none that can be told from chance, which
     gives some with a probability of ``false_alarm`` at most."""
@@ -118,7 +111,7 @@ def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:
     """How many stretches of small moves between two large ones stand still, and how many there are."""
     move = moves(samples)
     large = move > LARGE
-    first, end = stretches_of(move < SMALL)
+    first, end = stretches_inside(move < SMALL)
     at_end = _at_an_end(samples)
     good = large[first - 1] & large[end] & ~at_end[first]
     first, end = first[good], end[good]

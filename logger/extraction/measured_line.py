@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.stretches import stretches_of
 from logger.geodesy import EARTH_RADIUS_M
 
 Array = npt.NDArray[np.float64]
@@ -88,9 +89,8 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
     offset_m = along_m - driven_m
     on = aside_m <= ASIDE_M
     together = on[1:] & on[:-1] & (np.abs(np.diff(offset_m)) <= _APART_M)
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], together.astype(int), [0]])))
     found = []
-    for first, last in zip(ends[::2], ends[1::2], strict=True):
+    for first, last in zip(*stretches_of(together), strict=True):
         moved = np.ptp(driven_m[first : last + 1])
         if last - first + 1 >= _LEAST_FIXES and moved > 2 * _APART_M and np.ptp(offset_m[first : last + 1]) < moved / 2:
             found.append(Pass(int(first), int(last) + 1, float(np.median(offset_m[first : last + 1]))))

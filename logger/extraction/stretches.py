@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from logger.dsp.stretches import stretches_of
+
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
@@ -31,10 +33,9 @@ def stretches(time_s: Array, present: Bools, fix_s: Array, speed_mps: Array, lon
         return []
     at_s = time_s[present]
     breaks = [*_gaps(fix_s, longest_gap_s), *_gaps(at_s, LONGEST_HOLE_S)]
-    standing = np.diff(np.concatenate([[0], (speed_mps < stationary_mps).astype(int), [0]]))
-    for first, last in zip(np.flatnonzero(standing == 1), np.flatnonzero(standing == -1) - 1, strict=True):
-        if fix_s[last] - fix_s[first] > longest_standing_s:
-            breaks.append((fix_s[first] + KEPT_STANDING_S, fix_s[last] - KEPT_STANDING_S))
+    for first, end in zip(*stretches_of(speed_mps < stationary_mps), strict=True):
+        if fix_s[end - 1] - fix_s[first] > longest_standing_s:
+            breaks.append((fix_s[first] + KEPT_STANDING_S, fix_s[end - 1] - KEPT_STANDING_S))
     begin_s, end_s = max(fix_s[0], at_s[0]), min(fix_s[-1], at_s[-1])
     found = []
     for gone_s, back_s in sorted(breaks):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -81,7 +82,7 @@ class Comparison:
         """What of the runs was compared; None: all of it."""
         return compared_band(self.plain.residuals.runs)
 
-    @property
+    @cached_property
     def repeats(self) -> Repeats | None:
         """What runs that repeat each other differ by; None where none does."""
         return repeats_among(self.plain.residuals.runs)

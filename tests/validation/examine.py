@@ -22,7 +22,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from .cases.random_case import KINDS
-from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
+from .cases.seeds import add_seed_options, first_seed, seeds
 from .marking.marks import hidden, right, said
 from .marking.sitting import Question, Record, sit
 from .report.pages import Matrix, markdown, page
@@ -32,11 +32,11 @@ COUNTS = {"none": 40, "one": 100, "two": 40, "outsider": 39, "two_outsider": 0, 
 """Five of each effect of the list, three of each off it; two of each that distances that wander do not imitate."""
 
 
-def questions(counts: dict[str, int], first_seed: int, release: bool = False) -> list[Question]:
+def questions(counts: dict[str, int], first: int, release: bool = False) -> list[Question]:
     """Which cases, the kinds evenly mixed, so that a part of an examination says something of all of them. ValueError
     as in ``seeds``."""
     planned = [((number + 0.5) / count, Question(kind, seed)) for kind, count in counts.items() if count
-               for number, seed in enumerate(seeds(first_seed, count, release))]
+               for number, seed in enumerate(seeds(first, count, release))]
     return [question for _, question in sorted(planned)]
 
 
@@ -85,20 +85,15 @@ def main() -> None:
     for kind in KINDS:
         parser.add_argument(f"--{kind.replace('_', '-')}", type=int, default=COUNTS[kind], metavar="N",
                             help=f"how many cases of this kind (default: {COUNTS[kind]})")
-    parser.add_argument("--first-seed", type=int,
-                        help=f"default: {DEVELOPMENT_SEEDS[0]}, of a release {RELEASE_SEEDS[0]}")
-    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+    add_seed_options(parser)
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "examination.jsonl")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where the report goes")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--in-process", action="store_true", help="call the commands instead of starting them")
     parser.add_argument("--report-only", action="store_true", help="of the results that are there")
     options = parser.parse_args()
-    first_seed = options.first_seed
-    if first_seed is None:
-        first_seed = (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
     try:
-        asked = questions({kind: getattr(options, kind) for kind in KINDS}, first_seed, options.release)
+        asked = questions({kind: getattr(options, kind) for kind in KINDS}, first_seed(options), options.release)
     except ValueError as error:
         parser.error(str(error))
     if not options.report_only:

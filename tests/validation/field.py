@@ -20,7 +20,7 @@ import numpy as np
 from .cases.case_files import write_case
 from .cases.field_case import SENSORS, START_S, noise_of, write_field
 from .cases.random_case import Case, case
-from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
+from .cases.seeds import add_seed_options, first_seed, seeds
 from .cases.visibility import deviations
 from .marking.marks import all_found, hidden, near, numbers, right, said
 from .marking.sitting import NoAnswer, Record, added, asked, kept_of
@@ -59,10 +59,8 @@ def main() -> int:
     parser.add_argument("--sensor", choices=SENSORS, default=SENSORS[0])
     parser.add_argument("--kind", choices=("one", "none"), default="one")
     parser.add_argument("--cases", type=int, default=20)
-    parser.add_argument("--first-seed", type=int)
-    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+    add_seed_options(parser)
     options = parser.parse_args()
-    first = options.first_seed or (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
     goal = NAMED[options.sensor]
     named = Tally(f"named, of effects above {STANDS_OUT:g} deviations", f"at least {goal:.0%}")
     wrong = Tally("cases with a false name", f"at most {WRONG:.0%}")
@@ -71,7 +69,7 @@ def main() -> int:
     off: list[float] = []
     seconds: list[float] = []
     cpu_s: list[float] = []
-    for seed in seeds(first, options.cases, options.release):
+    for seed in seeds(first_seed(options), options.cases, options.release):
         made = case(options.kind, seed, None, noise_of(options.sensor))
         stands_out = deviations(made, _START_M)
         record, places_m = put(made, options.sensor)

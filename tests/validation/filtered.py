@@ -18,7 +18,7 @@ from pathlib import Path
 from .cases.case_files import write_case
 from .cases.filtered_case import LOW_PASS, draw_filter, filtered, wrong_names
 from .cases.random_case import Case, case
-from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
+from .cases.seeds import add_seed_options, first_seed, seeds
 from .marking.sitting import NoAnswer, asked
 from .simulator.effects import EFFECTS
 
@@ -32,12 +32,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kind", choices=("none", "one"), default="none")
     parser.add_argument("--cases", type=int, default=10)
-    parser.add_argument("--first-seed", type=int)
-    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+    add_seed_options(parser)
     options = parser.parse_args()
-    first = options.first_seed or (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
     wrong = strong = named = 0
-    for seed in seeds(first, options.cases, options.release):
+    for seed in seeds(first_seed(options), options.cases, options.release):
         by = draw_filter(options.kind, seed)
         made = case(options.kind, seed, HIDDEN[seed % len(HIDDEN)] if options.kind == "one" else None)
         said, rest = put(filtered(made, by))

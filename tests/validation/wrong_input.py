@@ -29,7 +29,7 @@ from logger.units import STANDARD_GRAVITY_MPS2
 
 from .cases.case_files import write_case
 from .cases.random_case import case
-from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS, seeds
+from .cases.seeds import add_seed_options, first_seed, seeds
 
 KINDS = ("none", "one", "two", "outsider", "wandering")
 Change = Callable[[Run, Track], Run]
@@ -58,14 +58,12 @@ def main() -> int:
     """Print the figures; exit 1 when a goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=50)
-    parser.add_argument("--first-seed", type=int)
-    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+    add_seed_options(parser)
     options = parser.parse_args()
-    first = options.first_seed or (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
     passed: Counter[str] = Counter()
     refused: Counter[str] = Counter()
     others: Track | None = None
-    for number, seed in enumerate(seeds(first, options.cases, options.release)):
+    for number, seed in enumerate(seeds(first_seed(options), options.cases, options.release)):
         kind = KINDS[number % len(KINDS)]
         runs, model = made(kind, seed)
         for words, change in ({"right": None} | (WRONG if others is not None else {})).items():

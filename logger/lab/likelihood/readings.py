@@ -112,7 +112,7 @@ def as_read_error(readings: Sequence[Readings], residuals: Sequence[Array]) -> f
     acceleration counts; those of rounded readings as they were read."""
     counted = [(one.run.main(left) + (one.run.measured_mps2 - one.mps2) * one.run.read)[one.run.first:]
                for one, left in zip(readings, residuals, strict=True)]
-    return normalised_rms(counted, [(one.run.measured_mps2 * one.run.read)[one.run.first:] for one in readings])
+    return normalised_rms(counted, [one.run.kept_readings_mps2 for one in readings])
 
 
 def _within(left: Array, step: float, noise: float) -> tuple[Array, Array]:

@@ -69,6 +69,10 @@ class Drive:
     facts: RecordFacts = field(default=UNKNOWN, kw_only=True)
     more: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
 
+    def marks(self, part: slice = slice(None)) -> Array | None:
+        """``usable`` of a part; None where all of it are readings."""
+        return None if self.usable is None or (self.usable[part] == READING).all() else self.usable[part]
+
 
 @dataclass(frozen=True, eq=False)
 class DriveOnRoad(Drive):

@@ -7,11 +7,27 @@ on the command line (``--release``); every other seed is for development.
 
 from __future__ import annotations
 
+from argparse import ArgumentParser, Namespace
+
 DEVELOPMENT_SEEDS = range(2000, 2100)
 """Where development runs begin unless they are told otherwise; a whole one uses all of them."""
 
 RELEASE_SEEDS = range(7000, 8000)
 """Of published examinations. Nothing may be tuned, chosen or mended by what comes of them."""
+
+
+def add_seed_options(parser: ArgumentParser) -> None:
+    """--first-seed and --release, for ``first_seed``."""
+    parser.add_argument("--first-seed", type=int,
+                        help=f"default: {DEVELOPMENT_SEEDS[0]}, of a release {RELEASE_SEEDS[0]}")
+    parser.add_argument("--release", action="store_true", help="of the seeds that no development run has used")
+
+
+def first_seed(options: Namespace) -> int:
+    """The seed to begin with, as it was said, or the first of its range."""
+    if options.first_seed is not None:
+        return int(options.first_seed)
+    return (RELEASE_SEEDS if options.release else DEVELOPMENT_SEEDS)[0]
 
 
 def seeds(first: int, count: int, release: bool) -> range:
