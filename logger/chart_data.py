@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+CLASS_COLOURS = ("#2f6db5", "#58a9d4", "#f2c744", "#ef8d32", "#d0402b", "#9e1b5e", "#651a70", "#35104a")
+"""Of classes from best to worst: from blue over yellow and red to purple, told apart with any common colour vision."""
+NO_CLASS_COLOUR = "#9aa4ad"
+
 
 @dataclass(frozen=True, eq=False)
 class Line:
