@@ -46,7 +46,7 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
 
     Raises BadInput for another ending, a missing extra, no log or none with an intact row.
 
-    >>> convert(folder, out / "drive.geojson").rows > 0
+    >>> convert(folder / "logs", folder / "drive.geojson").rows > 0
     True
     """
     from logger.exchange.format import format_of
