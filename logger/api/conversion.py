@@ -50,7 +50,7 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
     True
     """
     from logger.exchange.format import format_of
-    from logger.exchange.windows import windows_of
+    from logger.exchange.windows import windows_layer
     from logger.store.log.log_reader import find_logs, read_logged
 
     path = Path(to)
@@ -59,18 +59,18 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
     found = {log.resolve(): (log, place) for place in places for log in find_logs(place)}
     _check(path, [log for log, _ in found.values()])
     files = [logged for log, place in found.values() if (logged := read_logged(log, place)) is not None]
-    windows = windows_of(files)
-    if not windows.rows:
+    layer = windows_layer(files)
+    if not layer.features:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
     new = path.with_name(f".{os.getpid()}-{path.name}")  # GDAL goes by the ending
     try:
-        form.write(windows, new)
+        form.write(layer, new)
         new.replace(path)
     except OSError as error:
         raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None
     finally:
         new.unlink(missing_ok=True)
-    return Conversion(path, form.name, len(windows.rows), windows.placed, sum(one.damaged_lines for one in files))
+    return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files))
 
 
 def _check(out: Path, logs: Sequence[Path]) -> None:

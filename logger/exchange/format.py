@@ -7,12 +7,12 @@ from functools import cache
 from pathlib import Path
 
 from logger.errors import BadInput
-from logger.exchange.windows import Windows
+from logger.exchange.layer import Layer
 from logger.plugins import catalogue
 
 
 class Format(ABC):
-    """A way to write windows.
+    """A way to write a layer.
 
     name     as the file's of this package, and the ending of what it writes
     title    in a few words
@@ -22,8 +22,8 @@ class Format(ABC):
     title: str
 
     @abstractmethod
-    def write(self, windows: Windows, path: Path) -> None:
-        """Write all windows into a file that is not there yet. BadInput where a library that it takes is missing;
+    def write(self, layer: Layer, path: Path) -> None:
+        """Write all rows into a file that is not there yet. BadInput where a library that it takes is missing;
         OSError where the file cannot be written."""
 
 

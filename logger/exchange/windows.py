@@ -1,4 +1,4 @@
-"""Rows of logs with their places on the ground as geometries.
+"""Rows of logs as a layer: the columns of the log by their names there, and the file that the row is from.
 
 Problem: a row has one place, its middle; a map wants the stretch of road that the row is about. Solution: a row's line
 runs from half-way to the row before, through its middle, half-way to the next; where a neighbour does not join (a gap,
@@ -7,94 +7,73 @@ lost GPS) it ends at the middle, and a row without neighbours is a point. Nothin
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from itertools import pairwise
 
-from logger.geodesy import east_deg
+from logger.exchange.geometry import Geometry, Place, cut, half_way
+from logger.exchange.layer import Feature, Field, Kind, Layer, Value
 from logger.records import WindowRecord
-from logger.store.log.log_reader import LoggedFile, joined, split_drives
+from logger.store.log.log_reader import LoggedFile, iso_utc, joined, split_drives
+from logger.store.log.row_format import COLUMNS
+from logger.units import US_PER_S
 
-Place = tuple[float, float]
-"""Longitude and latitude [degrees], in the order of maps."""
-Line = tuple[Place, ...]
-Geometry = tuple[Line, ...]
-"""Lines of a row, in the order driven: one, two where it crosses the 180th meridian; a line of one place is a point;
-nothing where no place is known."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """A row of a log.
-
-    log         the file that it is from
-    drive       counts the drives of the file, from 1
-    geometry    where it lies
-    """
-
-    log: str
-    drive: int
-    record: WindowRecord
-    geometry: Geometry
+LAYER = "windows"
+_KINDS = {"t_utc": Kind.TIME, "segment": Kind.COUNT, "drive": Kind.COUNT, "samples": Kind.COUNT,
+          "clipped_samples": Kind.COUNT, "comfort": Kind.WORDS, "iri_class": Kind.WORDS, "flags": Kind.WORDS}
+FIELDS = (Field("log", Kind.WORDS),
+          *(Field(column.name, _KINDS.get(column.name, Kind.NUMBER)) for column in COLUMNS))
 
 
-@dataclass(frozen=True)
-class Windows:
-    """Rows of some logs, in the order driven: drives, each in stretches that join, rows without a place alone."""
-
-    rows: tuple[Window, ...]
-
-    @property
-    def placed(self) -> int:
-        """How many have a place."""
-        return sum(bool(row.geometry) for row in self.rows)
+def windows_layer(files: Sequence[LoggedFile]) -> Layer:
+    """The rows of logs as they were read, drives in the order driven."""
+    return Layer(LAYER, FIELDS, tuple(
+        feature for file in files for number, drive in enumerate(split_drives(file.records), start=1)
+        for feature in _features(file.name, group_name(file.name, number), drive)))
 
 
-def windows_of(files: Sequence[LoggedFile]) -> Windows:
-    """The rows of logs as they were read."""
-    return Windows(tuple(window for file in files
-                         for number, drive in enumerate(split_drives(file.records), start=1)
-                         for window in _windows(file.name, number, drive)))
+def group_name(log: str, drive: int) -> str:
+    """What the rows of a drive belong to; drives of a log count from 1."""
+    return f"{log}, drive {drive}"
 
 
-def _windows(log: str, drive: int, records: Sequence[WindowRecord]) -> Iterator[Window]:
-    geometry = {id(record): found for piece in joined(records)
-                for record, found in zip(piece, _geometries(piece), strict=True)}
-    for record in records:
-        yield Window(log, drive, record, geometry.get(id(record), ()))
+def iri_title(iri_m_per_km: float | None) -> str:
+    """A row in a few words."""
+    return "IRI not known" if iri_m_per_km is None else f"IRI {iri_m_per_km:.2f} m/km"
 
 
-def _geometries(piece: Sequence[WindowRecord]) -> Iterator[Geometry]:
-    places = [(record.lon_deg or 0.0, record.lat_deg or 0.0) for record in piece]
-    ends = [_half_way(one, next_) for one, next_ in itertools.pairwise(places)]
+def geometries(records: Sequence[WindowRecord]) -> list[tuple[Geometry, bool]]:
+    """Where the rows of a drive lie, and whether each joins the row before it."""
+    found = {id(record): (geometry, number > 0) for piece in joined(records)
+             for number, (record, geometry) in enumerate(zip(piece, _of_piece(piece), strict=True))}
+    return [found.get(id(record), ((), False)) for record in records]
+
+
+def _features(log: str, group: str, records: Sequence[WindowRecord]) -> Iterator[Feature]:
+    for record, (geometry, joins) in zip(records, geometries(records), strict=True):
+        middle_us = None if record.utc_us is None else record.utc_us + round(US_PER_S * record.duration_s / 2)
+        yield Feature(group, iri_title(record.iri_m_per_km), (log, *_values(record)), geometry,
+                      _middle(record) if geometry else None, iso_utc(middle_us), joins, record.iri_class)
+
+
+def _values(record: WindowRecord) -> Iterator[Value]:
+    for column in COLUMNS:
+        value = getattr(record, column.attribute)
+        if column.name == "t_utc":
+            yield iso_utc(value)
+        elif column.name == "t_s":
+            yield value / US_PER_S
+        elif column.name == "flags":
+            yield "|".join(value)
+        else:
+            yield None if value == "" else value
+
+
+def _middle(record: WindowRecord) -> Place:
+    return record.lon_deg or 0.0, record.lat_deg or 0.0
+
+
+def _of_piece(piece: Sequence[WindowRecord]) -> Iterator[Geometry]:
+    places = [_middle(record) for record in piece]
+    ends = [half_way(one, next_) for one, next_ in pairwise(places)]
     for index, place in enumerate(places):
-        yield _cut(tuple(_without_repeats([*ends[max(index - 1, 0) : index], place, *ends[index : index + 1]])))
-
-
-def _without_repeats(places: Sequence[Place]) -> Iterator[Place]:
-    """Those of a car that stands are all the same."""
-    return (place for index, place in enumerate(places) if not index or place != places[index - 1])
-
-
-def _half_way(one: Place, other: Place) -> Place:
-    return _wrapped(one[0] + east_deg(one[0], other[0]) / 2), (one[1] + other[1]) / 2
-
-
-def _wrapped(lon_deg: float) -> float:
-    """The same meridian from -180 to 180; what is there already stays as it was written."""
-    return lon_deg if -180.0 <= lon_deg <= 180.0 else (lon_deg + 180.0) % 360.0 - 180.0
-
-
-def _cut(line: Line) -> Geometry:
-    """A line in two where it crosses the 180th meridian (RFC 7946, section 3.1.9)."""
-    parts: list[list[Place]] = [[line[0]]]
-    for (lon0, lat0), (lon1, lat1) in itertools.pairwise(line):
-        if abs(lon1 - lon0) > 180.0:
-            edge = 180.0 if lon0 > 0 else -180.0
-            way = east_deg(lon0, lon1)
-            lat = lat0 + (lat1 - lat0) * ((edge - lon0) / way if way else 0.0)
-            parts[-1].append((edge, lat))
-            parts.append([(-edge, lat)])
-        parts[-1].append((lon1, lat1))
-    lines = [tuple(_without_repeats(part)) for part in parts]
-    return tuple(part for part in lines if len(part) > 1) or (lines[0],)
+        yield cut((*ends[max(index - 1, 0) : index], place, *ends[index : index + 1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from logger.exchange.windows import Geometry, Line
+from logger.exchange.geometry import Geometry, Line
 
 POINT, LINE, LINES = 1, 2, 5
 TYPE_NAMES = {POINT: "Point", LINE: "LineString", LINES: "MultiLineString"}

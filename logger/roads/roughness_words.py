@@ -7,6 +7,8 @@ scale from 0 to 12 m/km; here each one holds from the mark it stands at (the fir
 
 from __future__ import annotations
 
+from logger.units import INCH_PER_MILE_M_PER_KM
+
 # Lowest and highest IRI [m/km] and the kind of road.
 ROAD_RANGES = (
     (0.25, 1.75, "airport runways and superhighways"),
@@ -25,6 +27,18 @@ RIDES = (
     (8.0, "comfortable up to 50-60 km/h; frequent sharp movements, deep dips and frequent potholes"),
     (10.0, "too rough for 50 km/h; many deep dips and potholes, surface breaking up"),
 )
+
+# Where good ends and how far fair reaches: 23 CFR 490.313 (b)(1), of the Interstate and National Highway System.
+GOOD_BELOW_IN_PER_MI, FAIR_TO_IN_PER_MI = 95.0, 170.0
+FEDERAL_WORDS = ("good", "fair", "poor")
+
+
+def federal_condition(iri_m_per_km: float) -> str:
+    """Good, fair or poor by the IRI of a section of 0.1 mi (23 CFR 490.313: below 95 in/mi, up to 170, above)."""
+    in_per_mi = iri_m_per_km / INCH_PER_MILE_M_PER_KM
+    if in_per_mi < GOOD_BELOW_IN_PER_MI:
+        return "good"
+    return "fair" if in_per_mi <= FAIR_TO_IN_PER_MI else "poor"
 
 
 def road_kinds(iri_m_per_km: float) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.exchange.format import formats
-from logger.exchange.windows import windows_of
+from logger.exchange.windows import windows_layer
 from logger.records import WindowRecord
 from logger.store.log.log_reader import LoggedFile
 from logger.store.log.row_format import COLUMNS, HEADER, format_row
@@ -159,8 +159,8 @@ def test_a_table_has_all_rows_with_their_units(logs: Path) -> None:
 @given(lat=st.floats(-85, 85), lon=st.floats(-180, 180), count=st.integers(1, 30))
 def test_lines_join_and_cover_the_way_once(lat: float, lon: float, count: int) -> None:
     """From the first middle to the last, each line beginning where the one before ends, none across the meridian."""
-    found = windows_of([LoggedFile("one", drive(eastwards(lat, lon, count)), 0, None)])
-    lines = [line for row in found.rows for line in row.geometry]
+    found = windows_layer([LoggedFile("one", drive(eastwards(lat, lon, count)), 0, None)])
+    lines = [line for row in found.features for line in row.geometry]
     assert found.placed == count
     length_m = 0.0
     for line in lines:
@@ -176,8 +176,8 @@ def test_lines_join_and_cover_the_way_once(lat: float, lon: float, count: int) -
 def test_a_gap_stays_a_gap_and_a_lone_row_is_a_point(tmp_path: Path) -> None:
     places = eastwards(50.0, 8.0, 6)
     rows = drive([places[0], None, *places[2:4], None, places[5]])
-    found = windows_of([LoggedFile("one", rows, 0, None)])
-    assert [len(row.geometry[0]) if row.geometry else 0 for row in found.rows] == [1, 0, 2, 2, 0, 1]
+    found = windows_layer([LoggedFile("one", rows, 0, None)])
+    assert [len(row.geometry[0]) if row.geometry else 0 for row in found.features] == [1, 0, 2, 2, 0, 1]
     assert main(["convert", str(write(tmp_path / "logs", rows)), "--to", str(tmp_path / "out.gpkg")]) == 0
     assert pyogrio.read_info(tmp_path / "out.gpkg", layer="windows")["features"] == 6
 
@@ -234,7 +234,7 @@ def test_a_format_that_fails_half_way_leaves_the_old_file(logs: Path, monkeypatc
     out = converted(logs, "csv")
     before = out.read_bytes()
 
-    def fail(windows: object, path: Path) -> None:
+    def fail(layer: object, path: Path) -> None:
         path.write_text("half")
         raise OSError(28, "No space left on device", str(path))
 

@@ -6,9 +6,8 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from logger.exchange.fields import NAMES, values_of
 from logger.exchange.format import Format
-from logger.exchange.windows import Windows
+from logger.exchange.layer import Layer
 
 
 class Csv(Format):
@@ -17,11 +16,11 @@ class Csv(Format):
     name = "csv"
     title = "a table of all rows, for spreadsheets"
 
-    def write(self, windows: Windows, path: Path) -> None:
+    def write(self, layer: Layer, path: Path) -> None:
         with path.open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
-            table.writerow(NAMES)
-            table.writerows(values_of(window) for window in windows.rows)
+            table.writerow(layer.names)
+            table.writerows(one.values for one in layer.features)
 
 
 FORMAT = Csv()

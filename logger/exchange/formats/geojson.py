@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from logger.exchange.fields import NAMES, values_of
 from logger.exchange.format import Format
-from logger.exchange.windows import Geometry, Line, Windows
+from logger.exchange.geometry import Geometry, Line
+from logger.exchange.layer import Layer
 from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
 
 _DECIMALS = 6
@@ -20,12 +20,12 @@ class GeoJson(Format):
     name = "geojson"
     title = "a map of all rows, for GIS programs and web maps"
 
-    def write(self, windows: Windows, path: Path) -> None:
+    def write(self, layer: Layer, path: Path) -> None:
         with path.open("w", encoding="utf-8") as file:
             file.write('{"type":"FeatureCollection","features":[')
-            for number, window in enumerate(windows.rows):
-                feature = {"type": "Feature", "geometry": _geometry(window.geometry),
-                           "properties": dict(zip(NAMES, values_of(window), strict=True))}
+            for number, one in enumerate(layer.features):
+                feature = {"type": "Feature", "geometry": _geometry(one.geometry),
+                           "properties": dict(zip(layer.names, one.values, strict=True))}
                 file.write((",\n" if number else "\n") + json.dumps(feature, separators=(",", ":"), allow_nan=False))
             file.write("\n]}\n")
 

@@ -1,21 +1,19 @@
 """GPX 1.1: a track a drive, a segment a stretch without a gap, a point a row, with its values as extensions.
 
-A point's time is that of the window's middle, where the point lies.
+A point's time is that of the row's middle, where the point lies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import escape
 
-from logger.exchange.fields import NAMES, values_of
 from logger.exchange.format import Format
-from logger.exchange.windows import Window, Windows
-from logger.store.log.log_reader import iso_utc, joined
+from logger.exchange.layer import Feature, Layer
 
-_SPACE = "urn:x-ridelog:windows:1"
+_SPACE = "urn:x-ridelog:values:1"
 _IN_THE_POINT = {"lat_deg", "lon_deg", "t_utc"}
 
 
@@ -25,34 +23,36 @@ class Gpx(Format):
     name = "gpx"
     title = "tracks, for navigation devices and programs"
 
-    def write(self, windows: Windows, path: Path) -> None:
+    def write(self, layer: Layer, path: Path) -> None:
         with path.open("w", encoding="utf-8") as file:
             file.write('<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="ridelog" '
                        f'xmlns="http://www.topografix.com/GPX/1/1" xmlns:ridelog="{_SPACE}">\n')
-            for (log, drive), rows in groupby(windows.rows, lambda row: (row.log, row.drive)):
-                file.write(f"<trk><name>{escape(log)}, drive {drive}</name>\n")
-                file.writelines(_segments(list(rows)))
+            for group, rows in groupby(layer.features, lambda row: row.group):
+                file.write(f"<trk><name>{escape(group)}</name>\n")
+                file.writelines(_segments(rows, layer.names))
                 file.write("</trk>\n")
             file.write("</gpx>\n")
 
 
-def _segments(rows: list[Window]) -> Iterator[str]:
-    of = {id(row.record): row for row in rows}
-    for piece in joined([row.record for row in rows]):
-        yield "<trkseg>\n"
-        yield from (_point(of[id(record)]) for record in piece)
+def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:
+    is_open = False
+    for row in rows:
+        if is_open and not row.joins:
+            yield "</trkseg>\n"
+        if row.middle is not None:
+            yield ("" if is_open and row.joins else "<trkseg>\n") + _point(row, row.middle, names)
+        is_open = row.middle is not None
+    if is_open:
         yield "</trkseg>\n"
 
 
-def _point(row: Window) -> str:
-    record = row.record
-    middle_us = None if record.utc_us is None else record.utc_us + round(5e5 * record.duration_s)
-    time = "" if middle_us is None else f"<time>{iso_utc(middle_us)}</time>"
+def _point(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
+    time = "" if row.time_utc is None else f"<time>{row.time_utc}</time>"
     values = "".join(f"<ridelog:{name}>{escape(str(value))}</ridelog:{name}>"
-                     for name, value in zip(NAMES, values_of(row), strict=True)
+                     for name, value in zip(names, row.values, strict=True)
                      if name not in _IN_THE_POINT and value not in (None, ""))
-    return (f"<trkpt lat={quoteattr(f'{record.lat_deg:.7f}')} lon={quoteattr(f'{record.lon_deg:.7f}')}>{time}"
-            f"<extensions>{values}</extensions></trkpt>\n")
+    lon_deg, lat_deg = middle
+    return f'<trkpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{time}<extensions>{values}</extensions></trkpt>\n'
 
 
 FORMAT = Gpx()

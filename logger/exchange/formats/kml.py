@@ -9,9 +9,9 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
-from logger.exchange.fields import NAMES, values_of
 from logger.exchange.format import Format
-from logger.exchange.windows import Geometry, Line, Window, Windows
+from logger.exchange.geometry import Geometry, Line
+from logger.exchange.layer import Feature, Layer
 from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
 from logger.roads.iso8608 import CLASS_GD_N0_CM3
 
@@ -25,14 +25,14 @@ class Kml(Format):
     name = "kml"
     title = "lines in the colours of their classes, for Google Earth"
 
-    def write(self, windows: Windows, path: Path) -> None:
+    def write(self, layer: Layer, path: Path) -> None:
         with path.open("w", encoding="utf-8") as file:
             file.write('<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
                        "<name>ridelog</name>\n")
             file.writelines(_styles())
-            for (log, drive), rows in groupby(windows.rows, lambda row: (row.log, row.drive)):
-                file.write(f"<Folder><name>{escape(log)}, drive {drive}</name>\n")
-                file.writelines(_placemark(row) for row in rows if row.geometry)
+            for group, rows in groupby(layer.features, lambda row: row.group):
+                file.write(f"<Folder><name>{escape(group)}</name>\n")
+                file.writelines(_placemark(row, layer.names) for row in rows if row.geometry)
                 file.write("</Folder>\n")
             file.write("</Document></kml>\n")
 
@@ -46,14 +46,11 @@ def _styles() -> Iterator[str]:
                f"<IconStyle><color>{turned}</color></IconStyle></Style>\n")
 
 
-def _placemark(row: Window) -> str:
-    record = row.record
-    name = "IRI not known" if record.iri_m_per_km is None else f"IRI {record.iri_m_per_km:.2f} m/km"
-    time = "".join(f"<TimeStamp><when>{value}</when></TimeStamp>"
-                   for key, value in zip(NAMES, values_of(row), strict=True) if key == "t_utc" and value)
-    values = "".join(f'<Data name="{key}"><value>{escape(str(value))}</value></Data>'
-                     for key, value in zip(NAMES, values_of(row), strict=True) if value not in (None, ""))
-    return (f"<Placemark><name>{name}</name>{time}<styleUrl>#class-{record.iri_class or _UNKNOWN}</styleUrl>"
+def _placemark(row: Feature, names: tuple[str, ...]) -> str:
+    time = "" if row.time_utc is None else f"<TimeStamp><when>{row.time_utc}</when></TimeStamp>"
+    values = "".join(f'<Data name="{name}"><value>{escape(str(value))}</value></Data>'
+                     for name, value in zip(names, row.values, strict=True) if value not in (None, ""))
+    return (f"<Placemark><name>{escape(row.title)}</name>{time}<styleUrl>#class-{row.iri_class or _UNKNOWN}</styleUrl>"
             f"<ExtendedData>{values}</ExtendedData>{_geometry(row.geometry)}</Placemark>\n")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from logger.exchange.arrow_table import GEOMETRY, arrow_table
 from logger.exchange.format import Format
-from logger.exchange.windows import Windows
+from logger.exchange.layer import Layer
 from logger.exchange.wkb import TYPE_NAMES, type_of
 
 
@@ -18,17 +18,17 @@ class GeoParquet(Format):
     name = "parquet"
     title = "GeoParquet, for data programs (needs the 'maps' extra)"
 
-    def write(self, windows: Windows, path: Path) -> None:
-        table = arrow_table(windows, str(path))
+    def write(self, layer: Layer, path: Path) -> None:
+        table = arrow_table(layer, str(path))
         from pyarrow.parquet import write_table
 
-        metadata = {**(table.schema.metadata or {}), b"geo": json.dumps(_metadata(windows)).encode()}
+        metadata = {**(table.schema.metadata or {}), b"geo": json.dumps(_metadata(layer)).encode()}
         write_table(table.replace_schema_metadata(metadata), path)
 
 
-def _metadata(windows: Windows) -> dict[str, Any]:
+def _metadata(layer: Layer) -> dict[str, Any]:
     """Without a name of its own the reference system is WGS 84 with longitude first (OGC:CRS84)."""
-    placed = [window.geometry for window in windows.rows if window.geometry]
+    placed = [one.geometry for one in layer.features if one.geometry]
     column: dict[str, Any] = {"encoding": "WKB",
                               "geometry_types": sorted({TYPE_NAMES[type_of(geometry)] for geometry in placed})}
     if placed:

@@ -1,0 +1,117 @@
+"""Logs in sections of road, as agencies file them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.shown import CommandResult
+from logger.errors import BadInput
+from logger.units import FOOT_M, MILE_M
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.exchange.layer import Layer
+    from logger.report.sections_text import DriveSections
+
+Array = npt.NDArray[np.float64]
+USUAL_M = 100.0
+LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
+_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
+SYSTEMS = ("si", "us")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sections(CommandResult):
+    """Sections of the drives of some logs, k of all of them, in the order driven; NaN: not known.
+
+    length_m                      of a section; the last one of a drive is cut short [m]
+    drive                         (k,) number of the drive, in the order read, from 0
+    start_m, end_m                (k,) along the drive [m]
+    known_m                       (k,) how much of each has an IRI [m]
+    iri_m_per_km, iri_std_m_per_km    (k,) mean over that, and its standard error
+    a_w_mps2                      (k,) weighted r.m.s. acceleration (ISO 2631-1)
+    speed_mps                     (k,) mean
+    condition                     (k,) good, fair or poor (23 CFR 490.313); empty: not known
+    """
+
+    length_m: float
+    drive: npt.NDArray[np.intp]
+    start_m: Array
+    end_m: Array
+    known_m: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    a_w_mps2: Array
+    speed_mps: Array
+    condition: npt.NDArray[np.str_]
+    _drives: tuple[DriveSections, ...]
+
+    def charts(self) -> Sequence[Chart]:
+        """The IRI of the sections along each drive."""
+        from logger.report.sections_text import charts
+
+        return charts(self._drives)
+
+    def layer(self) -> Layer:
+        """Rows with places, for the formats of ``convert``."""
+        from logger.exchange.sections import sections_layer
+
+        return sections_layer(self._drives)
+
+
+def length_of(text: str) -> float:
+    """A length with its unit, such as 100m, 0.1mi, 500ft, 1km [m]. BadInput for anything else."""
+    found = re.fullmatch(r"([0-9.]+)\s*(m|km|mi|ft)", text.strip())
+    try:
+        length_m = float(found[1]) * _UNITS_M[found[2]] if found else 0.0
+    except ValueError:
+        length_m = 0.0
+    if not LEAST_M <= length_m <= MOST_M:
+        raise BadInput(f"length {text}: expected a length with its unit, such as 100m, 0.1mi or 500ft, from "
+                       f"{LEAST_M:g} m to {MOST_M / 1000:g} km")
+    return length_m
+
+
+def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUAL_M, units: str = "si") -> Sections:
+    """The drives of segment logs in sections of one length, each from its own beginning.
+
+    logs      folders at any depth, or files, of segment logs; open ones too
+    length    of a section, with its unit (``0.1mi``: 23 CFR 490), or in metres
+    units     of the text: si or us
+
+    The standard error of a section is that of independent windows. It holds nothing of what all windows of a car share:
+    a vehicle file that is wrong. Rows flagged ``unsettled`` stand in no mean.
+
+    Raises BadInput for no log, none with an intact row, and lengths from under 25 ft or beyond 100 km.
+
+    >>> found = sections(folder / "logs", "0.1mi")
+    >>> bool((found.known_m <= found.length_m + 1e-6).all())
+    True
+    """
+    from logger.report.sections_text import as_json, drive_sections, lines
+    from logger.store.log.log_reader import read_all
+
+    length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
+    if units not in SYSTEMS:
+        raise BadInput(f"units {units}: expected one of {', '.join(SYSTEMS)}")
+    places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
+    files = read_all(places)
+    drives = tuple(drive_sections(files, length_m))
+
+    def joined(of: Any) -> Any:
+        return np.concatenate([of(one) for one in drives]) if drives else np.zeros(0)
+
+    return Sections(
+        "\n".join(lines(drives, length_m, units)), as_json(drives, length_m), length_m,
+        joined(lambda one: np.full(len(one.condition), drives.index(one))).astype(np.intp),
+        joined(lambda one: one.figures.edges_m[:-1]), joined(lambda one: one.ends_m), joined(lambda one: one.figures.known_m),
+        joined(lambda one: one.figures.iri_m_per_km), joined(lambda one: one.figures.iri_std_m_per_km),
+        joined(lambda one: one.figures.a_w_mps2), joined(lambda one: one.figures.speed_mps),
+        np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)

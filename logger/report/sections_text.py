@@ -1,0 +1,200 @@
+"""Sections of logs in words, and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from logger.chart_data import Array, Chart, Curves, Line
+from logger.comfort.iso2631 import comfort_word
+from logger.records import WindowRecord
+from logger.report.summary import counts, mean_square
+from logger.roads.iso8608 import iri_class
+from logger.roads.roughness_words import FEDERAL_WORDS, federal_condition
+from logger.roads.sections import Sections, Windows, even_edges, sections
+from logger.store.log.log_reader import LoggedFile, split_drives
+from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
+
+_NONE = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSections:
+    """The sections of one drive.
+
+    log, number    the file, and which drive of it, from 1
+    records        its rows with a distance
+    origin_m       the distance of the first of them: sections begin there
+    figures        of the k sections
+    condition      by the federal limits; empty: not known
+    ends_m         (k,) of the sections, the last one where the drive ends [m]
+    """
+
+    log: str
+    number: int
+    records: tuple[WindowRecord, ...]
+    origin_m: float
+    figures: Sections
+    condition: tuple[str, ...]
+    ends_m: Array
+
+
+def drive_sections(files: Sequence[LoggedFile], length_m: float) -> Iterator[DriveSections]:
+    """Drives of logs, those that have a distance, in sections."""
+    for file in files:
+        for number, drive in enumerate(split_drives(file.records), start=1):
+            records = tuple(one for one in drive
+                            if one.distance_start_m is not None and one.distance_end_m is not None
+                            and one.distance_end_m > one.distance_start_m)
+            if records:
+                yield _of_drive(file.name, number, records, length_m)
+
+
+def windows_of(records: Sequence[WindowRecord]) -> tuple[Windows, float]:
+    """Rows with a distance as arrays, from the first one's beginning on, and that [m]."""
+    origin_m = records[0].distance_start_m or 0.0
+
+    def column(of: Any) -> Array:
+        return np.array([_NONE if (value := of(one)) is None else value for one in records], dtype=np.float64)
+
+    return Windows(
+        column(lambda one: one.distance_start_m) - origin_m, column(lambda one: one.distance_end_m) - origin_m,
+        column(lambda one: one.duration_s), column(lambda one: one.iri_m_per_km if counts(one) else None),
+        column(lambda one: one.iri_std_m_per_km),
+        column(lambda one: mean_square(one) if counts(one) else None)), origin_m
+
+
+def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:
+    windows, origin_m = windows_of(records)
+    edges_m = even_edges(float(windows.end_m[-1]), length_m)
+    found = sections(windows, edges_m)
+    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
+    return DriveSections(log, number, records, origin_m, found, condition,
+                         np.minimum(edges_m[1:], windows.end_m[-1]))
+
+
+# --- words ---
+
+
+@dataclass(frozen=True)
+class _Units:
+    """How lengths, roughness and speeds are written: name and SI value of the unit."""
+
+    length: tuple[str, float]
+    length_decimals: int
+    iri: tuple[str, float]
+    iri_decimals: int
+    speed: tuple[str, float]
+    way: tuple[str, float]
+
+
+_SYSTEMS = {
+    "si": _Units(("m", 1.0), 1, ("m/km", 1.0), 2, ("km/h", KMH_MPS), ("km", 1000.0)),
+    "us": _Units(("mi", MILE_M), 3, ("in/mi", INCH_PER_MILE_M_PER_KM), 0, ("mph", MPH_MPS), ("mi", MILE_M)),
+}
+
+
+def lines(drives: Sequence[DriveSections], length_m: float, system: str) -> list[str]:
+    """For a person."""
+    if not drives:
+        return ["No row has a distance, so there are no sections."]
+    units = _SYSTEMS[system]
+    said = list(_summary(drives, length_m, units))
+    head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
+            f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
+    for one in drives:
+        said += ["", f"{one.log}, drive {one.number}", head, *_rows(one, units)]
+    return [*said, "", "Condition: 23 CFR 490.313, good below 95 in/mi (1.50 m/km), poor above 170 (2.68). Class: ISO 8608.",
+            "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
+
+
+def _summary(drives: Sequence[DriveSections], length_m: float, units: _Units) -> Iterator[str]:
+    count = sum(len(one.condition) for one in drives)
+    known_m, iri, std = (np.concatenate([getattr(one.figures, name) for one in drives])
+                         for name in ("known_m", "iri_m_per_km", "iri_std_m_per_km"))
+    driven_m = sum(float(one.figures.driven_m.sum()) for one in drives)
+    name, unit_m = units.way
+    yield (f"{_count(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {_count(count, 'section')} of "
+           f"{_length_words(length_m)}")
+    total_m = float(known_m.sum())
+    if total_m <= 0:
+        yield "The IRI is known nowhere."
+        return
+    mean, error = float(np.nansum(iri * known_m)) / total_m, float(np.sqrt(np.nansum((std * known_m) ** 2))) / total_m
+    label, scale = units.iri
+    yield (f"Mean IRI {mean / scale:.{units.iri_decimals}f} {label}, standard error "
+           f"{error / scale:.{units.iri_decimals + 1}f}, over {total_m / unit_m:.2f} {name}")
+    words = [word for one in drives for word in one.condition]
+    shares = {word: float(known_m[[here == word for here in words]].sum()) / total_m for word in FEDERAL_WORDS}
+    yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())
+
+
+def _rows(one: DriveSections, units: _Units) -> Iterator[str]:
+    figures = one.figures
+    columns = (figures.edges_m[:-1], one.ends_m, figures.known_m, figures.iri_m_per_km, figures.iri_std_m_per_km,
+               figures.a_w_mps2, figures.speed_mps)
+    for word, (start_m, end_m, known_m, iri, std, a_w, speed) in zip(
+            one.condition, zip(*(column.tolist() for column in columns), strict=True), strict=True):
+        (_, unit_m), (_, iri_scale), (_, speed_scale) = units.length, units.iri, units.speed
+        yield (f"{start_m / unit_m:10.{units.length_decimals}f} {end_m / unit_m:10.{units.length_decimals}f} "
+               f"{known_m / (end_m - start_m):6.0%} {_number(iri / iri_scale, units.iri_decimals):>10} "
+               f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9} "
+               f"{iri_class(iri) if isfinite(iri) else '':5}  {_number(a_w, 2):>8} {_number(speed / speed_scale, 0):>6}")
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if isfinite(value) else "-"
+
+
+def _length_words(length_m: float) -> str:
+    for name, unit_m in (("mi", MILE_M), ("km", 1000.0), ("ft", FOOT_M)):
+        units = length_m / unit_m
+        if abs(units - round(units, 1)) < 1e-6 * units and (name != "km" or units >= 1):
+            return f"{units:g} {name}" if name != "ft" or length_m % 1 else f"{length_m:g} m"
+    return f"{length_m:g} m"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'s' * (number != 1)}"
+
+
+# --- for programs ---
+
+
+def as_json(drives: Sequence[DriveSections], length_m: float) -> dict[str, Any]:
+    """Drives with their sections; null where nothing is known."""
+    return {"length_m": length_m, "drives": [
+        {"log": one.log, "drive": one.number, "sections": list(section_values(one))} for one in drives]}
+
+
+def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
+    """The sections of a drive by the names of their columns; None where nothing is known."""
+    figures = one.figures
+    for index, word in enumerate(one.condition):
+        numbers = {name: _known(getattr(figures, name)[index]) for name in (
+            "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps", "worst_m_per_km", "worst_at_m")}
+        iri, a_w = numbers["iri_m_per_km"], numbers["a_w_mps2"]
+        yield {"distance_start_m": float(figures.edges_m[index]), "distance_end_m": float(one.ends_m[index]),
+               "known_m": float(figures.known_m[index]), **numbers, "condition": word or None,
+               "iri_class": None if iri is None else iri_class(iri),
+               "comfort": None if a_w is None else comfort_word(a_w)}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def charts(drives: Sequence[DriveSections]) -> list[Chart]:
+    """The IRI of the sections along each drive."""
+    found: list[Chart] = []
+    for one in drives:
+        known = np.isfinite(one.figures.iri_m_per_km)
+        if known.any():
+            middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
+            found.append(Curves(f"{one.log}, drive {one.number}", "distance [m]", "IRI [m/km]", (
+                Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
+    return found

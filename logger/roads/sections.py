@@ -1,0 +1,112 @@
+"""Means of windows over sections of road that are as long as an agency files them.
+
+The IRI of a section is the mean of the rectified slope over it (ASTM E1926), so it is the mean of its windows' IRI by
+length; a window across a limit counts in both sections by its parts. Errors of neighbouring windows are not correlated
+(measured over ten simulated drives: 0.00 from window to window; errors of 122 m and 488 m were 0.93 and 1.00 of what
+follows from that), so their variances add.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Windows of one way (n,), in order, none over another; NaN: not known, or to stand in no mean.
+
+    start_m, end_m           [m]
+    duration_s               [s]
+    iri_m_per_km, iri_std_m_per_km
+    mean_square              of the weighted acceleration [(m/s2)2]
+    """
+
+    start_m: Array
+    end_m: Array
+    duration_s: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    mean_square: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """Sections (k,) between limits (k + 1,) on the same way; NaN: not known.
+
+    edges_m          limits [m]
+    driven_m         how much of each windows cover, and ``known_m`` those with an IRI [m]
+    iri_m_per_km     mean over that, with its standard error
+    a_w_mps2         weighted r.m.s. acceleration over the time for which it is known [m/s2]
+    speed_mps        mean [m/s]
+    worst_m_per_km   largest IRI of a window in it, and ``worst_at_m`` where the middle of that lies [m]
+    """
+
+    edges_m: Array
+    driven_m: Array
+    known_m: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    a_w_mps2: Array
+    speed_mps: Array
+    worst_m_per_km: Array
+    worst_at_m: Array
+
+
+def even_edges(end_m: float, length_m: float) -> Array:
+    """Limits from 0 to beyond the end, a length apart; the last section may be longer than what was driven."""
+    return length_m * np.arange(int(np.ceil(end_m / length_m - 1e-9)) + 1)
+
+
+def sections(windows: Windows, edges_m: Array) -> Sections:
+    """The windows in sections between growing limits (k + 1,) [m]; what lies outside is left out."""
+    count = len(edges_m) - 1
+    piece_m, window, section = _pieces(windows, edges_m)
+    share = piece_m / (windows.end_m - windows.start_m)[window]
+
+    def total(weight: Array) -> Array:
+        return np.bincount(section, weight, count)
+
+    iri, variance = windows.iri_m_per_km[window], windows.iri_std_m_per_km[window] ** 2
+    known_m = total(np.where(np.isfinite(iri), piece_m, 0.0))
+    time_s, square = (share * windows.duration_s[window]), windows.mean_square[window]
+    felt_s = total(np.where(np.isfinite(square), time_s, 0.0))
+    driven_m = total(piece_m)
+    worst, worst_at_m = _worst(windows, window, section, count)
+    return Sections(
+        edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
+        _ratio(np.sqrt(total(np.nan_to_num(variance * piece_m**2))), known_m),
+        np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)), worst, worst_at_m)
+
+
+def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Parts of windows inside one section each: lengths [m], windows, sections."""
+    cuts = np.unique(np.concatenate([windows.start_m, windows.end_m, edges_m]))
+    middle_m = (cuts[1:] + cuts[:-1]) / 2
+    window = np.searchsorted(windows.start_m, middle_m, side="right") - 1
+    section = np.searchsorted(edges_m, middle_m, side="right") - 1
+    inside = (window >= 0) & (middle_m < windows.end_m[window]) & (section >= 0) & (section < len(edges_m) - 1)
+    return np.diff(cuts)[inside], window[inside], section[inside]
+
+
+def _worst(windows: Windows, window: npt.NDArray[np.intp], section: npt.NDArray[np.intp], count: int
+           ) -> tuple[Array, Array]:
+    iri = np.nan_to_num(windows.iri_m_per_km[window], nan=-np.inf)
+    order = np.lexsort((iri, section))
+    last = np.searchsorted(section[order], np.arange(count), side="right") - 1
+    there = (last >= 0) & (section[order][last] == np.arange(count)) if len(order) else np.zeros(count, bool)
+    found, at_m = np.full(count, np.nan), np.full(count, np.nan)
+    best = order[last[there]] if len(order) else np.zeros(0, np.intp)
+    known = np.isfinite(iri[best])
+    places = np.flatnonzero(there)[known]
+    found[places] = iri[best][known]
+    at_m[places] = ((windows.start_m + windows.end_m) / 2)[window[best]][known]
+    return found, at_m
+
+
+def _ratio(total: Array, over: Array) -> Array:
+    return np.divide(total, over, out=np.full(len(over), np.nan), where=over > 0)
