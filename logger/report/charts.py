@@ -6,7 +6,7 @@ are classes that the page's style sheet fills in, so that one chart reads on lig
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor, log10

@@ -36,6 +36,7 @@ from logger.report.terminal import (
     span_words,
 )
 from logger.report.track_data import track_data
+from logger.report.track_views import rank, track_views, windows_table
 from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
 _SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
@@ -57,6 +58,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "time_unset": "the GPS had not told the time yet",
     "partial": "cut short by the end of a drive or of the recording",
     "unsettled": "too near to a start, an end or a hole in the readings",
+    "hidden": "the ride is below the sensor's own noise: no value, but it counts in means as what it can be",
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
@@ -75,13 +77,13 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
     return document(f"Road roughness, {date_words(summary)}", [
         _head(summary, files),
         _tiles(summary),
-        _views_section(records, summary, _credits(base_name, host)),
+        track_views(records, summary, _sources(base_name, host)),
         _shares_section(summary),
         _places_section(records, summary.roughest),
         _drives_section(drives) if len(drives) > 1 else EMPTY,
         _notes_section(summary, files),
         _settings_section(files),
-        _rows_section(records),
+        windows_table(records),
         data_block("data", track_data(drives, base) | {
             "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
@@ -95,11 +97,11 @@ def _asset(name: str) -> str:
     return (resources.files("logger.report") / "assets" / name).read_text("utf-8")
 
 
-def _credits(base_name: str, host: str) -> str:
+def _sources(base_name: str, host: str) -> str:
     """Whose pictures and roads the map shows."""
-    credits = [f"Roads beneath: {base_name}"] if base_name else []
-    credits += [f"Street pictures: {urlsplit(host).netloc}"] if host else []
-    return ". ".join([*credits, "Where they are OpenStreetMap's: © OpenStreetMap contributors"]) if credits else ""
+    shown = [f"Roads beneath: {base_name}"] if base_name else []
+    shown += [f"Street pictures: {urlsplit(host).netloc}"] if host else []
+    return ". ".join([*shown, "Where they are OpenStreetMap's: © OpenStreetMap contributors"]) if shown else ""
 
 
 def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
@@ -123,66 +125,6 @@ def _tiles(summary: DriveSummary) -> Html:
     ])
 
 
-_MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
-_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that stands in no mean"))
-
-
-def _views_section(records: Sequence[WindowRecord], summary: DriveSummary, credits: str) -> Html:
-    """The map and the curves, which the script draws, and what it says of them."""
-    placed = any(record.lat_deg is not None and record.lon_deg is not None for record in records)
-    if not placed and not summary.distance_m > 0:
-        return section("Along the way", Html('<p class="empty">No row has a position or a distance: there is neither map '
-                                             "nor curve.</p>"))
-    parts = [_map_view(summary, credits) if placed else
-             Html('<p class="empty">No row has a position, so there is no map.</p>')]
-    parts += [_curves_view()] if summary.distance_m > 0 else []
-    return html('<section id="views" data-mode="iri"><h2>Along the way</h2><noscript><p class="warn">The map, the curves '
-                "and the table of windows are drawn by a script, which this browser does not run.</p></noscript>{}{}"
-                "</section>", concatenated(parts), _READOUT)
-
-
-def _map_view(summary: DriveSummary, credits: str) -> Html:
-    buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
-                                "true" if name == "iri" else "false", words) for name, words in _MODES)
-    trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
-    return html('<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
-                '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. Arrow '
-                "keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
-                'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
-                '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
-                '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
-                '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
-                '{}{}<ul class="legend by-trust">{}</ul>{}', buttons,
-                _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
-                _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust,
-                hint(credits) if credits else EMPTY)
-
-
-def _curves_view() -> Html:
-    return Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves of roughness, '
-                "weighted acceleration and speed along the way. Left and right go from window to window, with Shift they "
-                "choose a range; plus and minus zoom, 0 shows all. The table of all windows below holds the same "
-                'values."></canvas><canvas class="over" aria-hidden="true"></canvas></div>') + hint(
-        "The shaded band is the IRI plus and minus its standard error. Where many windows share a place of the picture, "
-        "the line is their mean, weighted by length, the band the mean error of one window, and a grey stroke reaches up "
-        "to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort (fairly, very, extreme). The "
-        "strip at the bottom: orange where a window carries a flag, grey where it has no value.")
-
-
-_READOUT = Html(
-    '<div class="readout"><div id="reading" aria-live="polite"><p class="hint">Point at a window, or tap it. Drag over '
-    'the curves for the figures of a range.</p></div><div id="range" hidden><div id="figures" aria-live="polite"></div>'
-    '<p class="actions"><button type="button" id="range-look">Look at it</button>'
-    '<button type="button" id="look-all">Whole way</button>'
-    '<button type="button" id="range-clear">Forget the range</button></p></div></div>')
-
-
-def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
-    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', _rank(share.name, names), words_of(share.name))
-                     for share in shares)
-    return html('<ul class="legend {}">{}</ul>', name, entries)
-
-
 def _shares_section(summary: DriveSummary) -> Html:
     return html('<section class="columns"><div><h2>Road by IRI class</h2>{}</div><div><h2>Road by comfort</h2>{}</div>'
                 "</section>", _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
@@ -195,7 +137,7 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
     return html("<table>{}</table>", concatenated(
         html('<tr><td>{0}</td><td class="bar"><span class="f{1}" style="width:{2:.1%}"></span></td>'
              '<td class="n">{2:.1%}</td><td class="n">{3}</td></tr>', words_of(share.name),
-             _rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
+             rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
 
 
 def _places_section(records: Sequence[WindowRecord], places: Sequence[Place]) -> Html:
@@ -223,7 +165,8 @@ def _numbers(records: Sequence[WindowRecord], places: Sequence[Place]) -> list[i
 def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg, place_words(place))
+    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg,
+                place_words(place).replace(" ", "\u00a0"))
 
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
@@ -282,29 +225,12 @@ def _settings_section(files: Sequence[LoggedFile]) -> Html:
     return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 
-def _rows_section(records: Sequence[WindowRecord]) -> Html:
-    """Every row, as a table of which the script shows some at a time: it stands behind the map and the curves."""
-    names = ("drive", "row", "time UTC", "from [m]", "lat", "lon", "km/h", "IRI [m/km]", "±", "a_w [m/s²]",
-             "MTVV [m/s²]", "VDV [m/s^1.75]", "crest", "class", "comfort", "flags")
-    head = concatenated(html('<th scope="col">{}</th>', name) for name in names)
-    turns = concatenated(html('<button type="button" data-turn="{}">{}</button>', *turn) for turn in (
-        ("first", "First"), ("-1", "Previous"), ("1", "Next"), ("last", "Last")))
-    return html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><thead><tr>{}</tr>'
-                '</thead><tbody id="rows"></tbody></table></div><p class="actions">{}<span id="rows-of" '
-                'aria-live="polite"></span></p></details>', len(records), head, turns)
-
-
-def _rank(name: str, names: tuple[str, ...]) -> str:
-    """Number of a name's colour; ``x`` for what has none."""
-    return str(names.index(name)) if name in names else "x"
-
-
 def _number(value: float | None, decimals: int, factor: float = 1.0) -> str:
     return "" if value is None else f"{value * factor:.{decimals}f}"
 
 
 def _instant(utc_us: int | None) -> str:
-    return "not known" if utc_us is None else f"{utc(utc_us):%Y-%m-%d %H:%M:%S}"
+    return "not known" if utc_us is None else f"{utc(utc_us):%Y-%m-%d\u00a0%H:%M:%S}"
 
 
 def _inside(content: Any, *keys: str) -> Any:

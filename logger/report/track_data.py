@@ -87,8 +87,8 @@ def packed(columns: Sequence[Column]) -> dict[str, Any]:
 
 
 def _planes(values: Array, steps: float, order: int) -> bytes:
-    """The lowest bytes of all numbers, then the next ones, four in all. Differences wrap around 32 bits, as the script's
-    sums do, so that any number comes back as it was."""
+    """The lowest bytes of all numbers, then the next ones, four in all. Differences wrap around 32 bits, as the
+    script's sums do, so that any number comes back as it was."""
     known = np.isfinite(values)
     whole = np.where(known, np.clip(np.where(known, values, 0.0), -_MOST / steps, _MOST / steps) * steps, UNKNOWN)
     differences = np.rint(whole).astype(np.int64).astype(np.uint32)

@@ -147,7 +147,8 @@ class TrackMap {
     ink.beginPath();
     for (let i = 1; i < base.count; i++) {
       if (base.begins[i]) continue;
-      const x0 = this.left(base.x[i - 1]), y0 = this.top(base.y[i - 1]), x = this.left(base.x[i]), y = this.top(base.y[i]);
+      const x0 = this.left(base.x[i - 1]), y0 = this.top(base.y[i - 1]);
+      const x = this.left(base.x[i]), y = this.top(base.y[i]);
       if (Math.max(x0, x) < 0 || Math.min(x0, x) > width || Math.max(y0, y) < 0 || Math.min(y0, y) > height) continue;
       if (i % STROKES === 0) { ink.stroke(); ink.beginPath(); }
       ink.moveTo(x0, y0);
@@ -206,16 +207,16 @@ class TrackMap {
     if (Number.isNaN(worst)) return;
     const x = this.left(windows.x[worst]), y = this.top(windows.y[worst]);
     circle(ink, x, y, 11, colours.ink, null, 2);
-    const right = x < this.canvas.clientWidth - 120;
-    write(ink, `worst ${value[worst].toFixed(mode === "iri" ? 1 : 2)}`, x + (right ? 16 : -16), y - 8,
-          {colour: colours.ink, align: right ? "left" : "right", weight: 600});
+    write(ink, `worst ${value[worst].toFixed(mode === "iri" ? 1 : 2)}`, clamp(x, 40, this.canvas.clientWidth - 40),
+          y > 40 ? y - 17 : y + 26, {colour: colours.ink, align: "center", weight: 600});
   }
 
   drawPlaces(ink) {
     const {windows, data} = this.report;
-    data.places.forEach((i, number) => {
-      if (windows.hasPlace(i)) mark(ink, this.left(windows.x[i]), this.top(windows.y[i]), String(number + 1));
-    });
+    for (let number = data.places.length; number > 0; number--) {  // the worst comes last, on top
+      const i = data.places[number - 1];
+      if (windows.hasPlace(i)) mark(ink, this.left(windows.x[i]), this.top(windows.y[i]), String(number));
+    }
   }
 
   drawScale(ink, width, height) {
@@ -284,7 +285,10 @@ class TrackMap {
     canvas.addEventListener("pointermove", event => {
       const now = local(event), before = fingers.get(event.pointerId);
       if (!before) { if (event.pointerType === "mouse") this.point(...now); return; }
-      const apart = () => { const [one, other] = [...fingers.values()]; return Math.hypot(one[0] - other[0], one[1] - other[1]); };
+      const apart = () => {
+        const [one, other] = [...fingers.values()];
+        return Math.hypot(one[0] - other[0], one[1] - other[1]);
+      };
       const wide = fingers.size === 2 ? apart() : 0;
       fingers.set(event.pointerId, now);
       this.travelled += Math.hypot(now[0] - before[0], now[1] - before[1]);

@@ -16,7 +16,7 @@ function element(tag, properties, ...children) {
   return made;
 }
 
-function span_words(second) {
+function duration(second) {
   const minutes = Math.floor(Math.round(second) / 60), hours = Math.floor(minutes / 60);
   const two = value => String(value).padStart(2, "0");
   if (hours) return `${hours} h ${two(minutes % 60)} min`;
@@ -47,6 +47,7 @@ class Report {
       view.drawOver();
     }
     byId("reading").replaceChildren(...(i < 0 ? [element("p", {className: "hint", textContent: HINT})] : this.reading(i)));
+    this.follow();
   }
 
   // From key to key: with Shift the range grows from where one was.
@@ -67,7 +68,11 @@ class Report {
     if (range) byId("figures").replaceChildren(...this.figures(...range));
     this.page = 0;
     this.tabulate();
+    this.follow();
   }
+
+  // The words follow the pictures down the page once there are any.
+  follow() { byId("reading").parentElement.classList.toggle("live", this.at >= 0 || this.range !== null); }
 
   // --- words ---
 
@@ -114,7 +119,7 @@ class Report {
     }
     return [
       element("p", {className: "where"}, element("b", {textContent: "Range"}), ` · ${where}`),
-      element("dl", {}, this.pair("Distance", distance(sum.metre), span_words(sum.second)),
+      element("dl", {}, this.pair("Distance", distance(sum.metre), duration(sum.second)),
               this.pair("Mean IRI", number(sum.iri, 2), "m/km"),
               this.pair("Worst IRI", number(way.iri_m_per_km[sum.worst], 1), "m/km"),
               this.pair("a_w", number(sum.a_w, 3), "m/s²"), this.pair("Mean speed", number(sum.speed_mps * 3.6, 0), "km/h")),
