@@ -7,7 +7,6 @@ import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from urllib.parse import urlsplit
 
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import replace_bytes
@@ -29,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--base", metavar="ROADS.geojson", type=Path,
                         help="roads to draw beneath the way, such as an extract of OpenStreetMap; the page holds them")
     parser.add_argument("--tiles", metavar="ADDRESS", nargs="?", const=STREETS, default="",
-                        help="draw pictures of streets beneath the way: the page then asks a server for them (with {z}, "
-                             "{x} and {y} in the address; by default OpenStreetMap's)")
+                        help="draw pictures of streets beneath the way: the page then asks a server for them (with "
+                             "{z}, {x} and {y} in the address; by default OpenStreetMap's)")
     parser.add_argument("--json", action="store_true", help="also print the summary, as one JSON object")
 
 
@@ -50,9 +49,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_tiles(address: str) -> None:
-    parts = urlsplit(address)
-    whole = parts.scheme in ("http", "https") and re.fullmatch(r"[\w.-]+(:\d+)?", parts.netloc, re.ASCII) is not None
-    if address and not (whole and all(key in parts.path + parts.query for key in ("{z}", "{x}", "{y}"))):
+    whole = re.fullmatch(r"https?://[\w.-]+(:\d+)?/\S*", address, re.ASCII)
+    if address and not (whole and all(key in address for key in ("{z}", "{x}", "{y}"))):
         raise BadInput(f"--tiles: expected an address such as {STREETS}, found {address!r}")
 
 

@@ -48,8 +48,9 @@ def _map_view(summary: DriveSummary, sources: str) -> Html:
 def _curves_view() -> Html:
     return Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves '
                 "of roughness, weighted acceleration and speed along the way. Left and right go from window "
-                "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all windows below holds the same "
-                'values."></canvas><canvas class="over" aria-hidden="true"></canvas></div>') + hint(
+                "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
+                'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
+                "</div>") + hint(
         "The shaded band is the IRI plus and minus its standard error. Where many windows share a place of the "
         "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey stroke "
         "reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort (fairly, very, "

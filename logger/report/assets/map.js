@@ -3,6 +3,8 @@
 const WORLD_M = 2 * Math.PI * 6378137;  // once around the Earth at the equator, as Web Mercator takes it (EPSG:3857)
 const PIECE_PX = 4;       // shorter pieces of colour are blur
 const STROKES = 300;      // pieces in one stroke: long paths that cross themselves are slow to fill
+const MARGIN = 0.2;       // of the view, that is painted around it
+const REST_MS = 150;      // without a move
 const REACH_PX = 32;      // how near to the way a pointer has to be
 const CLOSEST_M = 0.02;   // in a pixel
 const TILE_PX = 256;
@@ -78,68 +80,119 @@ class TrackMap {
 
   // --- drawing ---
 
+  // What is slow to draw is kept as a picture somewhat larger than the view. While the map moves the picture moves; it
+  // is painted anew where it no longer covers the view, and sharp once the map rests at another scale.
   drawWay() {
-    const {ink, width, height} = sheet(this.canvas), {windows, mode} = this.report;
-    this.drawTiles(ink, width, height);
-    this.drawBase(ink, width, height);
-    const group = windows.level(PIECE_PX * this.metresPerPixel());
-    const pieces = this.piecesInView(group, width, height);
-    const byRank = new Map();
-    for (const g of pieces) {
-      const rank = windows.rank(group, g, mode);
-      if (!byRank.has(rank)) byRank.set(rank, []);
-      byRank.get(rank).push(g);
-    }
-    this.stroke(ink, group, pieces, colours.casing, 8, "round");
-    // Where drives lie on one another the worst is on top.
-    for (const rank of [...byRank.keys()].sort((one, other) => one - other))
-      this.stroke(ink, group, byRank.get(rank), colourOf(rank), 5.5, "butt");
+    const {ink, width, height} = sheet(this.canvas);
+    if (!this.covers(width, height)) this.paint(width, height);
+    const {still} = this, grown = this.scale / still.scale;
+    ink.drawImage(still.canvas, this.left(still.x) - still.width / 2 * grown, this.top(still.y) - still.height / 2 * grown,
+                  still.width * grown, still.height * grown);
+    clearTimeout(this.resting);
+    if (grown !== 1) this.resting = setTimeout(() => this.repaint(), REST_MS);
     this.drawEnds(ink);
-    this.drawWorst(ink, group, pieces);
+    this.drawWorst(ink);
     this.drawPlaces(ink);
     this.drawScale(ink, width, height);
   }
 
-  piecesInView(group, width, height) {
-    const {windows} = this.report, {first} = group, perMetre = 1 / this.metresPerPixel(), pieces = [];
-    for (let g = 0; g < group.count; g++) {
-      const from = first[g], to = first[g + 1];
-      const x = this.left(windows.x[from]), y = this.top(windows.y[from]);
-      const reach = (windows.end_m[to - 1] - windows.begin(from)) * perMetre + 12;
-      if (x > -reach && y > -reach && x < width + reach && y < height + reach) pieces.push(g);
-    }
-    return pieces;
+  repaint() {
+    this.still = null;
+    this.draw();
   }
 
-  // A piece reaches from half-way to the window before it to half-way to the one after, through its middle.
-  stroke(ink, group, pieces, colour, width, cap) {
-    const {windows} = this.report, {first} = group;
+  covers(width, height) {
+    const {still} = this;
+    if (!still || still.ofWidth !== width || still.ofHeight !== height) return false;
+    const grown = this.scale / still.scale, spareX = (still.width * grown - width) / 2;
+    const spareY = (still.height * grown - height) / 2;
+    return grown < 2.5 && Math.abs(this.x - still.x) * this.scale <= spareX
+      && Math.abs(this.y - still.y) * this.scale <= spareY;
+  }
+
+  paint(width, height) {
+    const asideX = Math.round(width * MARGIN), asideY = Math.round(height * MARGIN), ratio = window.devicePixelRatio || 1;
+    const canvas = this.still?.canvas ?? document.createElement("canvas");
+    const wide = width + 2 * asideX, high = height + 2 * asideY;
+    Object.assign(canvas, {width: Math.round(wide * ratio), height: Math.round(high * ratio)});
+    this.still = {canvas, x: this.x, y: this.y, scale: this.scale, width: wide, height: high, ofWidth: width,
+                  ofHeight: height};
+    const ink = canvas.getContext("2d"), box = [-asideX, -asideY, width + asideX, height + asideY];
+    ink.setTransform(ratio, 0, 0, ratio, asideX * ratio, asideY * ratio);
+    this.drawTiles(ink, box);
+    this.drawBase(ink, box);
+    const {windows, mode} = this.report, group = this.group = windows.level(PIECE_PX * this.metresPerPixel());
+    const cells = this.cells(group, box), byRank = new Map(), drawn = [];
+    for (const cell of cells.values()) {
+      const rank = cell.groups.length === 1 ? windows.rank(group, cell.groups[0], mode)
+        : windows.rankOfSeveral(group, cell.groups, mode);
+      if (!byRank.has(rank)) byRank.set(rank, []);
+      byRank.get(rank).push(cell.groups[0]);
+      drawn.push(cell.groups[0]);
+    }
+    this.seen = cells;
+    this.stroke(ink, group, drawn, colours.casing, 8);
+    // Where ways cross or lie side by side the worst is on top.
+    for (const rank of [...byRank.keys()].sort((one, other) => one - other))
+      this.stroke(ink, group, byRank.get(rank), colourOf(rank), 5.5);
+  }
+
+  // Pieces in the box, those whose middles share some pixels together: drives over one street are one mean, drawn once.
+  cells(group, [west, north, east, south]) {
+    const {windows} = this.report, {first} = group, perMetre = 1 / this.metresPerPixel(), cells = new Map();
+    const side = this.cellPx(group);
+    for (let g = 0; g < group.count; g++) {
+      const from = first[g], to = first[g + 1], middle = (from + to - 1) >> 1;
+      const x = this.left(windows.x[middle]), y = this.top(windows.y[middle]);
+      const reach = (windows.end_m[to - 1] - windows.begin(from)) * perMetre + 12;
+      if (!(x > west - reach && y > north - reach && x < east + reach && y < south + reach)) continue;
+      const key = Math.floor((x - west + 1e4) / side) * 1e6 + Math.floor((y - north + 1e4) / side);
+      const cell = cells.get(key);
+      if (cell) cell.groups.push(g); else cells.set(key, {groups: [g]});
+    }
+    return cells;
+  }
+
+  piecePx(group) { return 2 ** group.k * this.report.windows.average_m / this.metresPerPixel(); }
+  cellPx(group) { return clamp(0.6 * this.piecePx(group), PIECE_PX, 10); }
+
+  // A piece reaches from half-way to the window before it to half-way to the one after, through its middle. Short ones,
+  // of which a neighbour may have been left out for another drive's, reach on to the middles of their neighbours.
+  stroke(ink, group, pieces, colour, width) {
+    const {windows} = this.report, {first} = group, long = this.piecePx(group) > 16;
     ink.strokeStyle = colour;
     ink.lineWidth = width;
-    ink.lineCap = cap;
+    ink.lineCap = "butt";
+    ink.lineJoin = "bevel";
+    const middleOf = g => (first[g] + first[g + 1] - 1) >> 1;
     for (let at = 0; at < pieces.length; at += STROKES) {
       ink.beginPath();
       for (const g of pieces.slice(at, at + STROKES)) {
-        const from = first[g], last = first[g + 1] - 1, middle = (from + last) >> 1;
-        const before = windows.begins[from] ? from : from - 1;
-        const after = last + 1 === windows.count || windows.begins[last + 1] ? last : last + 1;
+        const from = first[g], last = first[g + 1] - 1, middle = middleOf(g);
+        const starts = windows.begins[from], ends = last + 1 === windows.count || windows.begins[last + 1];
         const x = this.left(windows.x[middle]), y = this.top(windows.y[middle]);
-        if (before === after) {  // a window alone: a line that has no length is drawn by its round ends only
+        if (starts && ends && from === last) {  // a window alone has no direction
           ink.moveTo(x - width / 2, y);
           ink.lineTo(x + width / 2, y);
           continue;
         }
-        ink.moveTo(this.left((windows.x[before] + windows.x[from]) / 2),
-                   this.top((windows.y[before] + windows.y[from]) / 2));
+        if (long) this.half(ink, "moveTo", from, starts ? from : from - 1);
+        else this.half(ink, "moveTo", starts ? from : middleOf(g - 1));
         ink.lineTo(x, y);
-        ink.lineTo(this.left((windows.x[last] + windows.x[after]) / 2),
-                   this.top((windows.y[last] + windows.y[after]) / 2));
+        if (long) this.half(ink, "lineTo", last, ends ? last : last + 1);
+        else this.half(ink, "lineTo", ends ? last : middleOf(g + 1));
       }
       ink.stroke();
     }
   }
 
-  drawBase(ink, width, height) {
+  // To the place half-way between two windows.
+  half(ink, go, one, other = one) {
+    const {x, y} = this.report.windows;
+    ink[go](this.left((x[one] + x[other]) / 2), this.top((y[one] + y[other]) / 2));
+  }
+
+  drawBase(ink, [west, north, east, south]) {
     const {base} = this.report;
     ink.strokeStyle = colours.line;
     ink.lineWidth = 2;
@@ -149,7 +202,8 @@ class TrackMap {
       if (base.begins[i]) continue;
       const x0 = this.left(base.x[i - 1]), y0 = this.top(base.y[i - 1]);
       const x = this.left(base.x[i]), y = this.top(base.y[i]);
-      if (Math.max(x0, x) < 0 || Math.min(x0, x) > width || Math.max(y0, y) < 0 || Math.min(y0, y) > height) continue;
+      if (Math.max(x0, x) < west || Math.min(x0, x) > east) continue;
+      if (Math.max(y0, y) < north || Math.min(y0, y) > south) continue;
       if (i % STROKES === 0) { ink.stroke(); ink.beginPath(); }
       ink.moveTo(x0, y0);
       ink.lineTo(x, y);
@@ -158,19 +212,20 @@ class TrackMap {
   }
 
   // Street pictures of 256 pixels, only where the page was made with --tiles.
-  drawTiles(ink, width, height) {
+  drawTiles(ink, [west, north, east, south]) {
     const {tiles} = this.report.data;
     if (!tiles) return;
     const zoom = clamp(Math.round(Math.log2(this.scale / TILE_PX)), 0, 19), count = 2 ** zoom, side = this.scale / count;
-    const column = Math.floor((this.x - width / 2 / this.scale) * count);
-    const row = Math.max(Math.floor((this.y - height / 2 / this.scale) * count), 0);
-    for (let x = column; this.left(x / count) < width; x++)
-      for (let y = row; y < count && this.top(y / count) < height; y++) {
+    const {clientWidth: width, clientHeight: height} = this.canvas;
+    const column = Math.floor((this.x + (west - width / 2) / this.scale) * count);
+    const row = Math.max(Math.floor((this.y + (north - height / 2) / this.scale) * count), 0);
+    for (let x = column; this.left(x / count) < east; x++)
+      for (let y = row; y < count && this.top(y / count) < south; y++) {
         const address = tiles.replace("{z}", zoom).replace("{x}", (x % count + count) % count).replace("{y}", y);
         let picture = this.tiles.get(address);
         if (!picture) {
           this.tiles.set(address, picture = new Image());
-          picture.onload = this.draw;
+          picture.onload = () => this.repaint();
           picture.src = address;
         }
         if (picture.complete && picture.naturalWidth)
@@ -192,18 +247,16 @@ class TrackMap {
   }
 
   // However far out one looks, and whatever the means say: the worst window of what is in view, with its value.
-  drawWorst(ink, group, pieces) {
-    const {windows, mode} = this.report;
+  drawWorst(ink) {
+    const {windows, mode} = this.report, {clientWidth: width, clientHeight: height} = this.canvas;
     if (mode === "trust") return;
-    const value = mode === "iri" ? windows.iri_m_per_km : windows.a_w_mps2;
-    const inside = (low, at, high) => at > low && at < high - low;
+    const value = mode === "iri" ? windows.iri_m_per_km : windows.a_w_mps2, worsts = this.group[`${mode}Worst`];
     let worst = NaN;
-    for (const g of pieces) {
-      const i = group[mode === "iri" ? "iriWorst" : "comfortWorst"][g];
-      if (!(value[i] <= value[worst]) && i >= 0 && windows.counts[i]
-          && inside(4, this.left(windows.x[i]), this.canvas.clientWidth)
-          && inside(4, this.top(windows.y[i]), this.canvas.clientHeight)) worst = i;
-    }
+    for (const {groups} of this.seen.values())
+      for (const g of groups) {
+        const i = worsts[g], x = this.left(windows.x[i]), y = this.top(windows.y[i]);
+        if (!(value[i] <= value[worst]) && windows.counts[i] && x > 4 && y > 4 && x < width - 4 && y < height - 4) worst = i;
+      }
     if (Number.isNaN(worst)) return;
     const x = this.left(windows.x[worst]), y = this.top(windows.y[worst]);
     circle(ink, x, y, 11, colours.ink, null, 2);

@@ -159,7 +159,7 @@ class Report {
       this.mode = byId("views").dataset.mode = button.dataset.mode;
       for (const other of document.querySelectorAll("button[data-mode]"))
         other.setAttribute("aria-pressed", String(other === button));
-      this.map?.draw();
+      this.map?.repaint();
     });
     on("#range-look", () => {
       this.map?.fit(...this.range);
@@ -182,6 +182,7 @@ class Report {
     const repaint = paper => {
       document.documentElement.toggleAttribute("data-paper", paper);
       readColours();
+      if (this.map) this.map.still = null;
       this.map?.drawWay();
       this.map?.drawMarks();
       this.curves?.drawCurves();

@@ -2,6 +2,8 @@
 
 const UNKNOWN = -(2 ** 31);  // as logger/report/track_data.py writes it
 
+const TRUST_RANKS = [0, 3, -1];  // colours of: no flag, a flag beside a value, no value that counts
+
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 // Columns by name. Four planes of bytes make whole numbers; sums undo the differences that were taken, and wrap as those.
@@ -38,7 +40,8 @@ function grouped(way, k) {
   const group = {k, count: first.length};
   first.push(way.count);
   group.first = Int32Array.from(first);
-  for (const name of ["iri", "iriError", "iriWorst", "comfort", "comfortWorst", "speed", "trust"])
+  for (const name of ["iri", "iriError", "iriWorst", "comfort", "comfortWorst", "speed", "trust", "metre",
+                      "second"])
     group[name] = new Float64Array(group.count).fill(NaN);
   for (let g = 0; g < group.count; g++) {
     let metre = 0, iri = 0, errorMetre = 0, error = 0, second = 0, square = 0, time = 0, distance = 0, trust = 0;
@@ -64,6 +67,8 @@ function grouped(way, k) {
     if (errorMetre > 0) group.iriError[g] = error / errorMetre;
     if (second > 0) group.comfort[g] = Math.sqrt(square / second);
     if (time > 0) group.speed[g] = distance / time;
+    group.metre[g] = metre;
+    group.second[g] = second;
     group.iriWorst[g] = roughest;
     group.comfortWorst[g] = hardest;
     group.trust[g] = trust;
@@ -104,11 +109,30 @@ class Windows {
 
   // Number of a group's colour; -1 for grey: no value. A window alone has the class that its log gives it.
   rank(group, g, mode) {
-    if (mode === "trust") return [0, 3, -1][group.trust[g]];
-    if (group.k === 0) { const own = (mode === "iri" ? this.iri_rank : this.comfort_rank)[g]; return own >= 0 ? own : -1; }
-    const value = group[mode];
-    if (!(value[g] >= 0)) return -1;
-    return this.data.limits[mode].filter(limit => value[g] >= limit).length;
+    if (mode === "trust") return TRUST_RANKS[group.trust[g]];
+    if (group.k > 0) return this.rankOf(group[mode][g], mode);
+    const own = (mode === "iri" ? this.iri_rank : this.comfort_rank)[g];
+    return own >= 0 ? own : -1;
+  }
+
+  // Of groups that are drawn as one: of their mean, weighted by length (IRI) and time (comfort); of the worst flag.
+  rankOfSeveral(group, several, mode) {
+    if (mode === "trust") return TRUST_RANKS[Math.max(...several.map(g => group.trust[g]))];
+    const weights = mode === "iri" ? group.metre : group.second, power = mode === "iri" ? 1 : 2;
+    let sum = 0, weight = 0;
+    for (const g of several) {
+      if (!(group[mode][g] >= 0)) continue;
+      sum += weights[g] * group[mode][g] ** power;
+      weight += weights[g];
+    }
+    return this.rankOf((sum / weight) ** (1 / power), mode);
+  }
+
+  rankOf(value, mode) {
+    if (!(value >= 0)) return -1;
+    let rank = 0;
+    for (const limit of this.data.limits[mode]) if (value >= limit) rank++;
+    return rank;
   }
 
   // The window at a distance along the way.
