@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from logger.api.outputs import check_out
 from logger.api.shown import Shown
 from logger.errors import BadInput
 
@@ -49,35 +49,21 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
     >>> convert(folder / "logs", folder / "drive.geojson").rows > 0
     True
     """
-    from logger.exchange.format import format_of
+    from logger.exchange.format import format_of, write_layer
     from logger.exchange.windows import windows_layer
-    from logger.store.log.log_reader import find_logs, read_logged
+    from logger.store.log.log_reader import find_logs_in, read_found
 
     path = Path(to)
     form = format_of(path)
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    found = {log.resolve(): (log, place) for place in places for log in find_logs(place)}
-    _check(path, [log for log, _ in found.values()])
-    files = [logged for log, place in found.values() if (logged := read_logged(log, place)) is not None]
+    found = find_logs_in(places)
+    check_out(path, (), [log for log, _ in found], "--to")
+    files = read_found(found)
     layer = windows_layer(files)
     if not layer.features:
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
-    new = path.with_name(f".{os.getpid()}-{path.name}")  # GDAL goes by the ending
-    try:
-        form.write(layer, new)
-        new.replace(path)
-    except OSError as error:
-        raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None
-    finally:
-        new.unlink(missing_ok=True)
+    write_layer(layer, path)
     return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files))
-
-
-def _check(out: Path, logs: Sequence[Path]) -> None:
-    """Raise BadInput where the file to write is a log, or cannot be written."""
-    from logger.api.outputs import check_out
-
-    check_out(out, (), logs, "--to")
 
 
 def _count(number: int, what: str) -> str:

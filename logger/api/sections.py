@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from logger.units import FOOT_M, MILE_M
 if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.exchange.layer import Layer
-    from logger.report.sections_text import DriveSections
+    from logger.report.drive_sections import DriveSections
 
 Array = npt.NDArray[np.float64]
 USUAL_M = 100.0
@@ -61,7 +61,7 @@ class Sections(CommandResult):
 
     def layer(self) -> Layer:
         """Rows with places, for the formats of ``convert``."""
-        from logger.exchange.sections import sections_layer
+        from logger.report.sections_layer import sections_layer
 
         return sections_layer(self._drives)
 
@@ -95,23 +95,27 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     >>> bool((found.known_m <= found.length_m + 1e-6).all())
     True
     """
-    from logger.report.sections_text import as_json, drive_sections, lines
-    from logger.store.log.log_reader import read_all
+    from logger.report.drive_sections import drive_sections
+    from logger.report.sections_text import as_json, lines
+    from logger.store.log.log_reader import find_logs_in, read_found
 
     length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
     if units not in SYSTEMS:
         raise BadInput(f"units {units}: expected one of {', '.join(SYSTEMS)}")
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    files = read_all(places)
+    files = read_found(find_logs_in(places))
+    if not any(one.records for one in files):
+        raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
     drives = tuple(drive_sections(files, length_m))
-
-    def joined(of: Any) -> Any:
-        return np.concatenate([of(one) for one in drives]) if drives else np.zeros(0)
-
+    figures = [one.figures for one in drives]
+    known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
+        "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
     return Sections(
         "\n".join(lines(drives, length_m, units)), as_json(drives, length_m), length_m,
-        joined(lambda one: np.full(len(one.condition), drives.index(one))).astype(np.intp),
-        joined(lambda one: one.figures.edges_m[:-1]), joined(lambda one: one.ends_m), joined(lambda one: one.figures.known_m),
-        joined(lambda one: one.figures.iri_m_per_km), joined(lambda one: one.figures.iri_std_m_per_km),
-        joined(lambda one: one.figures.a_w_mps2), joined(lambda one: one.figures.speed_mps),
-        np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)
+        np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
+        _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
+        speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)
+
+
+def _joined(arrays: Sequence[Array]) -> Array:
+    return np.concatenate(arrays) if arrays else np.zeros(0)

@@ -62,7 +62,7 @@ def _drive(out: Path, as_json: bool) -> None:
     with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump:
         outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
     report = out / REPORT_NAME
-    write_report(outcome.files, report)
+    write_report([(log, None) for log in outcome.files], report)
     if as_json:
         print(json.dumps(outcome.as_json() | {"report": str(report)}))
     else:

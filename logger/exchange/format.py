@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from functools import cache
 from pathlib import Path
@@ -41,3 +42,17 @@ def format_of(path: Path) -> Format:
         expected = ", ".join(f".{name}" for name in known)
         raise BadInput(f"{path}: expected a file that ends in one of {expected}")
     return known[ending]
+
+
+def write_layer(layer: Layer, path: Path) -> None:
+    """Write a file that is there whole, in place of an old one, or not at all. BadInput as ``format_of`` and
+    ``Format.write``, and where it cannot be written."""
+    form = format_of(path)
+    new = path.with_name(f".{os.getpid()}-{path.name}")  # GDAL goes by the ending
+    try:
+        form.write(layer, new)
+        new.replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: expected a file that can be written ({error.strerror or error})") from None
+    finally:
+        new.unlink(missing_ok=True)

@@ -22,6 +22,7 @@ from logger.api.modal import Channels, Modes, make_channels, modes, read_channel
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
 from logger.api.same_road import SameRoadDiagnosis, diagnose_same_road
+from logger.api.sections import Sections, sections
 from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
@@ -53,6 +54,7 @@ __all__ = [
     "Run",
     "SameRoadDiagnosis",
     "Samples",
+    "Sections",
     "ShiftedNumber",
     "Slopes",
     "add_effect",
@@ -79,6 +81,7 @@ __all__ = [
     "read_record",
     "read_run",
     "read_vehicle",
+    "sections",
     "simulate",
     "vehicles",
     "write_profile",

@@ -1,4 +1,4 @@
-"""Charts as SVG text, all in one style: values along the way, lines over an axis, shades over a grid, falling steps.
+"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, falling steps.
 
 A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
 are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground.
@@ -6,7 +6,7 @@ are classes that the page's style sheet fills in, so that one chart reads on lig
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor, log10
@@ -18,14 +18,10 @@ from logger.chart_data import SERIES, Array, Chart, Curves, Field, Line
 from logger.report.html import EMPTY, Html, concatenated, html
 
 WIDTH = 1000
-MAX_POINTS = 4000
-"""More points than this are drawn as means of neighbours: a screen has no more columns."""
-_NAME_ROOM = 11
 _ABOUT = 6
 _KEY_PX = 20
 _LINE_PX, _LETTER_PX, _MOST_LINES = 15, 7.0, 3
 
-Value = float | None
 Point = tuple[float, float]
 
 
@@ -51,7 +47,6 @@ class _Box:
         return self.height - self.bottom
 
 
-_ALONG = _Box(height=190, left=46, right=60, top=14, bottom=34)
 _CHART = _Box(height=420, left=64, right=170, top=20, bottom=44)
 _STEPS = _Box(height=300, left=64, right=110, top=26, bottom=62)
 
@@ -118,17 +113,11 @@ def _words(x: float, y: float, text: str, anchor: str = "start") -> Html:
     return html('<text class="tick" x="{:.1f}" y="{:.1f}"{}>{}</text>', x, y, where, text)
 
 
-def _figure(box: _Box, title: str, drawn: Iterable[Html], caption: Html = EMPTY) -> Html:
-    """The figure element; ``caption``: more words after the title."""
+def _figure(box: _Box, title: str, drawn: Iterable[Html]) -> Html:
+    """The figure element."""
     svg = html('<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>', WIDTH, box.height, title,
                concatenated(drawn))
-    return html("<figure><figcaption>{}{}</figcaption>{}</figure>", title, caption, svg)
-
-
-def numbered_mark(x: float, y: float, text: str) -> Html:
-    """A small disc with a number, at a place of a picture."""
-    return html('<g class="mark"><circle cx="{:.1f}" cy="{:.1f}" r="8"/><text x="{:.1f}" y="{:.1f}" '
-                'text-anchor="middle">{}</text></g>', x, y, x, y + 3.7, text)
+    return html("<figure><figcaption>{}</figcaption>{}</figure>", title, svg)
 
 
 def nice_ticks(low: float, high: float, about: int) -> list[float]:
@@ -141,116 +130,6 @@ def nice_step(least: float) -> float:
     """The smallest of 1, 2, 5, 10 ... times a power of ten that is not below ``least`` (positive)."""
     power = 10.0 ** floor(log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
-
-
-# --- values along the way ---
-
-
-@dataclass(frozen=True)
-class Level:
-    """A faint line across a plot at a value that has a name."""
-
-    value: float
-    name: str
-
-
-@dataclass(frozen=True)
-class Plot:
-    """What is drawn: one line over the distance, perhaps with a band of its standard error.
-
-    along_m    (n,) distance [m], rising
-    values     (n,) None where not known; the line is broken there
-    errors     (n,) standard errors; empty: no band
-    breaks     indices at which a new line begins (a new drive)
-    marks      (distance [m], value, text) of numbered points
-    """
-
-    title: str
-    unit: str
-    along_m: Sequence[float]
-    values: Sequence[Value]
-    errors: Sequence[Value] = ()
-    levels: Sequence[Level] = ()
-    breaks: Sequence[int] = ()
-    marks: Sequence[tuple[float, float, str]] = ()
-
-
-def line_figure(plot: Plot) -> Html:
-    """The figure element of a plot along the way."""
-    along_m, values, errors, group = _thinned(plot)
-    top = max((value for value in values if value is not None), default=1.0) * 1.05 or 1.0
-    frame = _Frame(_ALONG, 0.0, max(plot.along_m, default=1.0) or 1.0, 0.0, max(top, nice_ticks(0.0, top, 5)[-1]))
-    runs = _runs(values, {index // group for index in plot.breaks})
-    parts = [frame.rows(5), frame.columns(8, unit=1000.0), *_levels(frame, plot.levels),
-             _words(_ALONG.right_px, _ALONG.height - 2, "distance [km]", "end")]
-    if errors:
-        parts.append(html('<path class="band" d="{}"/>', _band(frame, along_m, values, errors, runs)))
-    lines = "".join(_path(frame.points((along_m[i], values[i] or 0.0) for i in run)) for run in runs)
-    parts.append(html('<path class="line" d="{}"/>', lines))
-    parts += [numbered_mark(frame.x(at_m), frame.y(value), text) for at_m, value, text in plot.marks]
-    caption = html(' <span class="unit">[{}]</span>', plot.unit)
-    if group > 1:
-        caption += html(' <span class="unit">each point the mean of {} windows</span>', group)
-    return _figure(_ALONG, plot.title, parts, caption)
-
-
-def _levels(frame: _Frame, levels: Sequence[Level]) -> list[Html]:
-    """The lines of the levels; a name where the one above it leaves room."""
-    parts = []
-    named_y = 0.0
-    for level in sorted(levels, key=lambda level: -level.value):
-        y = frame.y(level.value)
-        if level.value >= frame.y_high:
-            continue
-        parts.append(frame.across("level", level.value))
-        if y - named_y >= _NAME_ROOM:
-            named_y = y
-            parts.append(frame.beside(level.value, level.name))
-    return parts
-
-
-def _thinned(plot: Plot) -> tuple[list[float], list[Value], list[Value], int]:
-    """The points to draw, and how many rows one of them stands for."""
-    group = ceil(len(plot.values) / MAX_POINTS) or 1
-    starts = range(0, len(plot.values), group)
-    along_m = [_mean(plot.along_m[start:start + group]) or 0.0 for start in starts]
-    values = [_mean(plot.values[start:start + group]) for start in starts]
-    errors = [_mean(plot.errors[start:start + group]) for start in starts] if plot.errors else []
-    return along_m, values, errors, group
-
-
-def _mean(values: Iterable[Value]) -> Value:
-    known = [value for value in values if value is not None]
-    return sum(known) / len(known) if known else None
-
-
-def _runs(values: Sequence[Value], breaks: set[int]) -> list[range]:
-    """Stretches of known values without a break in them."""
-    runs: list[range] = []
-    start: int | None = None
-    for index, value in enumerate(values):
-        if start is not None and (value is None or index in breaks):
-            runs.append(range(start, index))
-            start = None
-        if start is None and value is not None:
-            start = index
-    if start is not None:
-        runs.append(range(start, len(values)))
-    return runs
-
-
-def _band(frame: _Frame, along_m: Sequence[float], values: Sequence[Value], errors: Sequence[Value],
-          runs: Sequence[range]) -> str:
-    """Value plus and minus its standard error, as closed shapes."""
-    def edge(run: Iterable[int], sign: int) -> list[str]:
-        return frame.points((along_m[i], (values[i] or 0.0) + sign * (errors[i] or 0.0)) for i in run)
-
-    return "".join(_path([*edge(run, 1), *edge(reversed(run), -1)]) + "z" for run in runs)
-
-
-def _path(points: Sequence[str]) -> str:
-    """One line through points. A single point becomes a dot, by the round end of a line without length."""
-    return "M" + (" ".join(points) if len(points) > 1 else f"{points[0]}h0")
 
 
 # --- lines over an axis, shades over a grid ---

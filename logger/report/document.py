@@ -1,8 +1,16 @@
-"""An HTML page that stands alone: one style, no script, no network. Every text is escaped (``logger.report.html``)."""
+"""An HTML page that stands alone: one style, no network. Every text is escaped (``logger.report.html``).
+
+A page may have one script of ours. The page's policy names it by its hash, so that no other one runs even if a hostile
+file got a tag past us.
+"""
 
 from __future__ import annotations
 
+import json
+from base64 import b64encode
 from collections.abc import Iterable
+from hashlib import sha256
+from typing import Any
 
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.style import STYLE
@@ -11,13 +19,28 @@ _RIGHT = Html(" class=n")
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def document(title: str, parts: Iterable[str]) -> Html:
-    """The page of a title and of parts; those that are not HTML are shown as they are written."""
+def document(title: str, parts: Iterable[str], *, style: str = "", script: str = "", images_from: str = "") -> Html:
+    """The page of a title and of parts; those that are not HTML are shown as they are written.
+
+    style, script    of this page alone, ours
+    images_from      another host that the page may take pictures from (``https://host``); empty: none
+    """
+    policy = _POLICY + (f"; img-src {images_from}" if images_from else "")
+    run = EMPTY
+    if script:
+        policy += f"; script-src 'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'"
+        run = html("<script>{}</script>", Html(script))
     return html('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta http-equiv="Content-Security-Policy" content="{}">'
                 '<meta name="viewport" content="width=device-width,initial-scale=1">'
                 '<meta name="color-scheme" content="light dark"><title>{}</title><style>{}</style></head>\n'
-                "<body><main>{}</main></body></html>\n", Html(_POLICY), title, Html(STYLE), concatenated(parts))
+                "<body><main>{}</main>{}</body></html>\n", policy, title, Html(STYLE + style), concatenated(parts), run)
+
+
+def data_block(name: str, content: Any) -> Html:
+    """What the page's script reads, as JSON that cannot end its element."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return html('<script type="application/json" id="{}">{}</script>', name, Html(text))
 
 
 def heading(title: str, under: str) -> Html:
@@ -63,4 +86,3 @@ def grid(heads: Iterable[str], rows: Iterable[Iterable[str]], words: Iterable[in
 
     body = concatenated(html("<tr>{}</tr>", cells(row, "td")) for row in rows)
     return html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', cells(heads, "th"), body)
-

@@ -1,13 +1,13 @@
-"""The way on the ground as one SVG picture, coloured by class; no tiles, no network.
+"""Lines on the ground as one SVG picture; no tiles, no network.
 
-Degrees become metres around the middle of the way (a degree of longitude shrinks with the cosine of the latitude),
-which is right to a part in a thousand for a day's drive. Between rows that are not joined there is a gap. Rows of one
-class in a row are one line, whose points are left out where they lie within a third of a pixel of it.
+Degrees become metres around the middle of the lines (a degree of longitude shrinks with the cosine of the latitude),
+which is right to a part in a thousand for a day's drive. Points are left out where they lie within a third of a pixel
+of the line through the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
 
@@ -15,11 +15,8 @@ import numpy as np
 
 from logger.chart_data import Array
 from logger.geodesy import east_and_north_m
-from logger.records import WindowRecord
-from logger.report.charts import WIDTH, nice_step, numbered_mark
+from logger.report.charts import WIDTH, nice_step
 from logger.report.html import Html, concatenated, html
-from logger.report.summary import Place
-from logger.store.log.log_reader import joined
 
 _MARGIN = 46
 _LEAST_HEIGHT, _MOST_HEIGHT = 260, 640
@@ -28,34 +25,6 @@ _TOLERANCE = 0.3
 _SPREAD = (1, 2, 4, 6)  # colours of a page's style that differ most, on its dark casing
 
 Point = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Colouring:
-    """One way to colour the track: a CSS class for the whole, and the style class of each row."""
-
-    name: str
-    style_of: Callable[[WindowRecord], str]
-
-
-def track_map(records: Sequence[WindowRecord], colourings: Sequence[Colouring], places: Sequence[Place]) -> Html:
-    """The SVG element of the way; a sentence where no row has a position."""
-    pieces = [piece for piece in joined(records) if piece]
-    if not pieces:
-        return Html('<p class="empty">No row has a position, so there is no map.</p>')
-    projection = _Projection.around([record for piece in pieces for record in piece])
-    drawn = [(piece, [projection.xy(record) for record in piece]) for piece in pieces]
-    parts = [html('<path class="casing" d="{}"/>', "".join(_path(points) for _, points in drawn))]
-    for colouring in colourings:
-        lines = concatenated(_coloured(piece, points, colouring) for piece, points in drawn)
-        parts.append(html('<g class="track {}">{}</g>', colouring.name, lines))
-    parts.append(_end(projection.xy(pieces[-1][-1]), "end", "End"))
-    parts.append(_end(projection.xy(pieces[0][0]), "start", "Start"))
-    parts += [numbered_mark(*projection.xy(place), str(number)) for number, place in enumerate(places, start=1)
-              if place.lat_deg is not None and place.lon_deg is not None]
-    parts += [_scale_bar(projection), _north()]
-    return html('<svg class="map" viewBox="0 0 {} {:.0f}" role="img" aria-label="Map of the way">{}</svg>', WIDTH,
-                projection.height, concatenated(parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +82,11 @@ class _Projection:
     height: float
 
     @classmethod
-    def around(cls, records: Sequence[WindowRecord | _Spot]) -> _Projection:
-        """The largest scale at which all rows fit the picture."""
-        latitudes = [record.lat_deg or 0.0 for record in records]
-        plain = cls((min(latitudes) + max(latitudes)) / 2, records[0].lon_deg or 0.0, (0.0, 0.0), 1.0, 0.0)
-        metres = np.array([plain.metres(record) for record in records])
+    def around(cls, places: Sequence[_Spot]) -> _Projection:
+        """The largest scale at which all places fit the picture."""
+        latitudes = [place.lat_deg for place in places]
+        plain = cls((min(latitudes) + max(latitudes)) / 2, places[0].lon_deg, (0.0, 0.0), 1.0, 0.0)
+        metres = np.array([plain.metres(place) for place in places])
         low, high = metres.min(axis=0), metres.max(axis=0)
         middle = (low + high) / 2
         wide_m, high_m = np.maximum(high - low, _LEAST_SPAN_M)
@@ -125,37 +94,15 @@ class _Projection:
         height = max(high_m * scale + 2 * _MARGIN, _LEAST_HEIGHT)
         return cls(plain.lat_deg, plain.lon_deg, (float(middle[0]), float(middle[1])), float(scale), float(height))
 
-    def metres(self, place: WindowRecord | Place | _Spot) -> Point:
+    def metres(self, place: _Spot) -> Point:
         """East and north of the origin [m]."""
-        return east_and_north_m(place.lat_deg or 0.0, place.lon_deg or 0.0, self.lat_deg, self.lon_deg)
+        return east_and_north_m(place.lat_deg, place.lon_deg, self.lat_deg, self.lon_deg)
 
-    def xy(self, place: WindowRecord | Place | _Spot) -> Point:
+    def xy(self, place: _Spot) -> Point:
         """In the picture, y downwards."""
         east_m, north_m = self.metres(place)
         return (WIDTH / 2 + (east_m - self.middle_m[0]) * self.units_per_m,
                 self.height / 2 - (north_m - self.middle_m[1]) * self.units_per_m)
-
-
-def _coloured(piece: Sequence[WindowRecord], points: Sequence[Point], colouring: Colouring) -> Html:
-    """Lines of one style each. A row reaches from half-way to the row before to half-way to the next."""
-    styles = [colouring.style_of(record) for record in piece]
-    lines = []
-    start = 0
-    for index in range(1, len(piece) + 1):
-        if index < len(piece) and styles[index] == styles[start]:
-            continue
-        run = list(points[start:index])
-        if start > 0:
-            run.insert(0, _half_way(points[start - 1], points[start]))
-        if index < len(piece):
-            run.append(_half_way(points[index - 1], points[index]))
-        lines.append(html('<path class="{}" d="{}"/>', styles[start], _path(run)))
-        start = index
-    return concatenated(lines)
-
-
-def _half_way(one: Point, other: Point) -> Point:
-    return (one[0] + other[0]) / 2, (one[1] + other[1]) / 2
 
 
 def _path(points: Sequence[Point]) -> str:
@@ -183,16 +130,6 @@ def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
             keep[first + 1 + worst] = True
             spans += [(first, first + 1 + worst), (first + 1 + worst, last)]
     return [(float(x), float(y)) for x, y in xy[keep]]
-
-
-def _end(at: Point, name: str, text: str) -> Html:
-    """A disc for the start, a square for the end, each with its word."""
-    x, y = at
-    shape = (html('<circle cx="{:.1f}" cy="{:.1f}" r="7"/>', x, y) if name == "start" else
-             html('<rect x="{:.1f}" y="{:.1f}" width="13" height="13" rx="2"/>', x - 6.5, y - 6.5))
-    right = x < WIDTH - 80
-    return html('<g class="{}">{}<text x="{:.1f}" y="{:.1f}" text-anchor="{}">{}</text></g>', name, shape,
-                x + (12 if right else -12), y + 4.5, "start" if right else "end", text)
 
 
 def _scale_bar(projection: _Projection) -> Html:

@@ -2,29 +2,28 @@
 
 It opens from a stick on a machine without network or rights: no script, no picture or font from elsewhere, and a
 content policy that forbids them even if a hostile file got a tag past us. Every text that comes from a file is
-escaped.
+escaped. The map and the curves are drawn by a script of ours (``assets``) out of packed numbers; all else is plain.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate
+from functools import cache
+from importlib import resources
 from typing import Any
+from urllib.parse import urlsplit
 
-from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.records import WindowRecord
-from logger.report.charts import Level, Plot, line_figure
-from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.document import bullets, data_block, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
-from logger.report.maps import Colouring, track_map
+from logger.report.maps import Way
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
     DriveSummary,
     Place,
     Share,
-    class_limits_m_per_km,
     summarise,
 )
 from logger.report.terminal import (
@@ -36,14 +35,15 @@ from logger.report.terminal import (
     place_words,
     span_words,
 )
+from logger.report.track_data import track_data
+from logger.report.track_views import rank, track_views, windows_table
 from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
-MAX_TABLE_ROWS = 5000
+_SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
 
 _A_W = Html("a<sub>w</sub> [m/s²]")
-_COMFORT_SHORT = {"fairly_uncomfortable": "fairly", "very_uncomfortable": "very", "extremely_uncomfortable": "extreme"}
 
 FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
@@ -58,28 +58,50 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "time_unset": "the GPS had not told the time yet",
     "partial": "cut short by the end of a drive or of the recording",
     "unsettled": "too near to a start, an end or a hole in the readings",
+    "hidden": "the ride is below the sensor's own noise: no value, but it counts in means as what it can be",
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
 
 
-def page(files: Sequence[LoggedFile]) -> Html:
-    """The page of some log files, in order of their writing, as one HTML document."""
+def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "") -> Html:
+    """The page of some log files, in order of their writing, as one HTML document.
+
+    base          roads that are drawn beneath, out of a file named ``base_name``
+    tiles_from    address of street pictures, with {z}, {x} and {y} in it; empty: none, and no request is made
+    """
     records = [record for file in files for record in file.records]
     summary = summarise(records)
     drives = split_drives(records)
+    host = "{0.scheme}://{0.netloc}".format(urlsplit(tiles_from)) if tiles_from else ""
     return document(f"Road roughness, {date_words(summary)}", [
         _head(summary, files),
         _tiles(summary),
-        _map_section(records, summary),
+        track_views(records, summary, _sources(base_name, host)),
         _shares_section(summary),
-        _places_section(summary.roughest),
+        _places_section(records, summary.roughest),
         _drives_section(drives) if len(drives) > 1 else EMPTY,
-        _plots_section(drives, summary),
         _notes_section(summary, files),
         _settings_section(files),
-        _rows_section(records),
-    ])
+        windows_table(records),
+        data_block("data", track_data(drives, base) | {
+            "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
+            "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
+                      "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
+    ], style=_asset("page.css"), script='"use strict";\n' + "".join(map(_asset, _SCRIPTS)), images_from=host)
+
+
+@cache
+def _asset(name: str) -> str:
+    """A file of the page's script or style."""
+    return (resources.files("logger.report") / "assets" / name).read_text("utf-8")
+
+
+def _sources(base_name: str, host: str) -> str:
+    """Whose pictures and roads the map shows."""
+    shown = [f"Roads beneath: {base_name}"] if base_name else []
+    shown += [f"Street pictures: {urlsplit(host).netloc}"] if host else []
+    return ". ".join([*shown, "Where they are OpenStreetMap's: © OpenStreetMap contributors"]) if shown else ""
 
 
 def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
@@ -103,24 +125,6 @@ def _tiles(summary: DriveSummary) -> Html:
     ])
 
 
-def _map_section(records: Sequence[WindowRecord], summary: DriveSummary) -> Html:
-    by_iri = Colouring("by-iri", lambda record: "s" + _rank(record.iri_class, tuple(IRI_CLASSES)))
-    by_comfort = Colouring("by-comfort", lambda record: "s" + _rank(record.comfort, COMFORT_NAMES))
-    return section("Map", html(
-        '<input class="pick" type="radio" name="pick" id="pick-iri" checked>'
-        '<input class="pick" type="radio" name="pick" id="pick-comfort"><div class="switch">'
-        '<label for="pick-iri">Roughness</label><label for="pick-comfort">Comfort</label></div><div>{}{}{}</div>',
-        track_map(records, (by_iri, by_comfort), summary.roughest),
-        _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
-        _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words)))
-
-
-def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
-    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', _rank(share.name, names), words_of(share.name))
-                     for share in shares)
-    return html('<ul class="legend {}">{}</ul>', name, entries)
-
-
 def _shares_section(summary: DriveSummary) -> Html:
     return html('<section class="columns"><div><h2>Road by IRI class</h2>{}</div><div><h2>Road by comfort</h2>{}</div>'
                 "</section>", _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
@@ -133,25 +137,36 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
     return html("<table>{}</table>", concatenated(
         html('<tr><td>{0}</td><td class="bar"><span class="f{1}" style="width:{2:.1%}"></span></td>'
              '<td class="n">{2:.1%}</td><td class="n">{3}</td></tr>', words_of(share.name),
-             _rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
+             rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
 
 
-def _places_section(places: Sequence[Place]) -> Html:
-    rows = [(str(number), _geo(place), distance_words(place.along_m), _clock(place.utc_us), iri_words(place),
+def _places_section(records: Sequence[WindowRecord], places: Sequence[Place]) -> Html:
+    rows = [(html('<button type="button" data-window="{}">{}</button>', index, str(number)), str(place.drive),
+             _instant(place.utc_us), _geo(place), distance_words(place.along_m), iri_words(place),
              _number(place.speed_mps, 0, 3.6), _number(place.a_w_mps2, 2), comfort_words(place.comfort),
-             " ".join(place.flags)) for number, place in enumerate(places, start=1)]
+             " ".join(place.flags))
+            for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
         return EMPTY
-    heads = ("#", "Coordinates", "Along the way", "Time (UTC)", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort", "Flags")
-    return section("Roughest places", grid(heads, rows, words=(0, 1, 3, 7, 8)) + hint(
+    heads = ("#", "Drive", "When (UTC)", "Coordinates", "Along the way", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
+             "Flags")
+    return section("Roughest places", grid(heads, rows, words=(0, 1, 2, 3, 8, 9)) + hint(
         "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
-        "visit a place before judging it."))
+        "visit a place before judging it. Its number shows it on the map and in the curves."))
+
+
+def _numbers(records: Sequence[WindowRecord], places: Sequence[Place]) -> list[int]:
+    """Which rows the places are."""
+    rows = {(along, record.iri_m_per_km): index
+            for index, (along, record) in enumerate(zip(along_m(records), records, strict=True))}
+    return [rows[place.along_m, place.iri_m_per_km] for place in places]
 
 
 def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg, place_words(place))
+    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg,
+                place_words(place).replace(" ", "\u00a0"))
 
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
@@ -159,30 +174,6 @@ def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
              _number(one.mean_iri_m_per_km, 1), _number(one.a_w_mps2, 2))
             for number, one in enumerate(map(summarise, drives), start=1)]
     return section("Drives", grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
-
-
-def _plots_section(drives: Sequence[Sequence[WindowRecord]], summary: DriveSummary) -> Html:
-    by_drive = [[record for record in drive if record.distance_end_m is not None] for drive in drives]
-    measured = [record for drive in by_drive for record in drive]
-    if not measured:
-        return EMPTY
-    at_m = along_m(measured)
-    breaks = list(accumulate(len(drive) for drive in by_drive))
-    class_levels = [Level(limit, letter) for letter in IRI_CLASSES
-                    if (limit := class_limits_m_per_km(letter)[0]) is not None]
-    comfort_levels = [Level(limit, _COMFORT_SHORT[word]) for limit, word in COMFORT_WORDS if word in _COMFORT_SHORT]
-    marks = [(place.along_m, place.iri_m_per_km, str(number)) for number, place in enumerate(summary.roughest, start=1)]
-    plots = (
-        Plot("Roughness, IRI", "m/km", at_m, [record.iri_m_per_km for record in measured],
-             errors=[record.iri_std_m_per_km for record in measured], levels=class_levels, breaks=breaks, marks=marks),
-        Plot("Weighted acceleration, a_w", "m/s²", at_m, [record.a_w_mps2 for record in measured],
-             levels=comfort_levels, breaks=breaks),
-        Plot("Speed", "km/h", at_m, [None if record.speed_mps is None else record.speed_mps * 3.6
-                                     for record in measured], breaks=breaks),
-    )
-    return section("Along the way", concatenated(map(line_figure, plots)) + hint(
-        "The shaded band is the estimate plus and minus one standard error; dotted lines are the lower limits of the "
-        "IRI classes, and of discomfort: fairly, very, extreme."))
 
 
 def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
@@ -234,39 +225,12 @@ def _settings_section(files: Sequence[LoggedFile]) -> Html:
     return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 
-def _rows_section(records: Sequence[WindowRecord]) -> Html:
-    """Every row, as a table that opens on demand. End tags that HTML lets one leave out are left out: it is long."""
-    names = ("row", "time UTC", "from [m]", "lat", "lon", "km/h", "IRI", "±", "a_w", "MTVV", "VDV", "crest", "class",
-             "comfort", "flags")
-    head = concatenated(html("<th>{}", name) for name in names)
-    rows = concatenated(concatenated([Html("<tr>"), *(html("<td>{}", cell) for cell in _cells(record))])
-                  for record in records[:MAX_TABLE_ROWS])
-    rest = len(records) - MAX_TABLE_ROWS
-    more = hint(f"{rest} more rows are in the log files.") if rest > 0 else EMPTY
-    return html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><tr>{}{}</table>'
-                "</div>{}</details>", len(records), head, rows, more)
-
-
-def _cells(record: WindowRecord) -> tuple[str, ...]:
-    return (
-        str(record.segment), _clock(record.utc_us), _number(record.distance_start_m, 0), _number(record.lat_deg, 5),
-        _number(record.lon_deg, 5), _number(record.speed_mps, 0, 3.6), _number(record.iri_m_per_km, 2),
-        _number(record.iri_std_m_per_km, 2), _number(record.a_w_mps2, 3), _number(record.mtvv_mps2, 2),
-        _number(record.vdv_mps175, 2), _number(record.crest_factor, 1), record.iri_class,
-        comfort_words(record.comfort), " ".join(record.flags))
-
-
-def _rank(name: str, names: tuple[str, ...]) -> str:
-    """Number of a name's colour; ``x`` for what has none."""
-    return str(names.index(name)) if name in names else "x"
-
-
 def _number(value: float | None, decimals: int, factor: float = 1.0) -> str:
     return "" if value is None else f"{value * factor:.{decimals}f}"
 
 
-def _clock(utc_us: int | None) -> str:
-    return "" if utc_us is None else f"{utc(utc_us):%H:%M:%S}"
+def _instant(utc_us: int | None) -> str:
+    return "not known" if utc_us is None else f"{utc(utc_us):%Y-%m-%d\u00a0%H:%M:%S}"
 
 
 def _inside(content: Any, *keys: str) -> Any:

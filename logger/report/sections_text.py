@@ -9,75 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from logger.chart_data import Array, Chart, Curves, Line
+from logger.chart_data import Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
-from logger.records import WindowRecord
-from logger.report.summary import counts, mean_square
+from logger.report.drive_sections import DriveSections
 from logger.roads.iso8608 import iri_class
-from logger.roads.roughness_words import FEDERAL_WORDS, federal_condition
-from logger.roads.sections import Sections, Windows, even_edges, sections
-from logger.store.log.log_reader import LoggedFile, split_drives
+from logger.roads.roughness_words import FEDERAL_WORDS
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
-
-_NONE = float("nan")
-
-
-@dataclass(frozen=True, eq=False)
-class DriveSections:
-    """The sections of one drive.
-
-    log, number    the file, and which drive of it, from 1
-    records        its rows with a distance
-    origin_m       the distance of the first of them: sections begin there
-    figures        of the k sections
-    condition      by the federal limits; empty: not known
-    ends_m         (k,) of the sections, the last one where the drive ends [m]
-    """
-
-    log: str
-    number: int
-    records: tuple[WindowRecord, ...]
-    origin_m: float
-    figures: Sections
-    condition: tuple[str, ...]
-    ends_m: Array
-
-
-def drive_sections(files: Sequence[LoggedFile], length_m: float) -> Iterator[DriveSections]:
-    """Drives of logs, those that have a distance, in sections."""
-    for file in files:
-        for number, drive in enumerate(split_drives(file.records), start=1):
-            records = tuple(one for one in drive
-                            if one.distance_start_m is not None and one.distance_end_m is not None
-                            and one.distance_end_m > one.distance_start_m)
-            if records:
-                yield _of_drive(file.name, number, records, length_m)
-
-
-def windows_of(records: Sequence[WindowRecord]) -> tuple[Windows, float]:
-    """Rows with a distance as arrays, from the first one's beginning on, and that [m]."""
-    origin_m = records[0].distance_start_m or 0.0
-
-    def column(of: Any) -> Array:
-        return np.array([_NONE if (value := of(one)) is None else value for one in records], dtype=np.float64)
-
-    return Windows(
-        column(lambda one: one.distance_start_m) - origin_m, column(lambda one: one.distance_end_m) - origin_m,
-        column(lambda one: one.duration_s), column(lambda one: one.iri_m_per_km if counts(one) else None),
-        column(lambda one: one.iri_std_m_per_km),
-        column(lambda one: mean_square(one) if counts(one) else None)), origin_m
-
-
-def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:
-    windows, origin_m = windows_of(records)
-    edges_m = even_edges(float(windows.end_m[-1]), length_m)
-    found = sections(windows, edges_m)
-    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
-    return DriveSections(log, number, records, origin_m, found, condition,
-                         np.minimum(edges_m[1:], windows.end_m[-1]))
-
-
-# --- words ---
 
 
 @dataclass(frozen=True)
@@ -108,7 +45,8 @@ def lines(drives: Sequence[DriveSections], length_m: float, system: str) -> list
             f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
     for one in drives:
         said += ["", f"{one.log}, drive {one.number}", head, *_rows(one, units)]
-    return [*said, "", "Condition: 23 CFR 490.313, good below 95 in/mi (1.50 m/km), poor above 170 (2.68). Class: ISO 8608.",
+    return [*said, "",
+            "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313. Class: ISO 8608.",
             "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
 
 
@@ -143,7 +81,8 @@ def _rows(one: DriveSections, units: _Units) -> Iterator[str]:
         yield (f"{start_m / unit_m:10.{units.length_decimals}f} {end_m / unit_m:10.{units.length_decimals}f} "
                f"{known_m / (end_m - start_m):6.0%} {_number(iri / iri_scale, units.iri_decimals):>10} "
                f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9} "
-               f"{iri_class(iri) if isfinite(iri) else '':5}  {_number(a_w, 2):>8} {_number(speed / speed_scale, 0):>6}")
+               f"{iri_class(iri) if isfinite(iri) else '':5}  {_number(a_w, 2):>8} "
+               f"{_number(speed / speed_scale, 0):>6}")
 
 
 def _number(value: float, decimals: int) -> str:

@@ -7,7 +7,7 @@ apart with any common colour vision; a casing around them carries the light ones
 _LIGHT = """
 --ink:#1d242b;--soft:#5c6873;--line:#d9dee3;--faint:#eef1f4;--ground:#fff;--panel:#f7f9fa;--casing:#3c464f;
 --c0:#2f6db5;--c1:#58a9d4;--c2:#f2c744;--c3:#ef8d32;--c4:#d0402b;--c5:#9e1b5e;--c6:#651a70;--c7:#35104a;
---none:#9aa4ad;
+--none:#9aa4ad;--band:#58a9d48c;
 """
 _DARK = """
 --ink:#e7ebee;--soft:#9ba7b1;--line:#343d45;--faint:#252d34;--ground:#14191e;
@@ -49,31 +49,21 @@ border-radius:8px;overflow:hidden;margin:0}
 .tiles dt{font-size:12.5px;color:var(--soft)}
 .tiles dd{margin:0;font-size:22px;font-weight:600;font-variant-numeric:tabular-nums;white-space:nowrap}
 .tiles small{font-size:13px;font-weight:400;color:var(--soft)}
-.pick{position:absolute;opacity:0;pointer-events:none}
-.switch{display:inline-flex;border:1px solid var(--line);border-radius:7px;overflow:hidden;margin-bottom:10px}
-.switch label{padding:5px 14px;font-size:13.5px;cursor:pointer;color:var(--soft)}
-#pick-iri:checked~.switch label[for=pick-iri],
-#pick-comfort:checked~.switch label[for=pick-comfort]{background:var(--ink);color:var(--ground)}
-#pick-iri:focus-visible~.switch label[for=pick-iri],
-#pick-comfort:focus-visible~.switch label[for=pick-comfort]{outline:2px solid var(--c1);outline-offset:-3px}
-#pick-iri:checked~* .by-comfort,#pick-comfort:checked~* .by-iri{display:none}
 .map{background:var(--panel);border:1px solid var(--line);border-radius:8px}
 .map path{fill:none;stroke-linecap:round;stroke-linejoin:round}
 .casing{stroke:var(--casing);stroke-width:8.5;stroke-opacity:.85}
-.track path{stroke-width:5.5;stroke-linecap:butt}
-.track path[d$=h0]{stroke-linecap:round}
 .f0{background:var(--c0)}.f1{background:var(--c1)}.f2{background:var(--c2)}.f3{background:var(--c3)}
 .f4{background:var(--c4)}.f5{background:var(--c5)}
 .f6{background:var(--c6)}.f7{background:var(--c7)}.fx{background:var(--none)}
-.start circle,.end rect{fill:var(--ground);stroke:var(--ink);stroke-width:2.5}
-.map .start text,.map .end text{font-weight:600;fill:var(--ink);paint-order:stroke;stroke:var(--panel);
+.start circle{fill:var(--ground);stroke:var(--ink);stroke-width:2.5}
+.map .start text{font-weight:600;fill:var(--ink);paint-order:stroke;stroke:var(--panel);
 stroke-width:4;stroke-linejoin:round}
 .scale path{stroke:var(--soft);stroke-width:1.5}
 .legend{display:flex;flex-wrap:wrap;gap:4px 18px;margin:10px 0 0;padding:0;list-style:none;font-size:13px;
 color:var(--soft)}
 .legend i,.bars i{display:inline-block;width:18px;height:6px;border-radius:3px;margin-right:7px;
 vertical-align:2px;box-shadow:0 0 0 1px var(--casing)}
-.columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,1fr));gap:0 48px}
+.columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(330px,100%),1fr));gap:0 48px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:13.5px;font-variant-numeric:tabular-nums}
 th{text-align:left;font-weight:600;color:var(--soft);font-size:12.5px;vertical-align:bottom}
@@ -87,15 +77,15 @@ details{margin-top:14px;border-top:1px solid var(--line);padding-top:12px}
 summary{cursor:pointer;font-weight:600}
 pre{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;overflow:auto;
 max-height:520px;font-size:12.5px;line-height:1.45}
-.rows table{font-size:12.5px}
-.rows td,.rows th{text-align:right;padding:2px 10px 2px 0;white-space:nowrap}
-.rows td:nth-last-child(-n+2),.rows th:nth-last-child(-n+2){text-align:left}
 .notes{padding-left:18px;margin:14px 0 0}
 .notes li{margin:3px 0}
 .warn{font-weight:600}
-@media print{main{padding:0}.switch{display:none}}
+@media(max-width:500px){main{padding:20px 14px 40px}h1{font-size:23px}h2{margin-top:32px}}
+@media print{*{print-color-adjust:exact;-webkit-print-color-adjust:exact}main{padding:0;max-width:none}
+section,tr,figure{break-inside:avoid}}
 """
-STYLE = f":root{{{_LIGHT}}}@media(prefers-color-scheme:dark){{:root{{{_DARK}}}}}{_CHART}{_PAGE}"
+STYLE = (f":root{{{_LIGHT}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-paper]){{{_DARK}}}}}"
+         f"{_CHART}{_PAGE}")
 """Of a page."""
 CELL_STYLE = f".ridelog{{{_LIGHT}{_CHART}}}@media(prefers-color-scheme:dark){{.ridelog{{{_DARK}}}}}"
 """Of charts in somebody else's page: inside an element of the class ``ridelog`` and nowhere else (nested rules, CSS

@@ -46,8 +46,10 @@ class Share:
 
 @dataclass(frozen=True)
 class Place:
-    """A rough window. ``along_m`` is where its middle lies on the way through all rows [m]."""
+    """A rough window. ``along_m`` is where its middle lies on the way through all rows [m], ``drive`` counts the drives
+    of these rows from 1 on."""
 
+    drive: int
     along_m: float
     utc_us: int | None
     lat_deg: float | None
@@ -98,7 +100,7 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
     dated = [record for record in records if record.utc_us is not None]
     mean_iri = _mean((record.iri_m_per_km, length) for record, length in zip(records, lengths_m, strict=True)
                      if counts(record))
-    mean_square = _mean((_mean_square(record), record.duration_s) for record in records if counts(record))
+    mean_square = _mean((expected_square(record), record.duration_s) for record in records if counts(record))
     return DriveSummary(
         windows=len(records),
         drives=len(split_drives(records)),
@@ -117,7 +119,7 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
     )
 
 
-def _mean_square(record: WindowRecord) -> float | None:
+def expected_square(record: WindowRecord) -> float | None:
     """Of the weighted acceleration of a window, as it is expected: what is open of it counts too [(m/s2)2]. Of a ride
     that hides, of which no value is known, the middle between nothing and all that was read: without these rows, which
     are smooth ones, the mean of a drive would be too high."""
@@ -177,10 +179,11 @@ def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: 
 
 
 def _roughest(records: Sequence[WindowRecord]) -> tuple[Place, ...]:
+    numbered = [(number, record) for number, drive in enumerate(split_drives(records), start=1) for record in drive]
     candidates = [
-        Place(along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
+        Place(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps, record.iri_m_per_km,
               record.iri_std_m_per_km, record.a_w_mps2, record.comfort, record.flags)
-        for record, along in zip(records, along_m(records), strict=True)
+        for (drive, record), along in zip(numbered, along_m(records), strict=True)
         if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)
     ]
     found: list[Place] = []

@@ -59,7 +59,7 @@ class Sections:
 
 def even_edges(end_m: float, length_m: float) -> Array:
     """Limits from 0 to beyond the end, a length apart; the last section may be longer than what was driven."""
-    return length_m * np.arange(int(np.ceil(end_m / length_m - 1e-9)) + 1)
+    return np.asarray(length_m * np.arange(int(np.ceil(end_m / length_m - 1e-9)) + 1), dtype=np.float64)
 
 
 def sections(windows: Windows, edges_m: Array) -> Sections:
@@ -69,7 +69,7 @@ def sections(windows: Windows, edges_m: Array) -> Sections:
     share = piece_m / (windows.end_m - windows.start_m)[window]
 
     def total(weight: Array) -> Array:
-        return np.bincount(section, weight, count)
+        return np.asarray(np.bincount(section, weight, count), dtype=np.float64)
 
     iri, variance = windows.iri_m_per_km[window], windows.iri_std_m_per_km[window] ** 2
     known_m = total(np.where(np.isfinite(iri), piece_m, 0.0))
@@ -80,7 +80,8 @@ def sections(windows: Windows, edges_m: Array) -> Sections:
     return Sections(
         edges_m, driven_m, known_m, _ratio(total(np.nan_to_num(iri * piece_m)), known_m),
         _ratio(np.sqrt(total(np.nan_to_num(variance * piece_m**2))), known_m),
-        np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)), worst, worst_at_m)
+        np.sqrt(_ratio(total(np.nan_to_num(square * time_s)), felt_s)), _ratio(driven_m, total(time_s)), worst,
+        worst_at_m)
 
 
 def _pieces(windows: Windows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from hashlib import sha256
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, Protocol
@@ -61,6 +62,38 @@ def find_logs(place: Path) -> list[Path]:
     if not found:
         raise BadInput(f"{place}: expected segment logs (such as 00001-001.csv), found none")
     return [found[key] for key in sorted(found)]
+
+
+def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
+    """The logs of files and folders, place by place, each with the folder that its name is shown from.
+
+    A log that is found twice, in two places or as a copy (on a stick, say), is taken once, where it is found first.
+    Raises BadInput for a place without any.
+    """
+    found: list[tuple[Path, Path | None]] = []
+    seen: set[object] = set()
+    for place in places:
+        for log in find_logs(place):
+            marks = {log.resolve(), _copied(log)} - {None}
+            if not seen & marks:
+                # With one place its own name says nothing; among several it tells them apart.
+                found.append((log, place if len(places) == 1 else place.parent))
+            seen |= marks
+    return found
+
+
+def read_found(found: Iterable[tuple[Path, Path | None]]) -> list[LoggedFile]:
+    """The logs that ``find_logs_in`` found, as they are read; those that are there no more are left out. BadInput as
+    ``read_logged``."""
+    return [logged for log, place in found if (logged := read_logged(log, place)) is not None]
+
+
+def _copied(log: Path) -> tuple[str, bytes] | None:
+    """What a log shares with its copies: name and content. None for one that is still written, or cannot be read."""
+    try:
+        return (log.name, sha256(log.read_bytes()).digest()) if finished_path(log) == log else None
+    except OSError:
+        return None
 
 
 def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:

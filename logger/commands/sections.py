@@ -1,0 +1,56 @@
+"""Logs in sections of one length, as road agencies file them: mean IRI with its standard error, condition, comfort.
+
+  ridelog sections /media/RIDELOG --length 0.1mi --units us
+  ridelog sections drive-logs/ --length 100m --out sections.geojson
+
+Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its windows
+by length, over as much of it as has an IRI, which is said beside it. Its standard error is that of independent windows.
+It does not hold what all windows of a car share, such as a vehicle file that is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from logger.api.outputs import check_out
+from logger.api.sections import SYSTEMS
+from logger.commands.pictures import parted, write_picture
+from logger.errors import EXIT_DONE
+
+_USUAL = "100m"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog sections``."""
+    parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
+                        help="folder of segment logs, exported stick, or log file")
+    parser.add_argument("--length", default=_USUAL, metavar="LENGTH",
+                        help=f"of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: {_USUAL})")
+    parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
+    parser.add_argument("--out", metavar="FILE", type=Path, action="append",
+                        help="write the sections as .csv .geojson .gpkg .gpx .kml .parquet (in SI units), or a page or "
+                             "picture of them (.html .png .svg .pdf); once for each")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog sections``."""
+    from logger.api.sections import sections
+    from logger.exchange.format import format_of, write_layer
+    from logger.store.log.log_reader import find_logs_in
+
+    picture, table = parted(args.out)
+    if table is not None:
+        format_of(table)
+    for path in (picture, table):
+        if path is not None:
+            check_out(path, (), [log for log, _ in find_logs_in(args.logs)])
+    found = sections(args.logs, args.length, args.units)
+    if table is not None:
+        write_layer(found.layer(), table)
+    of = ", ".join(map(str, args.logs))
+    write_picture(picture, "Sections", of, found.text, found.charts)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
+    return EXIT_DONE

@@ -1,0 +1,67 @@
+"""Roads as lines out of a GeoJSON file, as an extract of OpenStreetMap gives them (RFC 7946)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.errors import BadInput
+from logger.files import read_bounded
+
+MAX_BYTES = 256 << 20
+"""A county's roads; a country's would not be read in a minute, and the page keeps only what is near."""
+
+Array = npt.NDArray[np.float64]
+
+
+def read_road_lines(path: Path | str) -> list[tuple[Array, Array]]:
+    """Latitudes and longitudes (n,) [degrees] of each line of a file, n > 1; what is no line is left out.
+
+    Raises BadInput for a file that cannot be read, is not GeoJSON, or holds no line.
+    """
+    try:
+        content = json.loads(read_bounded(path, MAX_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: expected GeoJSON, found what is no JSON ({error})") from None
+    if not isinstance(content, dict) or not isinstance(content.get("type"), str):
+        raise BadInput(f"{path}: expected GeoJSON, an object with a type, such as a FeatureCollection")
+    lines = [_line(path, points) for geometry in _geometries(content) for points in _points(geometry)]
+    if not lines:
+        raise BadInput(f"{path}: expected roads as LineString or MultiLineString, found none")
+    return lines
+
+
+def _geometries(content: Any) -> Iterator[dict[str, Any]]:
+    """What has coordinates, in features, in collections, or alone."""
+    if not isinstance(content, dict):
+        return
+    for many in ("features", "geometries"):
+        for one in content.get(many) or () if isinstance(content.get(many), list) else ():
+            yield from _geometries(one)
+    if content.get("type") == "Feature":
+        yield from _geometries(content.get("geometry"))
+    elif "coordinates" in content:
+        yield content
+
+
+def _points(geometry: dict[str, Any]) -> list[Any]:
+    coordinates = geometry["coordinates"]
+    if geometry.get("type") == "LineString":
+        return [coordinates]
+    return coordinates if geometry.get("type") == "MultiLineString" and isinstance(coordinates, list) else []
+
+
+def _line(path: Path | str, points: Any) -> tuple[Array, Array]:
+    try:
+        degrees = np.array([point[:2] for point in points], dtype=np.float64)
+    except (TypeError, ValueError, KeyError, OverflowError):
+        degrees = np.zeros(0)
+    if degrees.ndim != 2 or degrees.shape[0] < 2 or degrees.shape[1] != 2 or not (np.abs(degrees) <= [360, 90]).all():
+        raise BadInput(f"{path}: expected lines of at least two [longitude, latitude] in degrees, found "
+                       f"{json.dumps(points)[:80]}")
+    return degrees[:, 1], degrees[:, 0]
