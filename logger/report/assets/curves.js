@@ -10,11 +10,15 @@ class Curves {
     [this.canvas, this.over] = place.querySelectorAll("canvas");
     this.draw = atNextFrame(() => this.drawCurves());
     this.drawOver = atNextFrame(() => this.drawMarks());
+    this.measure();
     this.listen();
   }
 
+  // How large the picture is. It is kept, because a browser that is asked may lay out its page anew.
+  measure() { [this.width, this.height] = [this.canvas.clientWidth, this.canvas.clientHeight]; }
+
   get left() { return 40; }
-  get right() { return this.canvas.clientWidth - (this.canvas.clientWidth < 500 ? 14 : 62); }
+  get right() { return this.width - (this.width < 500 ? 14 : 62); }
   px(along_m) { return this.left + (along_m - this.from) / (this.to - this.from) * (this.right - this.left); }
   along(px) { return this.from + (px - this.left) / (this.right - this.left) * (this.to - this.from); }
 
@@ -43,7 +47,7 @@ class Curves {
   // --- drawing ---
 
   panels() {
-    const {limits, letters} = this.report.data, height = this.canvas.clientHeight - AXIS_PX - FLAGS_PX - 6;
+    const {limits, letters} = this.report.data, height = this.height - AXIS_PX - FLAGS_PX - 6;
     const each = height / 3 - GAP_PX, top = number => number * height / 3 + GAP_PX - 4;
     return [
       {title: "Roughness, IRI [m/km]", value: "iri", error: "iriError", worst: "iriWorst", column: "iri_m_per_km",
@@ -94,7 +98,7 @@ class Curves {
     panel.levels.forEach((level, number) => {
       if (level > ceiling) return;
       this.across(ink, y(level), colours.soft, [1, 4]);
-      if (this.right < this.canvas.clientWidth - 40 && y(level) < bottom && Math.abs(named - y(level)) > 12) {
+      if (this.right < this.width - 40 && y(level) < bottom && Math.abs(named - y(level)) > 12) {
         write(ink, panel.names[number], this.right + 7, y(level) + 4, {halo: colours.ground});
         named = y(level);
       }
@@ -177,7 +181,7 @@ class Curves {
 
   // A strip below: what carries a flag, and what has no value.
   drawFlags(ink, group, seen) {
-    const {windows} = this.report, top = this.canvas.clientHeight - AXIS_PX - FLAGS_PX;
+    const {windows} = this.report, top = this.height - AXIS_PX - FLAGS_PX;
     for (const wanted of [1, 2]) {
       ink.fillStyle = wanted === 1 ? colours.c3 : colours.none;
       for (const g of seen) {
@@ -194,7 +198,7 @@ class Curves {
   }
 
   drawAxis(ink, width) {
-    const {windows} = this.report, bottom = this.canvas.clientHeight, span = this.to - this.from;
+    const {windows} = this.report, bottom = this.height, span = this.to - this.from;
     const inMetres = span < 1000, unit = inMetres ? 1 : 1000;
     const step = niceStep(span / unit / Math.max((this.right - this.left) / 90, 2));
     ink.font = "12px system-ui";
@@ -223,7 +227,7 @@ class Curves {
 
   // What changes with the pointer: the range, and the window that is read.
   drawMarks() {
-    const {ink} = sheet(this.over), {windows, at, range} = this.report, bottom = this.canvas.clientHeight - AXIS_PX;
+    const {ink} = sheet(this.over), {windows, at, range} = this.report, bottom = this.height - AXIS_PX;
     if (range) {
       const from = Math.max(this.px(windows.begin(range[0])), this.left);
       const to = Math.min(this.px(windows.end_m[range[1]]), this.right);
@@ -287,6 +291,6 @@ class Curves {
       else if (event.key === "0") this.fit();
       else report.walk(to, event.shiftKey);
     });
-    new ResizeObserver(() => { this.draw(); this.drawOver(); }).observe(canvas);
+    new ResizeObserver(() => { this.measure(); this.draw(); this.drawOver(); }).observe(canvas);
   }
 }

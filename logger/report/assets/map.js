@@ -3,6 +3,7 @@
 const WORLD_M = 2 * Math.PI * 6378137;  // once around the Earth at the equator, as Web Mercator takes it (EPSG:3857)
 const PIECE_PX = 4;       // shorter pieces of colour are blur
 const STROKES = 300;      // pieces in one stroke: long paths that cross themselves are slow to fill
+const FAR_M = 8;          // in a pixel: from here on streets of a town lie close to one another, and lines are thin
 const MARGIN = 0.2;       // of the view, that is painted around it
 const REST_MS = 150;      // without a move
 const REACH_PX = 32;      // how near to the way a pointer has to be
@@ -15,8 +16,12 @@ class TrackMap {
     [this.canvas, this.over] = place.querySelectorAll("canvas");
     this.draw = atNextFrame(() => this.drawWay());
     this.drawOver = atNextFrame(() => this.drawMarks());
+    this.measure();
     this.listen();
   }
+
+  // How large the map is. It is kept, because a browser that is asked may lay out its page anew.
+  measure() { [this.width, this.height] = [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
   // --- where things are ---
 
@@ -30,7 +35,7 @@ class TrackMap {
       top = Math.min(top, y[i]); bottom = Math.max(bottom, y[i]);
     }
     if (west > east) return;
-    const {clientWidth: width, clientHeight: height} = this.canvas;
+    const {width, height} = this;
     this.x = (west + east) / 2;
     this.y = (top + bottom) / 2;
     const least = 60 / (WORLD_M * Math.cos(this.latitude()));  // a single window needs some ground around it
@@ -44,8 +49,8 @@ class TrackMap {
 
   latitude() { return Math.atan(Math.sinh((0.5 - this.y) * 2 * Math.PI)); }
   metresPerPixel() { return WORLD_M * Math.cos(this.latitude()) / this.scale; }
-  left(x) { return (x - this.x) * this.scale + this.canvas.clientWidth / 2; }
-  top(y) { return (y - this.y) * this.scale + this.canvas.clientHeight / 2; }
+  left(x) { return (x - this.x) * this.scale + this.width / 2; }
+  top(y) { return (y - this.y) * this.scale + this.height / 2; }
 
   pan(dx, dy) {
     this.x -= dx / this.scale;
@@ -53,11 +58,11 @@ class TrackMap {
     this.moved();
   }
 
-  zoom(factor, px = this.canvas.clientWidth / 2, py = this.canvas.clientHeight / 2) {
+  zoom(factor, px = this.width / 2, py = this.height / 2) {
     const closest = WORLD_M * Math.cos(this.latitude()) / CLOSEST_M;
     const scale = clamp(this.scale * factor, this.widest, closest), kept = 1 / this.scale - 1 / scale;
-    this.x += (px - this.canvas.clientWidth / 2) * kept;
-    this.y += (py - this.canvas.clientHeight / 2) * kept;
+    this.x += (px - this.width / 2) * kept;
+    this.y += (py - this.height / 2) * kept;
     this.scale = scale;
     this.moved();
   }
@@ -73,7 +78,7 @@ class TrackMap {
     const {windows} = this.report;
     if (!windows.hasPlace(i)) return;
     const x = this.left(windows.x[i]), y = this.top(windows.y[i]);
-    if (x > 20 && y > 20 && x < this.canvas.clientWidth - 20 && y < this.canvas.clientHeight - 20) return;
+    if (x > 20 && y > 20 && x < this.width - 20 && y < this.height - 20) return;
     [this.x, this.y] = [windows.x[i], windows.y[i]];
     this.moved();
   }
@@ -131,10 +136,11 @@ class TrackMap {
       drawn.push(cell.groups[0]);
     }
     this.seen = cells;
-    this.stroke(ink, group, drawn, colours.casing, 8);
+    const line = this.metresPerPixel() > FAR_M ? 3.4 : 5.5;
+    this.stroke(ink, group, drawn, colours.casing, line + 2.4);
     // Where ways cross or lie side by side the worst is on top.
     for (const rank of [...byRank.keys()].sort((one, other) => one - other))
-      this.stroke(ink, group, byRank.get(rank), colourOf(rank), 5.5);
+      this.stroke(ink, group, byRank.get(rank), colourOf(rank), line);
   }
 
   // Pieces in the box, those whose middles share some pixels together: drives over one street are one mean, drawn once.
@@ -216,7 +222,7 @@ class TrackMap {
     const {tiles} = this.report.data;
     if (!tiles) return;
     const zoom = clamp(Math.round(Math.log2(this.scale / TILE_PX)), 0, 19), count = 2 ** zoom, side = this.scale / count;
-    const {clientWidth: width, clientHeight: height} = this.canvas;
+    const {width, height} = this;
     const column = Math.floor((this.x + (west - width / 2) / this.scale) * count);
     const row = Math.max(Math.floor((this.y + (north - height / 2) / this.scale) * count), 0);
     for (let x = column; this.left(x / count) < east; x++)
@@ -248,19 +254,21 @@ class TrackMap {
 
   // However far out one looks, and whatever the means say: the worst window of what is in view, with its value.
   drawWorst(ink) {
-    const {windows, mode} = this.report, {clientWidth: width, clientHeight: height} = this.canvas;
+    const {windows, mode} = this.report, {width, height} = this;
     if (mode === "trust") return;
     const value = mode === "iri" ? windows.iri_m_per_km : windows.a_w_mps2, worsts = this.group[`${mode}Worst`];
     let worst = NaN;
     for (const {groups} of this.seen.values())
       for (const g of groups) {
-        const i = worsts[g], x = this.left(windows.x[i]), y = this.top(windows.y[i]);
-        if (!(value[i] <= value[worst]) && windows.counts[i] && x > 4 && y > 4 && x < width - 4 && y < height - 4) worst = i;
+        const i = worsts[g];
+        if (!(value[i] >= 0) || value[i] <= value[worst] || !windows.counts[i]) continue;
+        const x = this.left(windows.x[i]), y = this.top(windows.y[i]);
+        if (x > 4 && y > 4 && x < width - 4 && y < height - 4) worst = i;
       }
     if (Number.isNaN(worst)) return;
     const x = this.left(windows.x[worst]), y = this.top(windows.y[worst]);
     circle(ink, x, y, 11, colours.ink, null, 2);
-    write(ink, `worst ${value[worst].toFixed(mode === "iri" ? 1 : 2)}`, clamp(x, 40, this.canvas.clientWidth - 40),
+    write(ink, `worst ${value[worst].toFixed(mode === "iri" ? 1 : 2)}`, clamp(x, 40, this.width - 40),
           y > 40 ? y - 17 : y + 26, {colour: colours.ink, align: "center", weight: 600});
   }
 
@@ -358,7 +366,7 @@ class TrackMap {
     canvas.addEventListener("pointerup", lift);
     canvas.addEventListener("pointercancel", lift);
     canvas.addEventListener("keydown", event => {
-      const {clientWidth: width, clientHeight: height} = canvas;
+      const {width, height} = this;
       const act = {ArrowLeft: () => this.pan(width / 6, 0), ArrowRight: () => this.pan(-width / 6, 0),
                    ArrowUp: () => this.pan(0, height / 6), ArrowDown: () => this.pan(0, -height / 6),
                    "+": () => this.zoom(1.5), "=": () => this.zoom(1.5), "-": () => this.zoom(1 / 1.5),
@@ -371,13 +379,14 @@ class TrackMap {
       button.addEventListener("click", () => ({in: () => this.zoom(1.5), out: () => this.zoom(1 / 1.5),
                                                all: () => this.fit()})[button.dataset.zoom]());
     new ResizeObserver(() => {
+      this.measure();
       if (this.fitted) this.fit();
       else { this.draw(); this.drawOver(); }
     }).observe(canvas);
   }
 
   point(px, py, pressed = false) {
-    const {clientWidth: width, clientHeight: height} = this.canvas;
+    const {width, height} = this;
     const [i, off] = this.report.windows.nearest(this.x + (px - width / 2) / this.scale,
                                                  this.y + (py - height / 2) / this.scale);
     if (i >= 0 && off * this.scale < REACH_PX * (pressed ? 1.5 : 1)) this.report.point(i, this);
