@@ -175,13 +175,13 @@ class _Chooser:
                    before - model.score, rivals, self._nearest(model, best, gains[best.draft.name]))
 
     def _bases(self) -> list[Baseline]:
-        """Models that a law is tried beside: with all that was found, without each of it, and without any."""
+        """Models that a law is tried beside: without what was found, with all of it, and with each of two alone."""
         now, before = self.selection.now, self.selection.before
         names = now.state.names[self.search.present:]
         if not names:
             return [now]
-        others = [self.search.without(now, name) for name in names] if len(names) > 1 else []
-        return [now, *others, before]
+        others = [self.search.without(now, name) for name in names] if len(names) == 2 else []
+        return [before, *others, now]
 
     def _fitted_beside(self, base: Baseline) -> list[LawFit]:
         """Laws fitted beside a model."""
