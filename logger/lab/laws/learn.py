@@ -1,0 +1,300 @@
+"""A law out of the data, where no known effect explains it.
+
+Problem: something differs, none of the known effects is it, and the user is left with a shape. Solution: first the
+known effects are searched, as a diagnosis does. Where nothing is missing, nothing is learned. Else families of laws are
+screened beside the model without any effect, the promising ones are fitted, and the same evidence that chooses among
+effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no law alone explains
+what is missing, laws are tried beside the known effects that were found. Where these leave nothing, a law takes their
+place only by decisive evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from logger.lab.diagnosis import Diagnosis, judged, searched
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look
+from logger.lab.laws.screening import count_of, screened_law
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
+from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM
+from logger.lab.selection.screening import Baseline, Screened, screened
+from logger.lab.selection.stepwise import Effort as Usual
+from logger.lab.selection.stepwise import Search, Selection
+from logger.vehicle.effect import Chosen, Effect
+
+Progress = Callable[[str], None]
+
+DECISIVE = 2 * CONFUSED
+"""What a law has to gain over known effects that explain all: they are told from each other, and that twice."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much work the choice of a law takes.
+
+    listed                          how many known effects are sought first; all as usual where no law alone explains
+                                    what is left
+    worth_narrowing                 families of which one axle alone is tried
+    fitted, refined                 how many laws are fitted on a model, and how many of these with slopes of their own
+    worth_fitting, worth_refining   of what the best one promises, and gains
+    """
+
+    listed: int = 2
+    worth_narrowing: int = 3
+    fitted: int = 5
+    refined: int = 2
+    worth_fitting: float = 0.2
+    worth_refining: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class LawFit:
+    """A law that was fitted.
+
+    base    the model beside which it was
+    """
+
+    family: Family
+    draft: Draft
+    base: Baseline
+    fit: CandidateFit
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log of the model's evidence."""
+        return self.fit.found.score
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """A known effect in the place of a law: what it gains, and what the law gains, in minus twice the log of the
+    evidence; its numbers."""
+
+    one: Chosen
+    gain: float
+    law_gain: float
+
+    @property
+    def share(self) -> float:
+        """Of what the law explains."""
+        return max(self.gain, 0.0) / self.law_gain
+
+    @property
+    def as_good(self) -> bool:
+        """Whether the data do not tell the two apart."""
+        return self.gain > self.law_gain - CONFUSED
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A law that was chosen.
+
+    one        with the numbers of the search
+    beside     known effects that are missing beside it, with theirs
+    gain       of minus twice the log of the evidence over the model without it
+    listed     what the known effects alone gain over the car without any, and ``with_law`` what the law and those
+               beside it gain
+    rivals     laws of other families that explain as well
+    nearest    the known effect that comes nearest in its place; None: none does anything
+    """
+
+    family: Family
+    draft: Draft
+    one: Chosen
+    beside: tuple[Chosen, ...]
+    gain: float
+    listed: float
+    with_law: float
+    rivals: tuple[LawFit, ...]
+    nearest: Nearest | None
+
+
+@dataclass(frozen=True, eq=False)
+class Learning:
+    """What came of it.
+
+    law             None: none is learned
+    look            at what the car does, which pictures of the law need
+    verdict         names of the known effects that are missing where no law is learned, the most certain first
+    listed_error    of the model with these, on what its fit did not see
+    unexplained     whether these leave something
+    diagnosis       of the known effects alone, in full; None where a law is learned
+    """
+
+    law: Law | None
+    look: Look
+    verdict: tuple[str, ...]
+    listed_error: float
+    unexplained: bool
+    diagnosis: Diagnosis | None
+
+
+def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
+          known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None,
+          workers: int = 2, effort: Effort | None = None) -> Learning:
+    """Learn a law, in so many threads.
+
+    effects     the known effects that are searched first, by name
+    known       all that there are, by name, with those that no search tries unasked: a law may nearly be one of them
+
+    ValueError where the vehicle lacks what an effect needs.
+    """
+    effort = effort or Effort()
+    few = replace(Usual(), effects=effort.listed)
+    search, selection = searched(posterior, effects, present, progress, workers, few)
+    chooser = _Chooser(search, selection, families, known, effort)
+    law = chooser.alone()
+    if law is None and is_left_over(selection.now) and len(selection.gains) == effort.listed:
+        search.effort = Usual()
+        selection = search.run(selection.before)
+        chooser = replace(chooser, selection=selection)
+    if law is None and is_left_over(selection.now):
+        law = chooser.beside()
+    look = Look(selection.before.posterior, selection.before.state)
+    diagnosis = judged(posterior, effects, present, search, selection) if law is None else None
+    verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
+    left = is_left_over(selection.now) if diagnosis is None else diagnosis.unexplained
+    return Learning(law, look, verdict, selection.now.hold_out.error, left, diagnosis)
+
+
+def is_left_over(model: Baseline) -> bool:
+    """Whether a model leaves more than the sensor's noise, or bends the car as far as its prior lets it."""
+    posterior, state = model.posterior, model.state
+    return (excess(posterior, state, FALSE_ALARM) > UNEXPLAINED) or posterior.prior.at_the_wall(state.logs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Chooser:
+    """The choice of a law, after the search among the known effects."""
+
+    search: Search
+    selection: Selection
+    families: Mapping[str, Family]
+    known: Mapping[str, Effect]
+    effort: Effort
+
+    def alone(self) -> Law | None:
+        """A law that explains all that is missing by itself, better than the known effects do; None where none does, or
+        nothing is missing."""
+        now, before = self.selection.now, self.selection.before
+        if now is before and not is_left_over(now):
+            return None
+        least = 0.0 if is_left_over(now) else DECISIVE
+        law, model = self._best(self._fitted_beside(before), now.score - least)
+        return None if model is None or is_left_over(model) else law
+
+    def beside(self) -> Law | None:
+        """A law beside known effects, or one that explains more than they do, though not all."""
+        now, before = self.selection.now, self.selection.before
+        names = now.state.names[self.search.present:]
+        bases = [before, now] if names else [before]
+        if len(names) == 2:  # one of them may only be there in the place of the law
+            bases += [self.search.without(now, name) for name in names]
+        return self._best([one for base in bases for one in self._fitted_beside(base)], now.score)[0]
+
+    def _best(self, fits: Sequence[LawFit], least: float) -> tuple[Law | None, Baseline | None]:
+        """The law with the most evidence, with its model; none where none scores less than ``least``."""
+        there = sorted((one for one in fits if one.score < least and self._is_there(one)), key=lambda one: one.score)
+        if not there:
+            return None, None
+        best = self._simplest(there)
+        self.search.progress(f"{best.family.title}: fitting the car with it")
+        model, gains = self.search.needed(self.selection.before, self.search.refit(best.fit))
+        if best.draft.name not in gains or model.score > least:
+            return None, None
+        one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
+        beside = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
+        rivals = tuple(_best_of_each(other for other in there if other.family is not best.family
+                                     and other.score < best.score + CONFUSED))
+        before, now = self.selection.before.score, self.selection.now.score
+        law = Law(best.family, best.draft, one, beside, gains[best.draft.name], before - now, before - model.score,
+                  rivals, self._nearest(model, best, gains[best.draft.name]))
+        return law, model
+
+    def _fitted_beside(self, base: Baseline) -> list[LawFit]:
+        """Laws fitted beside a model."""
+        search, effort = self.search, self.effort
+        look = Look(base.posterior, base.state)
+        drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(look)]
+        with ThreadPoolExecutor(search.workers) as pool:
+            promised = self._screened(pool, base, drafted)
+            # A family is narrowed by whichever of its laws promises most.
+            best = list(_firsts(promised))[: effort.worth_narrowing]
+            narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, look)]
+            promised = sorted([*promised, *self._screened(pool, base, narrower)],
+                              key=lambda each: -self._promise(base, each[2]))
+            enough = effort.worth_fitting * max(self._promise(base, promised[0][2]), 0.0) if promised else 0.0
+            worth = [each for each in promised[: effort.fitted] if self._promise(base, each[2]) > enough]
+            search.progress(f"fitting {len(worth)} laws")
+            rough = list(pool.map(lambda each: roughly_fitted(base.score, base, each[2])[0], worth))
+            found = sorted(zip(worth, rough, strict=True), key=lambda pair: -pair[1].gain)
+            near = [fit for _, fit in found[: effort.refined] if fit.gain > effort.worth_refining * found[0][1].gain]
+            search.progress(f"refining {len(near)} laws")
+            fine = list(pool.map(lambda fit: refined(
+                base.score, fit, search.effort.worth_a_round * base.explanation), near))
+        fits = [*fine, *(fit for _, fit in found[len(near):])]
+        return [LawFit(family, draft, base, fit)
+                for ((family, draft, _), _), fit in zip(found, fits, strict=True)]
+
+    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
+                  ) -> list[tuple[Family, Draft, Screened]]:
+        """Laws with what they promise beside a model, the most promising first."""
+        found = []
+        for done, ((family, draft), one) in enumerate(zip(drafted, pool.map(
+                lambda pair: screened_law(base, pair[1], self.search.seen), drafted), strict=True), 1):
+            self.search.progress(f"screened {done} of {len(drafted)} laws")
+            found.append((family, draft, one))
+        return sorted(found, key=lambda each: -self._promise(base, each[2]))
+
+    def _promise(self, base: Baseline, one: Screened) -> float:
+        """What a law may gain in evidence, its numbers counted."""
+        return one.gain - count_of(one) * float(np.log(base.posterior.freedom))
+
+    def _is_there(self, one: LawFit) -> bool:
+        """As an effect is there; and the error on what no fit saw does not rise with it."""
+        return (self.search.accepted(one.base, one.fit)
+                and not one.fit.hold_out.raises(one.base.hold_out))
+
+    def _simplest(self, there: Sequence[LawFit]) -> LawFit:
+        """Of laws that cannot be told from the likeliest, the one with the fewest other effects beside it, and then the
+        fewest numbers."""
+        near = [one for one in there if one.score < there[0].score + CONFUSED]
+        return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
+
+    def _nearest(self, model: Baseline, best: LawFit, law_gain: float) -> Nearest | None:
+        """The known effect that gains most in the place of the law, of those that its family may nearly be."""
+        without = self.search.without(model, best.draft.name)
+        names = [name for name in best.family.akin if name in self.known and name not in without.state.names]
+        self.search.progress(f"what known effect comes near {best.family.title}")
+        with ThreadPoolExecutor(self.search.workers) as pool:
+            tries = list(pool.map(lambda name: roughly_fitted(
+                without.score, without, screened(without, self.known[name], [self.search.seen]))[0], names))
+        if not tries:
+            return None
+        nearest = refined(without.score, max(tries, key=lambda one: one.gain))
+        if nearest.gain <= 0:
+            return None
+        return Nearest(nearest.chosen, nearest.gain, law_gain)
+
+
+def _firsts(promised: Sequence[tuple[Family, Draft, Screened]]) -> list[tuple[Family, Draft, Screened]]:
+    """The most promising law of each family."""
+    found: dict[str, tuple[Family, Draft, Screened]] = {}
+    for each in promised:
+        found.setdefault(each[0].name, each)
+    return list(found.values())
+
+
+def _best_of_each(fits: Iterable[LawFit]) -> list[LawFit]:
+    """Of every family the law that is best, best first."""
+    found: dict[str, LawFit] = {}
+    for one in fits:
+        found.setdefault(one.family.name, one)
+    return list(found.values())
