@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.model_checks import check_model, predicted
+from logger.api.model_checks import check_model, check_moves, predicted
 from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from logger.lab.diagnosis import Diagnosis
     from logger.lab.likelihood.posterior import Posterior
     from logger.lab.selection.add_effect import AddedEffects
-    from logger.runs import Array
+    from logger.runs import Array, Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
@@ -103,7 +103,7 @@ class Bench:
         from logger.lab.compare import compare
         from logger.lab.likelihood.priors import Tolerance
 
-        with self._blamed():
+        with self.blamed():
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
                            Tolerance(numbers=self.numbers))
 
@@ -112,7 +112,7 @@ class Bench:
         from logger.lab.diagnosis import diagnose
 
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
-        with self._blamed():
+        with self.blamed():
             return diagnose(self.posterior(searches=True), effects, self.model.effects, tell)
 
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
@@ -153,7 +153,7 @@ class Bench:
 
         if set(values) >= {one.name for one in effect.parameters}:
             return chosen(effect, values)
-        with self._blamed():
+        with self.blamed():
             posterior = self.posterior(searches=True)
             tell("refitting the car's own numbers")
             nominal = posterior.start(self.model.effects)
@@ -171,7 +171,7 @@ class Bench:
         from logger.lab.selection.add_effect import add
 
         tell(f"fitting the car without and with {start.effect.name}")
-        with self._blamed():
+        with self.blamed():
             return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 
     def model_with(self, found: AddedEffects) -> Model:
@@ -191,7 +191,7 @@ class Bench:
                      self.model.given or self.model.vehicle, found.errors)
 
     @contextmanager
-    def _blamed(self) -> Iterator[None]:
+    def blamed(self) -> Iterator[None]:
         """What is wrong with the vehicle names it."""
         try:
             yield
@@ -220,6 +220,19 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     predictions = check_model(word, model, runs, warn, anyway)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
+
+
+def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str], numbers: float) -> Bench:
+    """The model on drives that nobody has driven yet, without readings. Arguments and BadInput as ``bench_of``, and for
+    a road that moves no car."""
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    effects, files = known_effects(model, effect_files)
+    require_compiler("plan", effects.values())
+    found = Bench(word, model, SimulatedRuns(drives), effects, files, numbers)
+    check_moves(word, model, found.runs)
+    _try_own(found, effect_files)
+    return found
 
 
 def deviation_of(tolerance: float) -> float:

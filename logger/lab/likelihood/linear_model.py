@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.signals import JointWhitener
+from logger.lab.likelihood.whittle import Whitener
 from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
@@ -64,20 +66,24 @@ class LinearModel:
     numbers      slopes by the car's numbers (p, n) per run, taken near the state; None: these stay where they are
     size         of the distance errors, by evidence
     whiteners    by the levels under the state's residuals
+    expected     whiteners by levels that are expected; the size is the state's then: nothing was measured yet
     """
 
-    def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
+    def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None,
+                 expected: Sequence[Whitener | JointWhitener] | None = None) -> None:
         self.posterior, self.prior = posterior, posterior.prior
         residuals = posterior.residuals(state)
         self._predictions = state.predictions
-        self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
+        self.whiteners: list[Whitener | JointWhitener] = [
+            one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)
+        ] if expected is None else list(expected)
         self._records = []
         for error, whitener, readings, prediction, residual, here in zip(
                 posterior.record_errors, self.whiteners, posterior.readings, state.predictions, residuals, state.record,
                 strict=True):
             white = whitener(readings.without_deaf(error.slopes(prediction), prediction))
             self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
-        self.size = self._likeliest_size(state.size)
+        self.size = self._likeliest_size(state.size) if expected is None else state.size
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
         self._precisions = [one.error.precision(self.size) for one in self._records]
         self._roots = [one.root(self.size) for one in self._records]

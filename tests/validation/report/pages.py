@@ -82,8 +82,8 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("Goals", [], _goals(records)),
         Part("By strength", [
             "Strength is the r.m.s. of what the effect changes in the noise-free record over the r.m.s. of the noise, "
-            "with all other numbers true; of several effects, that of the weakest. *Can be seen* leaves out the cases of "
-            "the section *What nobody could see*."], _by_strength(records)),
+            "with all other numbers true; of several effects, that of the weakest. *Can be seen* leaves out the cases "
+            "of the section *What nobody could see*."], _by_strength(records)),
         Part("After adding", _adding(records)),
         Part("Time and memory", _cost(records)),
         Part("Wrong verdicts", ["What these cases hid and what was said. An effect that is akin to one off the list is "
