@@ -115,8 +115,10 @@ class PlannedDrives:
     step_mps2: float = 0.0
 
 
-def planned(word: str, model: vehicle_file.Model, bench: Bench | None, asked: PlannedDrives, effect_files: Sequence[str],
-            numbers: float, candidates: Collection[str] | None = None, tell: Tell = unsaid) -> plan_results.Plan:
+def planned(
+    word: str, model: vehicle_file.Model, bench: Bench | None, asked: PlannedDrives, effect_files: Sequence[str],
+    numbers: float, candidates: Collection[str] | None = None, tell: Tell = unsaid,
+) -> plan_results.Plan:
     """What the lab says. Arguments as of ``bench_of``; ``bench``: of the runs that there are. BadInput as ``plan``."""
     from logger.lab.likelihood.priors import Tolerance
     from logger.lab.planning.plan import plan as planned_by_lab

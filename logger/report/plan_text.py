@@ -13,6 +13,7 @@ from logger.report.text_layout import columns, paragraphs
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
 HEADS = ("Effect", "Stands out by", "Told apart by", "Most like", "")
+GAIN_HINT = "Effects more: how many more could be named, by what is expected."
 SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
                "gyroscope to 0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
@@ -46,8 +47,8 @@ def rows(found: Plan) -> list[tuple[str, str, str, str, str]]:
     for index in sorted(range(len(found.names)), key=lambda one: -found.now.alone[one]):
         alone, told = float(found.now.alone[index]), float(found.now.told[index])
         near = int(found.now.nearest[index])
-        made.append((found.names[index], _number(alone), _number(told), found.names[near] if near != index else "",
-                     _judged(alone, told)))
+        like = found.names[near] if near != index and alone >= DETECTABLE_SIGMA else ""
+        made.append((found.names[index], number(alone), number(told), like, _judged(alone, told)))
     return made
 
 
@@ -57,15 +58,16 @@ def _judged(alone: float, told: float) -> str:
     return "can be named" if told >= TOLD_SIGMA else "cannot be told apart"
 
 
-def _number(deviations: float) -> str:
+def number(deviations: float) -> str:
+    """Of standard deviations."""
     return f"{deviations:.1f}" if deviations < 100 else f"{deviations:.0f}"
 
 
 def meaning() -> str:
     """What the numbers are."""
     return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {TOLD_SIGMA:.1f} remain when that one "
-            "is fitted in its place.")
+            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {TOLD_SIGMA:.1f} remain when "
+            "that one is fitted in its place.")
 
 
 def plan_lines(found: Plan) -> list[str]:
@@ -101,7 +103,7 @@ def next_words(one: NextDrive) -> str:
         return f"{do_words(one.option)}: adds next to nothing."
     shown = _most(one.gains)
     more = len(one.gains) - len(shown)
-    gains = ", ".join(f"{name} by {_number(each)}" for name, each in shown.items())
+    gains = ", ".join(f"{name} by {number(each)}" for name, each in shown.items())
     count = f"{one.more_named:.1f} effects more could be named" if one.more_named >= 0.05 else "no more can be named"
     return f"{do_words(one.option)}: {count}. Told apart better: {gains}{f' and {more} more' if more else ''}."
 
