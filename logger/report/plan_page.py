@@ -9,7 +9,7 @@ from logger.lab.planning.plan import Plan
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.heat_map import heat_map
-from logger.report.html import Html
+from logger.report.html import EMPTY, Html
 from logger.report.plan_text import GAIN_HINT, HEADS, SENSOR_HINT, do_words, meaning, number, rows, summary
 
 _FULL = 100.0  # deviations that are drawn as dark as any
@@ -28,7 +28,7 @@ def page(found: Plan, vehicle: str) -> Html:
         paragraphs(summary(found)),
         section("What remains of one effect beside another", figure(found) + hint(meaning())),
         section("Each effect", grid(HEADS, rows(found), words=(0, 3, 4))),
-        section("What a next drive would add", _next(found) + hint(f"{GAIN_HINT} {SENSOR_HINT}") if found.next else Html()),
+        section("What a next drive would add", _next(found)),
         section("Where this is from", bullets([
             "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected "
             "to be found, from one data set without noise."])),
@@ -45,7 +45,11 @@ def figure(found: Plan) -> Html:
 
 
 def _next(found: Plan) -> Html:
-    return grid(("Drive", "Effects more", "Told apart better, in standard deviations"), [
+    """Nothing where there is none."""
+    if not found.next:
+        return EMPTY
+    drawn = grid(("Drive", "Effects more", "Told apart better, in standard deviations"), [
         (do_words(one.option), f"{one.more_named:.1f}",
          ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
         words=(0, 2))
+    return drawn + hint(f"{GAIN_HINT} {SENSOR_HINT}")

@@ -101,7 +101,8 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
 
 
 def drives(name: str, noise_mps2: float, road: Road, seed: int = 1) -> list[ridelog.Run]:
-    """What would be recorded of a car with an effect at its usual strength, by a recorder whose distance errs as a good one's does."""
+    """What would be recorded of a car with an effect at its usual strength, by a recorder whose distance errs as a
+    good one's does."""
     rng = np.random.default_rng([seed, len(name)])
     car = simulated_car()
     plans = tuple(Drive(road, (LENGTH_M + car.wheelbase_m) / speed + 1.0, speed, 0.0) for speed in SPEEDS_MPS)
