@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ import ridelog
 from logger.api.bench import among
 from logger.api.lab import bench_with
 from logger.api.ranges import USUAL_TOLERANCE
+from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -92,11 +93,13 @@ def planned(road: Road, noise_mps2: float, candidates: tuple[str, ...] | None = 
 
 
 def deviations(name: str, runs: list[ridelog.Run]) -> float:
-    """The root of what the diagnosis of one effect gains, its numbers not counted."""
+    """The root of what the diagnosis of one effect gains, its numbers not counted, in a car that may bend as far as the
+    runs ask, as it ends in: a search holds the car's numbers at two deviations, and gains more where an effect would
+    bend them farther."""
     bench = bench_with(VEHICLE, runs, (), USUAL_TOLERANCE)
-    one = replace(bench, effects=among(bench.effects, [name])).diagnosed().candidate(name)
-    numbers = len(moves_of([chosen(one.effect, one.values)]))
-    gain = one.gain + numbers * float(np.log(bench.posterior(searches=True).freedom))
+    posterior = bench.posterior(searches=True).without_wall()
+    one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
+    gain = one.gain + len(moves_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
     return float(np.sqrt(max(gain, 0.0)))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -49,7 +50,7 @@ def test_for_a_program_and_as_a_page(road: Path, tmp_path: Path, capsys: pytest.
     assert told["noise_mps2"] == 0.05 and not told["noise_measured"]
     assert [one["drive"] for one in told["drives"]] == [f"{road} at 8 m/s", f"{road} at 12 m/s"]
     more = [one["more_named"] for one in told["next"]]
-    assert all(round(a, 1) >= round(b, 1) for a, b in zip(more, more[1:], strict=False))
+    assert all(round(a, 1) >= round(b, 1) for a, b in pairwise(more))
     assert min(more) > -0.01 and all(gain > 1 for one in told["next"] for gain in one["gains"].values())
     assert any("pitch gyroscope" in one["do"] for one in told["next"])
     html = page.read_text("utf-8")
@@ -63,7 +64,8 @@ def test_in_words_a_louder_sensor_names_less(road: Path, capsys: pytest.CaptureF
     assert plan(*drive, "--noise", 2, "--step", 1) == 0
     loud = capsys.readouterr().out
     assert "can be named" in quiet and "Next, the drive that adds most first:" in quiet
-    assert "would name 0" in loud and "noise 2.02 m/s2" in loud  # a step of 1 adds a twelfth of its square
+    assert "noise 2.02 m/s2" in loud  # a step of 1 adds a twelfth of its square
+    assert loud.count("can be named") < quiet.count("can be named")
 
 
 def test_runs_that_were_driven_bring_their_own_noise_and_effects(road: Path, tmp_path: Path) -> None:

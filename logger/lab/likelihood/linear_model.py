@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -139,10 +139,23 @@ class LinearModel:
         """Minus twice the log of the model's evidence at its state, without its constant: Laplace's approximation for
         the record's errors, G. Schwarz's (Annals of Statistics 6, 1978) for the numbers of effects."""
         posterior, state = self.posterior, self.state
-        occam = sum(_log_determinant(root) - one.error.log_determinant(self.size)
-                    for root, one in zip(self._roots, self._records, strict=True))
-        return (posterior.deviance(state) + posterior.cost(state) + occam
+        return (posterior.deviance(state) + posterior.cost(state) + self.occam
                 + len(moves_of(state.effects)) * float(np.log(posterior.freedom)))
+
+    @property
+    def occam(self) -> float:
+        """What the freedom of the record's errors costs in minus twice the log of the evidence."""
+        return sum(_log_determinant(root) - one.error.log_determinant(self.size)
+                   for root, one in zip(self._roots, self._records, strict=True))
+
+    def of_size(self, size: ErrorSize) -> LinearModel:
+        """The same with distance errors of another size."""
+        found = copy(self)
+        found.size, found.state = size, replace(self.state, size=size)
+        found._precisions = [one.error.precision(size) for one in self._records]
+        found._roots = [one.root(size) for one in self._records]
+        found._taken = found.taken(found.white)
+        return found
 
     def taken(self, white: Sequence[Array]) -> list[Array]:
         """What the record's errors take of whitened columns (m, kept) per run: (k, m), to be multiplied with each

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.lab.likelihood.distance_error import USUAL
+from logger.lab.planning.planned_drive import SIZES, Information, larger
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, usual_says_little
 from logger.lab.selection.evidence import CONFUSED
 from logger.vehicle.effect import Chosen, Effect, chosen
@@ -91,14 +93,15 @@ class Outlook:
         return np.minimum(ndtr(self.alone - DETECTABLE_SIGMA), ndtr(self.told - TOLD_SIGMA))
 
 
-def spoken_for(settings: Settings, products: Array, precision: Array) -> Indices:
+def spoken_for(settings: Settings, told: Information, precision: Array) -> Indices:
     """Which column (e,) stands for each effect: its usual values or, where these say little, those by which it stands
     out most.
 
-    products     (p + m, p + m) as of ``planned_drive.products``
+    told         what some drives tell
     precision    (p,) of the prior of the car's numbers
     """
-    alone = np.sqrt(np.maximum(np.diag(_marginal(products, precision)), 0.0))
+    marginal, costs = _marginal(told, precision)
+    alone = np.sqrt(np.maximum((np.einsum("sii->si", marginal) + costs[:, None]).min(axis=0), 0.0))
     found = settings.first.copy()
     for index, effect in enumerate(settings.effects):
         if usual_says_little(effect, float(alone[found[index]])):
@@ -106,19 +109,24 @@ def spoken_for(settings: Settings, products: Array, precision: Array) -> Indices
     return found
 
 
-def outlook(settings: Settings, products: Array, precision: Array, spoken: Indices) -> Outlook:
-    """What drives with these products could show; arguments as of ``spoken_for``, whose result is ``spoken``."""
-    marginal = _marginal(products, precision)
-    own = np.maximum(np.diag(marginal), 0.0)
-    explained = marginal[spoken] ** 2 / np.maximum(own, _TINY)
-    most = np.maximum.reduceat(explained, settings.first, axis=1)
-    np.fill_diagonal(most, 0.0)
-    return Outlook(np.sqrt(own[spoken]), np.sqrt(np.maximum(own[spoken][:, None] - most, 0.0)))
+def outlook(settings: Settings, told: Information, precision: Array, spoken: Indices) -> Outlook:
+    """What drives that tell so much could show; arguments as of ``spoken_for``, whose result is ``spoken``."""
+    marginal, costs = _marginal(told, precision)
+    own = np.maximum(np.einsum("sii->si", marginal), 0.0)
+    explained = marginal[:, spoken] ** 2 / np.maximum(own, _TINY)[:, None]
+    most = np.maximum.reduceat(explained, settings.first, axis=2)
+    np.einsum("sii->si", most)[:] = 0.0
+    beside = (own[:, spoken, None] - most + costs[:, None, None]).min(axis=0)
+    found = np.sqrt(np.maximum(beside, 0.0))
+    return Outlook(np.diag(found).copy(), found)
 
 
-def _marginal(products: Array, precision: Array) -> Array:
-    """Of the effects' columns (m, m), the car's numbers integrated out."""
+def _marginal(told: Information, precision: Array) -> tuple[Array, Array]:
+    """Of the effects' columns (s, m, m), the car's numbers integrated out, and what errors of each size cost more than
+    those that are expected (s,)."""
     count = len(precision)
-    mixed = products[:count, count:]
-    known = products[:count, :count] + np.diag(precision)
-    return np.asarray(products[count:, count:] - mixed.T @ np.linalg.solve(known, mixed))
+    mixed = told.products[:, :count, count:]
+    known = told.products[:, :count, :count] + np.diag(precision)
+    found = told.products[:, count:, count:] - mixed.transpose(0, 2, 1) @ np.linalg.solve(known, mixed)
+    costs = told.costs + [larger(USUAL, size).cost for size in SIZES[: len(told.costs)]]
+    return np.asarray(found), np.asarray(costs - costs[0])

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
+from operator import add
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ from logger.lab.likelihood.noise_floor import noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
 from logger.lab.planning.outlook import TOLD_SIGMA, Outlook, Settings, outlook, spoken_for
-from logger.lab.planning.planned_drive import CarThere, PlannedDrive, SensorNoise, products
+from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, information
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -111,13 +112,14 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
         asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
-        total = asked.nothing()
+        told: list[Information] = []
         if fitted is not None:
             progress("what the runs show")
-            total += asked.of_runs(fitted)
+            told.append(asked.of_runs(fitted))
         for number, drive in enumerate(drives, 1):
             progress(f"what planned drive {number} of {len(drives)} would show")
-            total += drive.products(asked.changes(drive), range(len(drive.run.signals)))
+            told.append(drive.information(asked.changes(drive), ()))
+        total = reduce(add, told)
         spoken = spoken_for(settings, total, asked.precision)
         now = outlook(settings, total, asked.precision, spoken)
         following: list[NextDrive] = []
@@ -125,7 +127,7 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
             progress(f"what a next drive would add: {number} tried")
             changes = asked.changes(one.drive)
             for option, signals in one.options:
-                after = total + one.drive.products(changes, signals)
+                after = total + one.drive.information(changes, signals)
                 following.append(_next(option, settings, now, outlook(settings, after, asked.precision, spoken)))
     return Plan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
@@ -141,22 +143,18 @@ class _Asked:
     precision: Array
     pool: ThreadPoolExecutor
 
-    def nothing(self) -> Array:
-        """What no drive shows (p + m, p + m)."""
-        return np.zeros((len(self.precision) + len(self.settings.columns),) * 2)
-
     def changes(self, drive: PlannedDrive) -> Array:
         """What the effects do to a planned record (m, (1 + s) n)."""
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
-    def of_runs(self, fitted: LinearModel) -> Array:
-        """Products of runs beside a fitted model."""
+    def of_runs(self, fitted: LinearModel) -> Information:
+        """What runs tell beside a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
         here = predict(state.effects)
         there = self.pool.map(lambda one: predict((*state.effects, one)), self.settings.columns)
         changes = [[new - old for new, old in zip(one, here, strict=True)] for one in there]
-        return products(fitted, [np.array(some) for some in zip(*changes, strict=True)])
+        return information(fitted, [np.array(some) for some in zip(*changes, strict=True)])
 
 
 def _next(option: Option, settings: Settings, now: Outlook, then: Outlook) -> NextDrive:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import USUAL
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
@@ -37,6 +37,11 @@ SEARCH_HZ = 500.0
 SIGNAL_NOISE = {"travel": 0.0005, "pitch_rate": 0.001, "roll_rate": 0.001}
 """R.m.s. noise of a second sensor that is no accelerometer: a string or rotary potentiometer of 0.25 m with a linearity
 of 0.2 %; a MEMS gyroscope's 0.05 deg/s (InvenSense, MPU-6000 product specification, 6.1) [m, rad/s]."""
+
+SIZES = ((1.0, 1.0, 1.0), (4.0, 1.0, 1.0), (16.0, 1.0, 1.0), (64.0, 1.0, 1.0), (1.0, 4.0, 1.0), (1.0, 16.0, 1.0),
+         (1.0, 1.0, 6.0), (1.0, 1.0, 36.0))
+"""Distance errors as many times as large as expected (start, walk, factor) that a fit may find likeliest instead, up to
+those that a delay of some hundredths of a second or a wheel radius that is wrong by a per cent looks like."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +143,8 @@ class PlannedDrive:
         """The greatest acceleration that the sensor feels."""
         return float(np.abs(self.run.measured_mps2).max())
 
-    def products(self, changes: Array, signals: Sequence[int]) -> Array:
-        """``products`` of effects' changes (m, (1 + s) n), recorded by the sensor and some of the signals alone."""
+    def information(self, changes: Array, signals: Sequence[int]) -> Information:
+        """Of effects' changes (m, (1 + s) n), recorded by the sensor and some of the signals alone."""
         run, kept = self.run, [0, *(1 + one for one in signals)]
         chosen_signals = tuple(run.signals[one] for one in signals)
         fewer = replace(run, facts=replace(run.facts, signals=chosen_signals), more=run.more[list(signals)])
@@ -152,7 +157,7 @@ class PlannedDrive:
         expected = [self._whitener(fewer, one) for one in posterior.bands]
         linear = LinearModel(posterior, self._state_of(posterior, of_kept(self._here)), [of_kept(self.numbers)],
                              expected)
-        return products(linear, [of_kept(changes)])
+        return information(linear, [of_kept(changes)])
 
     def _whitener(self, run: Run, bands: Bands | JointBands) -> Whitener | JointWhitener:
         """By the noise to come."""
@@ -162,11 +167,37 @@ class PlannedDrive:
         return JointWhitener(found) if isinstance(bands, JointBands) else found[0]
 
 
-def products(linear: LinearModel, changes: Sequence[Array]) -> Array:
-    """Products (p + m, p + m) of whitened slopes by the car's numbers and of effects' changes (m, n) per run, what the
-    records' errors can do taken out of both, no prior of the numbers in them: those of several drives add up."""
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What drives tell; that of several adds up. Whitened slopes by the car's numbers and effects' changes, what the
+    records' errors can do taken out of both, no prior of the numbers in it, for each of ``SIZES`` of these errors: an
+    effect that moves runs is taken for larger errors, if these are likely enough.
+
+    products    (s, p + m, p + m)
+    costs       (s,) of so large errors, in minus twice the log of the evidence, without the prior of the size
+    """
+
+    products: Array
+    costs: Array
+
+    def __add__(self, other: Information) -> Information:
+        return Information(self.products + other.products, self.costs + other.costs)
+
+
+def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
+    """Of a model beside its state, by effects' changes (m, n) per run."""
     free = linear.without_wall()
-    logs = free.state.logs
-    found = free.information(logs, free.whitened(changes))
-    found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
-    return found
+    logs, white = free.state.logs, free.whitened(changes)
+    each, costs = [], []
+    for size in SIZES:
+        there = free.of_size(larger(free.size, size))
+        found = there.information(logs, white)
+        found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
+        each.append(found)
+        costs.append(there.occam)
+    return Information(np.array(each), np.array(costs))
+
+
+def larger(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
+    """Start, walk and factor so many times as far off."""
+    return ErrorSize(size.start_m * factors[0], size.walk_m * factors[1], size.scale * factors[2])

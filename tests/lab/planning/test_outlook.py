@@ -7,7 +7,7 @@ import pytest
 
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.planning.outlook import Settings, outlook, spoken_for
-from logger.lab.planning.planned_drive import CarThere, PlannedDrive, SensorNoise, at_speed
+from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, at_speed
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.runs import Array
@@ -34,8 +34,9 @@ def test_what_remains_is_what_least_squares_leave() -> None:
     deviations = np.array([0.1, 0.3, 1.0, 3.0])
     every = np.vstack([numbers, changes])
     precision = deviations**-2.0
-    spoken = spoken_for(settings, every @ every.T, precision)
-    found = outlook(settings, every @ every.T, precision, spoken)
+    told = Information((every @ every.T)[None], np.zeros(1))
+    spoken = spoken_for(settings, told, precision)
+    found = outlook(settings, told, precision, spoken)
     assert list(spoken) == list(settings.first)
     for row, column in enumerate(spoken):
         alone = left_by(numbers, deviations, changes[column])
@@ -48,7 +49,7 @@ def test_what_remains_is_what_least_squares_leave() -> None:
 
 def test_an_effect_is_as_likely_named_as_not_where_it_just_stands_out() -> None:
     settings = Settings.of([shipped_effects()["wheel_lift"]])
-    found = outlook(settings, np.diag([1.0, 36.0]), np.array([1.0]), settings.first)
+    found = outlook(settings, Information(np.diag([1.0, 36.0])[None], np.zeros(1)), np.array([1.0]), settings.first)
     assert found.chances[0] == pytest.approx(0.5)
 
 
@@ -63,7 +64,7 @@ def planned(noise_mps2: float, speed_mps: float = 12.0) -> PlannedDrive:
 def of_drive(drive: PlannedDrive, settings: Settings) -> Array:
     changes = np.array([drive.change(one) for one in settings.columns])
     precision = drive.posterior.prior.without_wall().curvature(np.zeros(13))
-    total = drive.products(changes, ())
+    total = drive.information(changes, ())
     return outlook(settings, total, precision, spoken_for(settings, total, precision)).alone
 
 
