@@ -85,7 +85,7 @@ def plan(
     than 5 s.
 
     >>> found = plan(car, profile=runs[0].profile, speeds_mps=[9.0], candidates=["sensor_gain", "sensor_offset"])
-    >>> found.detectability["sensor_offset"] > 6 > found.detectability["sensor_gain"]
+    >>> found.isolability["sensor_offset"]["sensor_gain"] > 6
     True
     >>> found.next[0].more_named > 0
     True
