@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from logger.api.model_checks import check_model, predicted
+from logger.api.model_checks import check_model, check_moves, predicted
 from logger.api.ranges import TOLERANCE
 from logger.errors import BadInput
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from logger.lab.diagnosis import Diagnosis
     from logger.lab.likelihood.posterior import Posterior
     from logger.lab.selection.add_effect import AddedEffects
-    from logger.runs import Array
+    from logger.runs import Array, Run
     from logger.simulation.simulated_runs import SimulatedRuns
     from logger.store.formats.vehicle_file import Model
     from logger.vehicle.effect import Chosen, Effect
@@ -220,6 +220,19 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
     predictions = check_model(word, model, runs, warn, anyway)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
+
+
+def planned_bench(word: str, model: Model, drives: Sequence[Run], effect_files: Sequence[str], numbers: float) -> Bench:
+    """The model on drives that nobody has driven yet, without readings. Arguments and BadInput as ``bench_of``, and for
+    a road that moves no car."""
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    effects, files = known_effects(model, effect_files)
+    require_compiler("plan", effects.values())
+    found = Bench(word, model, SimulatedRuns(drives), effects, files, numbers)
+    check_moves(word, model, found.runs)
+    _try_own(found, effect_files)
+    return found
 
 
 def deviation_of(tolerance: float) -> float:

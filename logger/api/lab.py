@@ -280,9 +280,13 @@ def bench_with(
 ) -> Bench:
     """All that a question needs, checked together."""
     numbers, model = deviation_of(tolerance), model_of(vehicle)
-    drives = [_on_a_road(one) for one in given_runs(runs)]
-    return bench_of(word_of(vehicle, model), model, checked_runs(drives, thin, model.vehicle),
+    return bench_of(word_of(vehicle, model), model, checked_runs(lab_drives(runs), thin, model.vehicle),
                     list(map(str, effect_files)), numbers, searches, low_pass_hz=low_pass_hz, anyway=anyway)
+
+
+def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:
+    """One run or several, read, with their roads. BadInput as ``given_runs``, and for one without a road."""
+    return [_on_a_road(one) for one in given_runs(runs)]
 
 
 def word_of(vehicle: Model | Path | str, model: Model) -> str:

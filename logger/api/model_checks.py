@@ -44,6 +44,17 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
     """
     from logger.vehicle.compose import compose
 
+    predictions = check_moves(word, model, runs)
+    car = compose(model.vehicle, model.effects)
+    matches, band_hz = _matches(runs, predictions, car)
+    _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
+         warn, anyway)
+    return predictions
+
+
+def check_moves(word: str, model: Model, runs: SimulatedRuns) -> list[Array]:
+    """What the model predicts (n,) per run, whatever was measured. Raises BadInput where an effect of the model cannot
+    be on one of the runs, the model's motion grows without bound, or the road moves no car."""
     for run in runs.runs:
         for one in model.effects:
             why = one.effect.obstacle_on(model.vehicle, run.two_tracks, run.timed)
@@ -54,10 +65,6 @@ def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[st
         raise BadInput(f"{runs.runs[0].name}: expected " + (
             "an excitation that moves the car; it is flat while the record lasts" if runs.runs[0].timed else
             "a drive over a road that moves the car; where it was the profile is flat, or it stood still"))
-    car = compose(model.vehicle, model.effects)
-    matches, band_hz = _matches(runs, predictions, car)
-    _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
-         warn, anyway)
     return predictions
 
 

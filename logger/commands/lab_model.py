@@ -19,8 +19,14 @@ if TYPE_CHECKING:
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
-    """Those of ``add_model_and_runs``, and --effect-file."""
-    add_model_and_runs(parser)
+    """RUN... and ``add_lab_options``."""
+    _add_runs(parser)
+    add_lab_options(parser)
+
+
+def add_lab_options(parser: argparse.ArgumentParser) -> None:
+    """Those of ``add_model_and_runs``, but for RUN..., and --effect-file."""
+    _add_options(parser)
     parser.add_argument("--effect-file", action="append", default=[], metavar="FILE.py",
                         help="an effect of your own to be tried as well, or hysteresis or frame_friction, which are "
                              "tried only where they are named; may repeat")
@@ -28,8 +34,16 @@ def add_bench_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_model_and_runs(parser: argparse.ArgumentParser) -> None:
     """RUN..., --vehicle, --tolerance, --low-pass, --anyway and --json."""
+    _add_runs(parser)
+    _add_options(parser)
+
+
+def _add_runs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN",
                         help="folder with drive.csv and profile.csv, or of a rig excitation.csv")
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", required=True, metavar="NAME|FILE",
                         help="a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name)")
     _add_tolerance(parser)

@@ -40,6 +40,7 @@ VERBS = {
     "diagnose": "which physical effect a model lacks, how certain that is, and what else it could be",
     "add-effect": "add a physical effect to a vehicle: its numbers, the error before and after, what it changed",
     "learn": "a law out of the data, where no known effect explains what a model lacks",
+    "plan": "before anybody drives: which effects drives could show and tell apart, and which drive adds most",
     "lab": "compare, diagnose, add, compare again, until nothing is missing; writes the story as a page",
     "study": "a table or figure of the reference dissertation beside its printed values",
     "modes": "natural frequencies, damping ratios and mode shapes of a vibration record",

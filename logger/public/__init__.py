@@ -20,6 +20,7 @@ from logger.api.lab_loop import LabStory, lab
 from logger.api.learning import LearnedLaw, learn
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.modal import Channels, Modes, make_channels, modes, read_channels
+from logger.api.plan import NextDrive, Plan, plan
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
 from logger.api.same_road import SameRoadDiagnosis, diagnose_same_road
@@ -49,7 +50,9 @@ __all__ = [
     "Log",
     "Model",
     "Modes",
+    "NextDrive",
     "NotIdentifiable",
+    "Plan",
     "Profile",
     "Record",
     "RoadClass",
@@ -76,6 +79,7 @@ __all__ = [
     "make_channels",
     "make_run",
     "modes",
+    "plan",
     "random_road",
     "read_channels",
     "read_dump",

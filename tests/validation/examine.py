@@ -28,7 +28,7 @@ from .marking.sitting import Question, Record, sit
 from .report.pages import Matrix, markdown, page
 
 ROOT = Path(__file__).resolve().parents[2]
-COUNTS = {"none": 40, "one": 100, "two": 40, "outsider": 39, "two_outsider": 0, "wandering": 38}
+COUNTS = {"none": 40, "one": 100, "two": 40, "three": 40, "outsider": 39, "two_outsider": 0, "wandering": 38}
 """Five of each effect of the list, three of each off it; two of each that distances that wander do not imitate."""
 
 

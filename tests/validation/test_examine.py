@@ -85,7 +85,7 @@ def answer(kind: str, seed: int, there: dict[str, dict[str, float]], named: dict
     }
 
 
-RUB, GAIN = {"friction_force_n": 50.0}, {"gain": 1.1}
+RUB, GAIN, LOAD = {"friction_force_n": 50.0}, {"gain": 1.1}, {"mass_kg": 90.0}
 
 
 def test_an_effect_counts_where_it_stands_first_or_is_named_beside_the_first() -> None:
@@ -149,10 +149,10 @@ def test_seeds_of_a_release_are_asked_for_by_name() -> None:
 
 
 def test_the_report_says_which_seeds_were_asked() -> None:
-    assert "development seeds 1 to 11: the lab may have been tuned to them" in markdown(RECORDS, 11, "m.svg")
+    assert "development seeds 1 to 13: the lab may have been tuned to them" in markdown(RECORDS, 11, "m.svg")
     kept_back = [record | {"seed": RELEASE_SEEDS[0] + record["seed"]} for record in RECORDS]
     text = markdown(kept_back, 11, "m.svg")
-    assert "release seeds 7001 to 7011: no run of the lab's development has used them" in text
+    assert "release seeds 7001 to 7013: no run of the lab's development has used them" in text
     assert "examine --release" in text
 
 
@@ -168,6 +168,9 @@ RECORDS = [
     answer("one", 3, {"dry_friction": RUB}, {"dry_friction": RUB}, error=0.105),
     answer("one", 4, {"dry_friction": RUB}, {"payload": {"mass_kg": 9.0}}, strength=0.1),
     answer("two", 5, {"dry_friction": RUB, "sensor_gain": GAIN}, {"dry_friction": RUB, "sensor_gain": GAIN}, error=0.2),
+    answer("three", 12, {"dry_friction": RUB, "sensor_gain": GAIN, "payload": LOAD},
+           {"dry_friction": RUB, "sensor_gain": GAIN, "payload": LOAD}),
+    answer("three", 13, {"dry_friction": RUB, "sensor_gain": GAIN, "payload": LOAD}, {"payload": LOAD}, strength=0.1),
     answer("outsider", 6, {"bushing_hysteresis": {}}, {"dry_friction": RUB}, unexplained=True),
     answer("outsider", 7, {"trailer": {}}, {"dry_friction": RUB}),
     answer("one", 8, {"sensor_gain": GAIN}, {}) | {"said": None, "added": None, "failed": "diagnose ended with 2"},
@@ -178,13 +181,13 @@ RECORDS = [
 
 def test_goals_are_counted_over_the_cases_that_they_ask() -> None:
     found = [(goal.found.count, goal.found.of, goal.met) for goal in goals(RECORDS)]
-    assert found == [(1, 3, False), (1, 2, False), (1, 1, True), (1, 2, False), (0, 6, True), (2, 3, False),
-                     (1, 2, False), (2, 2, True), (1, 2, False), (1, 4, False)]
+    assert found == [(1, 3, False), (1, 2, False), (1, 1, True), (1, 1, True), (1, 2, False), (0, 8, True),
+                     (2, 3, False), (1, 2, False), (2, 2, True), (1, 2, False), (1, 4, False)]
 
 
 def test_the_report_says_what_the_records_hold() -> None:
-    text = markdown(RECORDS, 12, "m.svg")
-    assert "11 of 12 cases sat" in text
+    text = markdown(RECORDS, 14, "m.svg")
+    assert "13 of 14 cases sat" in text
     assert re.search(r"\| wandering \| 11 \| dry_friction \(5\) \| dry_friction, unexplained \|  \|", text)
     assert re.search(r"\| one \| 4 \| dry_friction \(0.1\) \| payload \| nobody could see it \|", text)
     assert re.search(r"\| outsider \| 7 \| trailer \(5\) \| dry_friction \| akin \|", text)

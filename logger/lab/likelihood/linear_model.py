@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.signals import JointWhitener
+from logger.lab.likelihood.whittle import Whitener
 from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
@@ -64,20 +66,24 @@ class LinearModel:
     numbers      slopes by the car's numbers (p, n) per run, taken near the state; None: these stay where they are
     size         of the distance errors, by evidence
     whiteners    by the levels under the state's residuals
+    expected     whiteners by levels that are expected; the size is the state's then: nothing was measured yet
     """
 
-    def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None) -> None:
+    def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None,
+                 expected: Sequence[Whitener | JointWhitener] | None = None) -> None:
         self.posterior, self.prior = posterior, posterior.prior
         residuals = posterior.residuals(state)
         self._predictions = state.predictions
-        self.whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
+        self.whiteners: list[Whitener | JointWhitener] = [
+            one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)
+        ] if expected is None else list(expected)
         self._records = []
         for error, whitener, readings, prediction, residual, here in zip(
                 posterior.record_errors, self.whiteners, posterior.readings, state.predictions, residuals, state.record,
                 strict=True):
             white = whitener(readings.without_deaf(error.slopes(prediction), prediction))
             self._records.append(_Record(error, white, white @ white.T, white @ whitener(residual), here))
-        self.size = self._likeliest_size(state.size)
+        self.size = self._likeliest_size(state.size) if expected is None else state.size
         self.state = State(state.effects, state.logs, state.record, self.size, state.predictions)
         self._precisions = [one.error.precision(self.size) for one in self._records]
         self._roots = [one.root(self.size) for one in self._records]
@@ -133,10 +139,23 @@ class LinearModel:
         """Minus twice the log of the model's evidence at its state, without its constant: Laplace's approximation for
         the record's errors, G. Schwarz's (Annals of Statistics 6, 1978) for the numbers of effects."""
         posterior, state = self.posterior, self.state
-        occam = sum(_log_determinant(root) - one.error.log_determinant(self.size)
-                    for root, one in zip(self._roots, self._records, strict=True))
-        return (posterior.deviance(state) + posterior.cost(state) + occam
+        return (posterior.deviance(state) + posterior.cost(state) + self.occam
                 + len(moves_of(state.effects)) * float(np.log(posterior.freedom)))
+
+    @property
+    def occam(self) -> float:
+        """What the freedom of the record's errors costs in minus twice the log of the evidence."""
+        return sum(_log_determinant(root) - one.error.log_determinant(self.size)
+                   for root, one in zip(self._roots, self._records, strict=True))
+
+    def of_size(self, size: ErrorSize) -> LinearModel:
+        """The same with distance errors of another size."""
+        found = copy(self)
+        found.size, found.state = size, replace(self.state, size=size)
+        found._precisions = [one.error.precision(size) for one in self._records]
+        found._roots = [one.root(size) for one in self._records]
+        found._taken = found.taken(found.white)
+        return found
 
     def taken(self, white: Sequence[Array]) -> list[Array]:
         """What the record's errors take of whitened columns (m, kept) per run: (k, m), to be multiplied with each

@@ -19,6 +19,7 @@ from logger.vehicle.effect import Chosen, Effect, VehicleEffect, chosen
 DETECTABLE_SIGMA = 6.0
 """An effect that stands out by fewer standard deviations would hardly be found among twenty: as much evidence as they
 give is what the search asks for."""
+_NOTHING = 0.1  # deviations
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,13 @@ def undetectable_effects(found: LinearModel, effects: Sequence[Effect]) -> tuple
                         key=lambda one: one.deviations))
 
 
+def usual_says_little(effect: Effect, deviations: float) -> bool:
+    """Whether an effect that stands out by so much at its usual values has to be looked at elsewhere: it has no
+    strength, or the vehicle has just that."""
+    strengthless = all(one.null is None for one in effect.parameters)
+    return isinstance(effect, VehicleEffect) and (strengthless or deviations < _NOTHING)
+
+
 class _Sensitivity:
     """By how much effects would stand out beside a fitted model."""
 
@@ -49,8 +57,7 @@ class _Sensitivity:
         """At its usual strength; where it has none, or the vehicle has just that, at the most telling values that a
         search begins at."""
         found = self._deviations(chosen(effect, effect.usual))
-        strengthless = all(one.null is None for one in effect.parameters)
-        if isinstance(effect, VehicleEffect) and (strengthless or found < 0.1):
+        if usual_says_little(effect, found):
             found = max(self._deviations(chosen(effect, values)) for values in effect.trials())
         return found
 

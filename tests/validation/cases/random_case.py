@@ -28,7 +28,7 @@ from ..simulator.scene import Drive, Scene, clean_acceleration, measured
 Array = NDArray[np.float64]
 Parameters = dict[str, float]
 
-KINDS = ("none", "one", "two", "outsider", "two_outsider", "wandering")
+KINDS = ("none", "one", "two", "three", "outsider", "two_outsider", "wandering")
 SKIPPED_S = 2.0  # at the start of every run, left out of every error
 VISIBLE = 2.0
 NUMBERS_OFF = 0.04
@@ -259,11 +259,13 @@ def _choose(rng: np.random.Generator, kind: str, seed: int, effect: str | None) 
         return [(first or EFFECTS[names[seed % len(names)]], _log_uniform(rng, 0.5, 20.0), 0.0)]
     if kind == "outsider":
         return [(first or OUTSIDERS[outside[seed % len(outside)]], _log_uniform(rng, 2.0, 20.0), VISIBLE)]
-    first = first or EFFECTS[names[seed % len(names)]]
-    pool = outside if kind == "two_outsider" else [
-        name for name in names if name != first.name and {name, first.name} not in NEVER_TOGETHER]
-    second = (EFFECTS | OUTSIDERS)[str(rng.choice(pool))]
-    return [(each, _log_uniform(rng, 2.2, 15.0), VISIBLE) for each in (first, second)]
+    drawn = [first or EFFECTS[names[seed % len(names)]]]
+    for _ in range(2 if kind == "three" else 1):
+        taken = {one.name for one in drawn}
+        pool = outside if kind == "two_outsider" else [
+            name for name in names if name not in taken and not any({name, one} in NEVER_TOGETHER for one in taken)]
+        drawn.append((EFFECTS | OUTSIDERS)[str(rng.choice(pool))])
+    return [(each, _log_uniform(rng, 2.2, 15.0), VISIBLE) for each in drawn]
 
 
 def _model(rng: np.random.Generator, effects: list[Effect]) -> str:

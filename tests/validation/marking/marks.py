@@ -121,8 +121,8 @@ def right_on_wandering(record: Record) -> bool:
 def right(record: Record) -> bool:
     """The answer that its kind asks for."""
     kinds: dict[str, Callable[[Record], bool]] = {
-        "none": lambda one: not alarm(one), "one": first_right, "two": all_named, "outsider": unexplained,
-        "two_outsider": unexplained, "wandering": right_on_wandering,
+        "none": lambda one: not alarm(one), "one": first_right, "two": all_named, "three": all_named,
+        "outsider": unexplained, "two_outsider": unexplained, "wandering": right_on_wandering,
     }
     return kinds[record["kind"]](record)
 
@@ -241,13 +241,15 @@ def of_kind(records: Sequence[Record], *kinds: str) -> list[Record]:
 def goals(records: Sequence[Record]) -> list[Goal]:
     """All that are shares of cases."""
     one, listed = of_kind(records, "one"), of_kind(records, "one", "two")
-    others = of_kind(records, "none", "one", "two")
+    others = of_kind(records, "none", "one", "two", "three")
     found = [record for record in listed if all_found(record)]
     return [
         Goal("One effect: right one first, or named as what cannot be told from the first", 0.90, True,
              share(one, first_right)),
         Goal("Nothing missing: anything said to be missing", 0.05, False, share(of_kind(records, "none"), alarm)),
         Goal("Two effects: both named", 0.75, True, share(of_kind(records, "two"), all_named)),
+        Goal("Three effects that stand out: all named", 0.70, True,
+             share([record for record in of_kind(records, "three") if not unseen(record)], all_named)),
         Goal("Off the list: unexplained", 0.80, True, share(of_kind(records, "outsider", "two_outsider"), unexplained)),
         Goal("Nothing off the list, distances right: unexplained", 0.05, False, share(others, unexplained)),
         Goal("Distances that wander: one effect or nothing, rightly, nothing unexplained", 0.80, True,

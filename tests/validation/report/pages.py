@@ -52,8 +52,8 @@ from .matrix_figure import matrix_figure
 TITLE = "The lab examined"
 COMMAND = "python -m tests.validation.examine"
 _LONGEST_S, _MOST_MB, _FULL = 60.0, 1000.0, (60.0,) * 4
-_WORDS = {"none": "nothing missing", "one": "one effect", "two": "two effects", "outsider": "one off the list",
-          "two_outsider": "one on the list and one off it",
+_WORDS = {"none": "nothing missing", "one": "one effect", "two": "two effects", "three": "three effects",
+          "outsider": "one off the list", "two_outsider": "one on the list and one off it",
           "wandering": "one effect or none where the distance wanders"}
 
 
@@ -82,8 +82,8 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("Goals", [], _goals(records)),
         Part("By strength", [
             "Strength is the r.m.s. of what the effect changes in the noise-free record over the r.m.s. of the noise, "
-            "with all other numbers true; of two effects, that of the weaker. *Can be seen* leaves out the cases of "
-            "the section *What nobody could see*."], _by_strength(records)),
+            "with all other numbers true; of several effects, that of the weakest. *Can be seen* leaves out the cases "
+            "of the section *What nobody could see*."], _by_strength(records)),
         Part("After adding", _adding(records)),
         Part("Time and memory", _cost(records)),
         Part("Wrong verdicts", ["What these cases hid and what was said. An effect that is akin to one off the list is "
@@ -133,12 +133,13 @@ def _goals(records: Sequence[Record]) -> Table:
 
 
 def _by_strength(records: Sequence[Record]) -> Table:
-    one, two, out = (of_kind(records, kind) for kind in ("one", "two", "outsider"))
+    one, two, three, out = (of_kind(records, kind) for kind in ("one", "two", "three", "outsider"))
     listed = [record for record in [*one, *two] if all_found(record)]
     rows = []
     for name, asked, holds in (
             ("One effect: right first, or named as confused", one, first_right),
             ("Two effects: both named", two, all_named),
+            ("Three effects: all named", three, all_named),
             ("Off the list: unexplained", out, unexplained),
             ("Effects found: error within 10 % of the noise floor", listed, near),
             ("Effects found: numbers right", listed, numbers_right)):

@@ -1,0 +1,132 @@
+"""What drives could show of effects: how far each stands out, and how much of it remains beside each other one.
+
+Problem: an effect that stands out by twenty standard deviations is not named if another one, at a strength of its own,
+does the same; and what another one does depends on its shape (a frequency, a knee). Solution: each effect is looked at
+with its usual values and with some that a search begins at. All changes are whitened, what the car's numbers and the
+records' errors can do is taken out (a Schur complement with their priors), and what remains of one change after
+another one, at any strength, is fitted to it is the deviations by which a search tells the two apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.distance_error import USUAL
+from logger.lab.planning.planned_drive import SIZES, Information, larger
+from logger.lab.selection.detectability import DETECTABLE_SIGMA, usual_says_little
+from logger.lab.selection.evidence import CONFUSED
+from logger.vehicle.effect import Chosen, Effect, chosen
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+TOLD_SIGMA = float(np.sqrt(CONFUSED))
+"""Effects are told apart where so many deviations of the one remain beside the other: their square is the difference of
+the two scores."""
+_MOST_TRIALS = 4
+"""Of an effect, spread over those that a search begins at: beside its usual values, they tell another shape of it from
+another effect; all of them would take three times as long."""
+_TINY = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """Effects at the values that are looked at: all columns of one effect in a row, its usual values first.
+
+    first    (e,) index of each effect's first column
+    """
+
+    effects: tuple[Effect, ...]
+    columns: tuple[Chosen, ...]
+    first: Indices
+
+    @staticmethod
+    def of(effects: Sequence[Effect]) -> Settings:
+        """Of some effects."""
+        each = [_values_of(one) for one in effects]
+        columns = tuple(chosen(effect, values) for effect, some in zip(effects, each, strict=True) for values in some)
+        return Settings(tuple(effects), columns, np.cumsum([0, *map(len, each[:-1])]))
+
+    def columns_of(self, index: int) -> range:
+        """Of an effect."""
+        ends = [*self.first[1:], len(self.columns)]
+        return range(int(self.first[index]), int(ends[index]))
+
+
+def _values_of(effect: Effect) -> list[dict[str, float]]:
+    trials = [one for one in effect.trials() if one != effect.usual]
+    places = np.unique(np.linspace(0, len(trials) - 1, min(len(trials), _MOST_TRIALS)).round().astype(int))
+    return [effect.usual, *(trials[one] for one in places)]
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What some drives could show, in standard deviations.
+
+    alone     (e,) by how much each effect stands out
+    beside    (e, e) what of it remains after another one was fitted; of itself: all
+    """
+
+    alone: Array
+    beside: Array
+
+    @property
+    def told(self) -> Array:
+        """(e,) by how much each is told from the effect that is most like it."""
+        return np.asarray(self.beside.min(axis=1))
+
+    @property
+    def nearest(self) -> Indices:
+        """(e,) which one that is; itself, where it stands alone."""
+        return np.asarray(self.beside.argmin(axis=1))
+
+    @property
+    def chances(self) -> Array:
+        """(e,) that a search names each, were it there alone: what it finds is normal around what is expected, with a
+        deviation of one, and has to stand out and to be told from all others."""
+        from scipy.special import ndtr
+
+        return np.minimum(ndtr(self.alone - DETECTABLE_SIGMA), ndtr(self.told - TOLD_SIGMA))
+
+
+def spoken_for(settings: Settings, told: Information, precision: Array) -> Indices:
+    """Which column (e,) stands for each effect: its usual values or, where these say little, those by which it stands
+    out most.
+
+    told         what some drives tell
+    precision    (p,) of the prior of the car's numbers
+    """
+    marginal, costs = _marginal(told, precision)
+    alone = np.sqrt(np.maximum((np.einsum("sii->si", marginal) + costs[:, None]).min(axis=0), 0.0))
+    found = settings.first.copy()
+    for index, effect in enumerate(settings.effects):
+        if usual_says_little(effect, float(alone[found[index]])):
+            found[index] = max(settings.columns_of(index), key=lambda column: alone[column])
+    return found
+
+
+def outlook(settings: Settings, told: Information, precision: Array, spoken: Indices) -> Outlook:
+    """What drives that tell so much could show; arguments as of ``spoken_for``, whose result is ``spoken``."""
+    marginal, costs = _marginal(told, precision)
+    own = np.maximum(np.einsum("sii->si", marginal), 0.0)
+    explained = marginal[:, spoken] ** 2 / np.maximum(own, _TINY)[:, None]
+    most = np.maximum.reduceat(explained, settings.first, axis=2)
+    np.einsum("sii->si", most)[:] = 0.0
+    beside = (own[:, spoken, None] - most + costs[:, None, None]).min(axis=0)
+    found = np.sqrt(np.maximum(beside, 0.0))
+    return Outlook(np.diag(found).copy(), found)
+
+
+def _marginal(told: Information, precision: Array) -> tuple[Array, Array]:
+    """Of the effects' columns (s, m, m), the car's numbers integrated out, and what errors of each size cost more than
+    those that are expected (s,)."""
+    count = len(precision)
+    mixed = told.products[:, :count, count:]
+    known = told.products[:, :count, :count] + np.diag(precision)
+    found = told.products[:, count:, count:] - mixed.transpose(0, 2, 1) @ np.linalg.solve(known, mixed)
+    costs = told.costs + [larger(USUAL, size).cost for size in SIZES[: len(told.costs)]]
+    return np.asarray(found), np.asarray(costs - costs[0])

@@ -1,0 +1,164 @@
+"""Which effects drives could show and tell apart, and which drive would add most: before anybody drives.
+
+Problem: a search that finds nothing may have had drives that show nothing, and one that names two effects that no drive
+of these tells apart has named none. Solution: the information that each drive would give of each effect is computed as
+a search uses it (``planned_drive``, ``outlook``); that of one more drive is added, and drives are ranked by how many
+more effects could be named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from operator import add
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.diagnosis import obstacles_of
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.map_fit import aligned, fit, read_beside
+from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.posterior import Posterior
+from logger.lab.planning.next_drives import Option, option_drives
+from logger.lab.planning.outlook import TOLD_SIGMA, Outlook, Settings, outlook, spoken_for
+from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, information
+from logger.lab.selection.detectability import DETECTABLE_SIGMA
+from logger.profiles.track import Track
+from logger.runs import Run
+from logger.vehicle.effect import Chosen, Effect
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[str], None]
+
+_WORTH_TELLING = 1.0
+"""Deviations that are gained: fewer are within what noise does to a search."""
+
+
+@dataclass(frozen=True, eq=False)
+class NextDrive:
+    """What one more drive would add.
+
+    gains         deviations by which effects would be told better from what is most like them: first those that it
+                  makes likelier to be named, then those that it helps most for their size
+    more_named    how many more effects a search would name, were each of them there alone
+    """
+
+    option: Option
+    gains: Mapping[str, float]
+    more_named: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What some drives could show.
+
+    drives       names and seconds of the runs and the planned drives
+    noise        of the accelerometers; ``measured``: whether it is that of the runs
+    names        of the effects (e,)
+    spoken       (e,) the values that each is looked at with
+    now          what the drives could show of them
+    obstacles    effects that cannot be there, and why
+    next         drives that may come next, those that gain most first
+    """
+
+    drives: tuple[tuple[str, float], ...]
+    noise: SensorNoise
+    measured: bool
+    names: tuple[str, ...]
+    spoken: tuple[Chosen, ...]
+    now: Outlook
+    obstacles: Mapping[str, str]
+    next: tuple[NextDrive, ...]
+
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """Effects that would stand out, and cannot be told from each other."""
+        seen = self.now.alone >= DETECTABLE_SIGMA
+        alike = (np.minimum(self.now.beside, self.now.beside.T) < TOLD_SIGMA) & seen & seen[:, None]
+        found: list[set[int]] = []
+        for index in np.flatnonzero(seen):
+            near = {int(index), *map(int, np.flatnonzero(alike[index]))}
+            joined = [one for one in found if one & near]
+            found = [one for one in found if not one & near] + [near.union(*joined)]
+        return [tuple(self.names[one] for one in sorted(some)) for some in found if len(some) > 1]
+
+
+def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
+         noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
+         progress: Progress = lambda words: None, workers: int = 2) -> Plan:
+    """What runs and planned drives could show of ``effects``.
+
+    there          the car; its numbers are fitted to the runs first
+    planned        drives to be, their records empty
+    noise          of the sensor to be; None: that of the runs, or as ``usual_noise``
+    road           over which the next drive may go; None: none is known
+
+    ValueError where the vehicle lacks what an effect needs.
+    """
+    fitted, measured = None, noise is None and runs is not None
+    if runs is not None:
+        progress("refitting the car's own numbers")
+        fitted = read_beside(fit(aligned(runs, runs.start(there.effects))))
+        there = replace(there, logs=fitted.state.logs)
+        noise = noise or SensorNoise(noise_of(fitted.posterior, fitted.state).deviation_mps2)
+    noise = noise or usual_noise
+    drives = [PlannedDrive(one, there, noise) for one in planned]
+    posteriors = [*([fitted.posterior] if fitted is not None else []), *(one.posterior for one in drives)]
+    obstacles = {name: why for one in posteriors for name, why in obstacles_of(one, effects, there.effects).items()}
+    settings = Settings.of([one for name, one in effects.items() if name not in obstacles])
+    base = [run for one in posteriors for run in one.runs.runs]
+    with ThreadPoolExecutor(workers) as pool:
+        asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
+        told: list[Information] = []
+        if fitted is not None:
+            progress("what the runs show")
+            told.append(asked.of_runs(fitted))
+        for number, drive in enumerate(drives, 1):
+            progress(f"what planned drive {number} of {len(drives)} would show")
+            told.append(drive.information(asked.changes(drive), ()))
+        total = reduce(add, told)
+        spoken = spoken_for(settings, total, asked.precision)
+        now = outlook(settings, total, asked.precision, spoken)
+        following: list[NextDrive] = []
+        for number, one in enumerate(option_drives(there, noise, road, base), 1):
+            progress(f"what a next drive would add: {number} tried")
+            changes = asked.changes(one.drive)
+            for option, signals in one.options:
+                after = total + one.drive.information(changes, signals)
+                following.append(_next(option, settings, now, outlook(settings, after, asked.precision, spoken)))
+    return Plan(
+        tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
+        tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in spoken), now, obstacles,
+        tuple(sorted(following, key=lambda one: (-round(one.more_named, 1), -len(one.gains)))))
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is asked of each drive: effects at some values; ``precision`` (p,) of the prior of the car's numbers."""
+
+    settings: Settings
+    precision: Array
+    pool: ThreadPoolExecutor
+
+    def changes(self, drive: PlannedDrive) -> Array:
+        """What the effects do to a planned record (m, (1 + s) n)."""
+        return np.array(list(self.pool.map(drive.change, self.settings.columns)))
+
+    def of_runs(self, fitted: LinearModel) -> Information:
+        """What runs tell beside a fitted model."""
+        posterior, state = fitted.posterior, fitted.state
+        predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
+        here = predict(state.effects)
+        there = self.pool.map(lambda one: predict((*state.effects, one)), self.settings.columns)
+        changes = [[new - old for new, old in zip(one, here, strict=True)] for one in there]
+        return information(fitted, [np.array(some) for some in zip(*changes, strict=True)])
+
+
+def _next(option: Option, settings: Settings, now: Outlook, then: Outlook) -> NextDrive:
+    gained, likelier = then.told - now.told, then.chances - now.chances
+    order = np.lexsort((now.told / np.maximum(then.told, 1.0), -likelier.round(2)))
+    gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _WORTH_TELLING}
+    return NextDrive(option, gains, float(likelier.sum()))

@@ -1,0 +1,203 @@
+"""A drive that nobody has driven yet, as the lab would read it: what a right model predicts, and the noise to come.
+
+Problem: a likelihood takes its levels and the sizes of distance errors from residuals, and a planned drive has none.
+Solution: its record is the prediction itself (an Asimov data set: G. Cowan et al., European Physical Journal C 71,
+2011), its levels are those of the sensors' noise, its distance errs as a good recorder's does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.signals import JointBands, JointWhitener
+from logger.lab.likelihood.whittle import Bands, Whitener
+from logger.profiles.excitation import Excitation
+from logger.profiles.track import Track
+from logger.runs import RecordFacts, Run, Signal
+from logger.simulation.simulated_runs import SimulatedRuns
+from logger.simulation.virtual_drive import at_one_speed, motion_along
+from logger.vehicle.effect import Chosen
+from logger.vehicle.models import structure_of
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+RATE_HZ = 100.0
+SEARCH_HZ = 500.0
+"""Steps a second of a search, which are enough for what an effect changes."""
+SIGNAL_NOISE = {"travel": 0.0005, "pitch_rate": 0.001, "roll_rate": 0.001}
+"""R.m.s. noise of a second sensor that is no accelerometer: a string or rotary potentiometer of 0.25 m with a linearity
+of 0.2 %; a MEMS gyroscope's 0.05 deg/s (InvenSense, MPU-6000 product specification, 6.1) [m, rad/s]."""
+
+SIZES = ((1.0, 1.0, 1.0), (4.0, 1.0, 1.0), (16.0, 1.0, 1.0), (64.0, 1.0, 1.0), (1.0, 4.0, 1.0), (1.0, 16.0, 1.0),
+         (1.0, 1.0, 6.0), (1.0, 1.0, 36.0))
+"""Distance errors as many times as large as expected (start, walk, factor) that a fit may find likeliest instead, up to
+those that a delay of some hundredths of a second or a wheel radius that is wrong by a per cent looks like."""
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Of the accelerometers to be: r.m.s. noise, and the step that they round to [m/s2]; 0: none."""
+
+    noise_mps2: float
+    step_mps2: float = 0.0
+
+    @property
+    def variance(self) -> float:
+        """Of a reading, rounding taken as noise [m2/s4]."""
+        return self.noise_mps2**2 + self.step_mps2**2 / 12
+
+    def variance_of(self, signal: Signal | None) -> float:
+        """Of a reading of a signal, or of the sensor (None), in the square of its unit."""
+        known = SIGNAL_NOISE.get(signal.measures) if signal is not None else None
+        return self.variance if known is None else known**2
+
+
+@dataclass(frozen=True)
+class CarThere:
+    """The car that is to be driven.
+
+    nominal, stands    as of ``Posterior``
+    effects, logs      those it has, and (p,) logarithms of its numbers over the nominal ones
+    """
+
+    nominal: Vehicle
+    stands: Vehicle
+    tolerance: Tolerance
+    effects: tuple[Chosen, ...]
+    logs: Array
+
+
+def at_speed(name: str, track: Track, vehicle: Vehicle, speed_mps: float, signals: Sequence[Signal] = (),
+             most_s: float = np.inf) -> Run:
+    """A drive along a track from its start, at one speed; its record is empty still. ValueError where it is too short
+    to be a run, or too long to be simulated."""
+    behind_m = float(structure_of(vehicle).behind_m.max())
+    times, speeds = at_one_speed(track, behind_m, speed_mps)
+    motion = motion_along(np.minimum(times, most_s), speeds, track.start_m, RATE_HZ)
+    return _empty(name, track, motion.distance_m, motion.speed_mps, signals)
+
+
+def again(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
+    """The beginning of a run once more, with other signals."""
+    count = min(run.count, int(most_s * run.rate_hz))
+    return replace(_empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals),
+                   rate_hz=run.rate_hz)
+
+
+def _empty(name: str, track: Track | Excitation, distance_m: Array, speed_mps: Array, signals: Sequence[Signal]) -> Run:
+    return Run(name, RATE_HZ, np.zeros(len(distance_m)), distance_m, speed_mps, track,
+               facts=RecordFacts(signals=tuple(signals)), more=np.zeros((len(signals), len(distance_m))))
+
+
+class PlannedDrive:
+    """A car on a drive to be.
+
+    run        with the prediction for its record, all its signals in it
+    numbers    what the car's numbers do to it (p, (1 + s) n)
+    """
+
+    def __init__(self, run: Run, there: CarThere, noise: SensorNoise) -> None:
+        self._there, self._noise = there, noise
+        empty = self._posterior_of(run)
+        self._here = empty.predict(there.effects, there.logs, self._no_errors(empty), rough=True)[0]
+        record = self._here.reshape(-1, run.count)
+        self.run = replace(run, measured_mps2=record[0], more=record[1:])
+        self.posterior = self._posterior_of(self.run)
+
+    def _posterior_of(self, run: Run) -> Posterior:
+        there = self._there
+        return Posterior(SimulatedRuns([run], fine_hz=SEARCH_HZ), there.nominal, there.tolerance, there.stands)
+
+    @staticmethod
+    def _no_errors(posterior: Posterior) -> list[Array]:
+        return [np.zeros(one.count) for one in posterior.record_errors]
+
+    def _state_of(self, posterior: Posterior, prediction: Array) -> State:
+        there = self._there
+        return State(there.effects, there.logs, self._no_errors(posterior), USUAL, [prediction])
+
+    @cached_property
+    def numbers(self) -> Array:
+        """By differences, as of ``Posterior.number_slopes``."""
+        state = self._state_of(self.posterior, self._here)
+        return self.posterior.number_slopes(state, self.posterior.prior.steps)[0]
+
+    def change(self, one: Chosen) -> Array:
+        """What an effect at its values does to the record ((1 + s) n,)."""
+        there = self._there
+        after = self.posterior.predict((*there.effects, one), there.logs, self._no_errors(self.posterior), rough=True)
+        return after[0] - self._here
+
+    @property
+    def most_mps2(self) -> float:
+        """The greatest acceleration that the sensor feels."""
+        return float(np.abs(self.run.measured_mps2).max())
+
+    def information(self, changes: Array, signals: Sequence[int]) -> Information:
+        """Of effects' changes (m, (1 + s) n), recorded by the sensor and some of the signals alone."""
+        run, kept = self.run, [0, *(1 + one for one in signals)]
+        chosen_signals = tuple(run.signals[one] for one in signals)
+        fewer = replace(run, facts=replace(run.facts, signals=chosen_signals), more=run.more[list(signals)])
+
+        def of_kept(columns: Array) -> Array:
+            parts = columns.reshape(*columns.shape[:-1], -1, run.count)[..., kept, :]
+            return np.asarray(parts.reshape(*columns.shape[:-1], -1))
+
+        posterior = self._posterior_of(fewer)
+        expected = [self._whitener(fewer, one) for one in posterior.bands]
+        linear = LinearModel(posterior, self._state_of(posterior, of_kept(self._here)), [of_kept(self.numbers)],
+                             expected)
+        return information(linear, [of_kept(changes)])
+
+    def _whitener(self, run: Run, bands: Bands | JointBands) -> Whitener | JointWhitener:
+        """By the noise to come."""
+        each = bands.each if isinstance(bands, JointBands) else [bands]
+        variances = [self._noise.variance_of(one) for one in (None, *run.signals)]
+        found = [Whitener(one, np.maximum(variance, one.floor)) for one, variance in zip(each, variances, strict=True)]
+        return JointWhitener(found) if isinstance(bands, JointBands) else found[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What drives tell; that of several adds up. Whitened slopes by the car's numbers and effects' changes, what the
+    records' errors can do taken out of both, no prior of the numbers in it, for each of ``SIZES`` of these errors: an
+    effect that moves runs is taken for larger errors, if these are likely enough.
+
+    products    (s, p + m, p + m)
+    costs       (s,) of so large errors, in minus twice the log of the evidence, without the prior of the size
+    """
+
+    products: Array
+    costs: Array
+
+    def __add__(self, other: Information) -> Information:
+        return Information(self.products + other.products, self.costs + other.costs)
+
+
+def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
+    """Of a model beside its state, by effects' changes (m, n) per run."""
+    free = linear.without_wall()
+    logs, white = free.state.logs, free.whitened(changes)
+    each, costs = [], []
+    for size in SIZES:
+        there = free.of_size(larger(free.size, size))
+        found = there.information(logs, white)
+        found[: free.count, : free.count] -= np.diag(free.prior.curvature(logs))
+        each.append(found)
+        costs.append(there.occam)
+    return Information(np.array(each), np.array(costs))
+
+
+def larger(size: ErrorSize, factors: tuple[float, float, float]) -> ErrorSize:
+    """Start, walk and factor so many times as far off."""
+    return ErrorSize(size.start_m * factors[0], size.walk_m * factors[1], size.scale * factors[2])
