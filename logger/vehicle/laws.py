@@ -96,6 +96,7 @@ class CornerLaws:
     tire_damping_n_s_per_m  of the tire
     tires                   forces by deflection beyond the linear tire: deflection [m] -> force [N]
     tire_pulls              whether the tire holds on to the road, as the linear model has it
+    rear                    whether it is a corner of the rear axle, for laws that the two axles do not share
     """
 
     damping_n_s_per_m: float
@@ -112,6 +113,7 @@ class CornerLaws:
     tire_damping_n_s_per_m: float = 0.0
     tires: tuple[Law, ...] = ()
     tire_pulls: bool = True
+    rear: bool = False
 
     @property
     def rubs(self) -> bool:
@@ -137,6 +139,6 @@ class CornerLaws:
         return replace(self, tires=(*self.tires, law))
 
 
-def linear(damping_n_s_per_m: float) -> CornerLaws:
+def linear(damping_n_s_per_m: float, rear: bool = False) -> CornerLaws:
     """The laws of the linear car, which its matrices hold already."""
-    return CornerLaws(damping_n_s_per_m, lambda rate: damping_n_s_per_m * rate)
+    return CornerLaws(damping_n_s_per_m, lambda rate: damping_n_s_per_m * rate, rear=rear)

@@ -194,6 +194,8 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
     if laws.damping_n_s_per_m != before.damping_n_s_per_m:
         raise ValueError("expected laws to leave damping_n_s_per_m as it was: another damper is "
                          "replace(laws, damper=...)")
+    if laws.rear is not before.rear:
+        raise ValueError("expected laws to leave rear as it was: it says at which axle they are")
     for name in ("springs", "others", "tires"):
         some = getattr(laws, name)
         if not isinstance(some, tuple) or not all(map(callable, some)):
