@@ -8,20 +8,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-BY_TRAVEL, BY_TIRE, MEMORY, MASS = "force by travel and rate", "force by tire deflection", "memory", "mass on a spring"
-CORRECTION, REPEATS, DRIFT, CHANGE = "body to record", "repeats", "sensor drift", "number that changes"
+BY_TRAVEL, BY_RATE, BY_BOTH, BY_TIRE = "force by travel", "force by rate", "damping by travel", "force by the tire"
+FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading by heat"
+MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
+DRIFT, CHANGE = "sensor drift", "number that changes"
 
 NAMES: dict[str, frozenset[str]] = {
-    BY_TRAVEL: frozenset({"suspension_force"}),
+    BY_TRAVEL: frozenset({"force_by_travel"}),
+    BY_RATE: frozenset({"force_by_rate"}),
+    BY_BOTH: frozenset({"damping_by_travel"}),
     BY_TIRE: frozenset({"tire_force"}),
-    MEMORY: frozenset({"memory"}),
-    MASS: frozenset({"mass_on_spring"}),
-    CORRECTION: frozenset({"sensor_correction"}),
+    FRICTION: frozenset({"axle_friction", "friction_with_memory"}),
+    RUBBER: frozenset({"spring_with_memory"}),
+    PLAY: frozenset({"damper_backlash"}),
+    HEAT: frozenset({"damper_heat"}),
+    MASS: frozenset({"hung_mass"}),
+    CORRECTION: frozenset({"record_filter"}),
     REPEATS: frozenset({"periodic"}),
-    DRIFT: frozenset({"drift"}),
+    DRIFT: frozenset({"sensor_drift"}),
     CHANGE: frozenset({"changing_number"}),
 }
-"""What ``ridelog learn`` calls a family of each meaning."""
+"""What ``ridelog learn`` calls the families of each meaning."""
 
 
 @dataclass(frozen=True)
@@ -33,29 +40,28 @@ class Right:
 
 
 RIGHT: dict[str, Right] = {
-    "quadratic_damping": Right((BY_TRAVEL,), "a force by the suspension's rate"),
-    "bushing_hysteresis": Right((MEMORY,), "Bouc-Wen: the force depends on where the motion turned"),
+    "quadratic_damping": Right((BY_RATE,), "a force by the suspension's rate"),
+    "bushing_hysteresis": Right((FRICTION,), "Bouc-Wen: the force depends on where the motion turned"),
     "hardening_tire": Right((BY_TIRE,), "a force by the tire's deflection"),
-    "one_axle_friction": Right((BY_TRAVEL, MEMORY), "friction is a force by the sign of the rate; before it slips, by "
-                                                    "where it stuck"),
-    "damper_backlash": Right((MEMORY,), "play in series with a damper: where its ends stand is a state"),
+    "one_axle_friction": Right((FRICTION, BY_RATE), "a force by the sign of the rate"),
+    "damper_backlash": Right((PLAY,), "play in series with a damper: where its ends stand is a state"),
     "wheel_imbalance": Right((REPEATS,), "once a turn of the wheel"),
     "engine_vibration": Right((REPEATS,), "a line in time"),
-    "damper_fading": Right((CHANGE, MEMORY), "the damping changes with time, as if it warmed"),
-    "rubber_spring": Right((MEMORY,), "a Maxwell branch"),
+    "damper_fading": Right((CHANGE, HEAT), "the damping changes with time, as if it warmed"),
+    "rubber_spring": Right((RUBBER,), "a Maxwell branch"),
     "trailer": Right((MASS,), "a mass on a spring behind the rear axle"),
     "clipping": Right((CORRECTION,), "of the sensor's reading alone"),
     "gain_drift": Right((CHANGE, DRIFT), "the gain is a number that was taken for fixed, and it is the sensor's"),
     "blurred_profile": Right((CORRECTION,), "what was compared lacks short waves, as if it were filtered"),
     "gas_spring": Right((BY_TRAVEL,), "a force by travel, stiffer in compression"),
-    "place_damper": Right((BY_TRAVEL,), "a force by travel and rate together"),
-    "stribeck_friction": Right((BY_TRAVEL, MEMORY), "a force by rate that falls; friction, as one axle's"),
+    "place_damper": Right((BY_BOTH,), "a force by travel and rate together"),
+    "stribeck_friction": Right((FRICTION, BY_RATE), "a force by rate that falls; friction"),
     "rebound_stop": Right((BY_TRAVEL,), "a force by travel and rate, in extension"),
-    "inerter": Right((MASS, MEMORY), "inertia behind a spring: two states, and a resonance"),
-    "hydraulic_mount": Right((MASS, MEMORY), "a column of fluid behind a spring: two states, and a resonance"),
+    "inerter": Right((MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way with time"),
+    "hydraulic_mount": Right((MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
     "wheel_absorber": Right((MASS,), "a mass on a spring at each wheel"),
     "tire_warming": Right((CHANGE,), "the tires' stiffness changes with time"),
-    "damper_heating": Right((CHANGE, MEMORY), "the damping falls with the heat that it made"),
+    "damper_heating": Right((HEAT, CHANGE), "the damping falls with the heat that it made"),
     "flat_spot": Right((REPEATS,), "once a turn of the wheel, with its multiples"),
     "driveline_order": Right((REPEATS,), "so many times a turn of the wheel"),
     "warming_sensor": Right((DRIFT,), "an offset that decays"),
