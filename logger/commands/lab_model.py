@@ -41,7 +41,7 @@ def add_model_and_runs(parser: argparse.ArgumentParser) -> None:
 def add_anyway(parser: argparse.ArgumentParser) -> None:
     """--anyway."""
     parser.add_argument("--anyway", action="store_true",
-                        help="go on where a run does not seem to be of this road, or in these units")
+                        help="go on where a run does not seem to be of this road or this car, or in these units")
 
 
 def _add_tolerance(parser: argparse.ArgumentParser) -> None:
