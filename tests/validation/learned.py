@@ -109,9 +109,9 @@ def law_of(given: KeptBack) -> Path:
 
 
 def learned(given: KeptBack) -> tuple[Record, dict[str, float]]:
-    """What ``learn`` says of the runs that it may see, and what it took. No law is an answer, with exit status 1."""
+    """What ``learn`` says of the runs that it may see, and what it took."""
     return asked(["learn", "--json", "--vehicle", str(given.vehicle), "--out", str(law_of(given)),
-                  *map(str, given.runs)], in_process=False, answers=(0, 1))
+                  *map(str, given.runs)], in_process=False)
 
 
 def judged(given: KeptBack, said: Record) -> Record:
@@ -122,7 +122,7 @@ def judged(given: KeptBack, said: Record) -> Record:
     if said["family"] is None:
         return found
     vehicle = given.vehicle
-    for number, name in enumerate([*said.get("verdict", []), str(law_of(given))]):
+    for number, name in enumerate([*said["verdict"], str(law_of(given))]):
         out = given.vehicle.with_name(f"with-{number}.yaml")
         asked(["add-effect", name, "--json", "--vehicle", str(vehicle), "--out", str(out), *map(str, given.runs)],
               in_process=False)
@@ -163,7 +163,7 @@ def prefers_the_list(record: Record) -> bool:
     """Whether ``learn`` learned no law, or said of its law that it is nearly the effect that was hidden."""
     if no_law(record):
         return True
-    nearest = (record["said"] or {}).get("nearest")
+    nearest = record["said"]["nearest"] if record["said"] else None
     return bool(nearest and nearest["as_good"]
                 and nearest["effect"] in [one["name"] for one in record["truth"]["effects"]])
 

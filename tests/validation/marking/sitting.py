@@ -109,15 +109,12 @@ def added(folder: Path, runs: Sequence[str], said: Record, in_process: bool) -> 
 
 # --- asking ---------------------------------------------------------------------------------------------------------
 
-def asked(arguments: list[str], in_process: bool, answers: tuple[int, ...] = (0,)) -> tuple[Record, dict[str, float]]:
-    """What a command printed as JSON, and what it took. NoAnswer where it failed.
-
-    answers    the exit statuses with which it has answered
-    """
-    return _called(arguments) if in_process else _started(arguments, answers)
+def asked(arguments: list[str], in_process: bool) -> tuple[Record, dict[str, float]]:
+    """What a command printed as JSON, and what it took. NoAnswer where it failed."""
+    return _called(arguments) if in_process else _started(arguments)
 
 
-def _started(arguments: list[str], answers: tuple[int, ...]) -> tuple[Record, dict[str, float]]:
+def _started(arguments: list[str]) -> tuple[Record, dict[str, float]]:
     """What a command printed as JSON, and what it took."""
     command = [str(Path(sys.executable).with_name("ridelog")), *arguments]
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
@@ -131,7 +128,7 @@ def _started(arguments: list[str], answers: tuple[int, ...]) -> tuple[Record, di
         wall_s = time.monotonic() - begun
         for file in (out, err):
             file.seek(0)
-        if process.returncode not in answers:
+        if process.returncode != 0:
             words = err.read().decode("utf-8", "replace").strip().splitlines()
             raise NoAnswer(f"{arguments[0]} ended with {process.returncode}: {words[-1] if words else 'no word'}")
         return json.loads(out.read()), {"wall_s": wall_s, "cpu_s": usage.ru_utime + usage.ru_stime,
