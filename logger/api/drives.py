@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from logger.api.bench import Tell, unsaid
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, line, table
@@ -300,7 +301,7 @@ class Estimate(CommandResult):
 def estimate(
     run: Run | Path | str, vehicle: Model | Path | str, *, noise_mps2: float | Literal["auto"] = NOISE_MPS2,
     step_mps2: float | None = None, window_m: float = WINDOW_M, unit: str | None = None,
-    resample_hz: float | None = None,
+    resample_hz: float | None = None, anyway: bool = False,
 ) -> Estimate:
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
@@ -312,9 +313,10 @@ def estimate(
     step_mps2     step that readings are rounded to; 0: none; None: what the run's ``run.yaml`` says, or none [m/s2]
     window_m      1 to 1000 [m]; 25 ft by default
     unit, resample_hz    as ``comfort``
+    anyway        go on where the run does not seem to be of its profile's road
 
-    Raises BadInput for a drive that cannot be used, what makes the result wrong (repeated samples, gravity in g),
-    and as ``read_run`` and ``read_vehicle``.
+    Raises BadInput for a drive that cannot be used, or of another road than its profile's, what makes the result wrong
+    (repeated samples, gravity in g), and as ``read_run`` and ``read_vehicle``.
     Source: a smoother of the road's state as ISO 8608 lets expect it (``logger.estimation``).
 
     >>> found = estimate(folder, "rav4-2009", noise_mps2=0.05)
@@ -331,7 +333,7 @@ def estimate(
         ADDED.check("step_mps2", step_mps2)
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
-    found = assessed(drive, model, Sensor(given_mps2, step_of(drive, step_mps2)), window_m, learns)
+    found = assessed(drive, model, Sensor(given_mps2, step_of(drive, step_mps2)), window_m, learns, anyway=anyway)
     return estimate_by(found, checked, str(drive.path))
 
 
@@ -356,10 +358,11 @@ def step_of(run: Run, said_mps2: float | None) -> float:
     return (run.facts.step_mps2 or 0.0) if said_mps2 is None else said_mps2
 
 
-def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False
-             ) -> Assessment:
+def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: float, learns_noise: bool = False,
+             warn: Tell = unsaid, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
-    expected ...") for a drive that cannot be used."""
+    expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
+    ``anyway`` (then ``warn`` is told)."""
     from logger.estimation.assessment import Unusable, assess, estimable
 
     if run.excitation is not None:
@@ -370,7 +373,23 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
     except Unusable as error:
         file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
         raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
+    if road is not None:
+        _check_road(run, ready.distance_m, road, model, warn, anyway)
     try:
         return assess(ready, model.vehicle, sensor, window_m, road, learns_noise, model.effects, model.errors)
     except ValueError as error:
         raise BadInput(f"{model.vehicle.name}: {error}") from None
+
+
+def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Tell,
+                anyway: bool) -> None:
+    """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
+    left out: whether it is the road can be told without them, and some take long."""
+    from logger.api.model_checks import check_roads
+    from logger.runs import SKIP_S
+    from logger.runs import Run as Record
+    from logger.simulation.simulated_runs import SimulatedRuns
+
+    if len(distance_m) > SKIP_S * run.rate_hz + 2:
+        record = Record(str(run.path), run.rate_hz, run.accel_z_mps2, distance_m, run.speed_mps, road)
+        check_roads(model.vehicle.name, replace(model, effects=()), SimulatedRuns([record]), warn, anyway)

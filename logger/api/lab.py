@@ -63,7 +63,7 @@ def compare(vehicle: Model | Path | str, runs: Runs, *, tolerance: float = USUAL
     tolerance    how far off the car's masses, springs and dampers may well be, as a share, 0.001 to 0.5
     low_pass_hz  what lies above is not compared [Hz]; None: all is that the records hold. Errors are then of the
                  measurement and the model without it
-    anyway       go on where a run does not seem to be of this road, or in these units
+    anyway       go on where a run does not seem to be of this road or this car, or in these units
 
     Raises BadInput where these do not fit together, and as ``read_vehicle`` and ``read_run``.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from math import log
 from typing import TYPE_CHECKING
 
@@ -31,24 +32,29 @@ _UNITS = (
 _SENSOR_GAIN = (0.2, 5.0)
 """Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
 ANYWAY = "--anyway goes on"
+USUAL_DEVIATION = 0.025
+_NAMED = 4
+"""Of the numbers of another car, so many are said."""
 
 
 def check_model(word: str, model: Model, runs: SimulatedRuns, warn: Callable[[str], None],
-                anyway: bool = False) -> list[Array]:
+                anyway: bool = False, numbers: float = USUAL_DEVIATION) -> list[Array]:
     """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
     the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
-    profile is in another unit, or the road is another one, unless the user wants to go on ``anyway`` (then it is a
-    warning).
+    profile is in another unit, or the road or the car is another one, unless the user wants to go on ``anyway`` (then
+    it is a warning).
 
-    word    by which the user knows the vehicle
+    word       by which the user knows the vehicle
+    numbers    deviation of what the car's numbers are usually off by, as a share
     """
     from logger.vehicle.compose import compose
 
     predictions = check_moves(word, model, runs)
     car = compose(model.vehicle, model.effects)
     matches, band_hz = _matches(runs, predictions, car)
-    _say([*_other_ways_up(runs, matches), *_other_units(runs, matches), *_other_roads(runs, matches, car, band_hz)],
-         warn, anyway)
+    # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
+    _say(chain(_other_ways_up(runs, matches), _other_units(runs, matches), _other_roads(runs, matches, car, band_hz),
+               _another_car(word, model, runs, predictions, numbers)), warn, anyway)
     return predictions
 
 
@@ -151,6 +157,22 @@ def _other_roads(runs: SimulatedRuns, matches: Sequence[RoadMatch], car: Car,
         what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
                f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, band_hz)}")
+
+
+def _another_car(word: str, model: Model, runs: SimulatedRuns, predictions: Sequence[Array],
+                 numbers: float) -> Iterator[str]:
+    """That the runs are of another car, which explains them, and how it differs."""
+    from logger.lab.another_car import another_car
+
+    mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
+    found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
+    if found is not None:
+        far = list(found.shares.items())[:_NAMED]
+        more = f" and {len(found.shares) - _NAMED} more numbers far off" if len(found.shares) > _NAMED else ""
+        yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: this one says "
+               f"next to nothing of it (error {found.error:.2f}), one with "
+               f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
+               "Is it another car's file? ridelog identify fits a car's numbers")
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, WINDOW
+from logger.commands.lab_model import add_anyway, warned
 from logger.commands.numbers import add_number
 from logger.commands.pictures import HELP, check_picture, parted, write_picture
 from logger.commands.record_options import add_record_options, tell_doubts
@@ -54,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"write the windows as CSV; FILE.html: {HELP}; may be given for each")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     add_record_options(parser)
+    add_anyway(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
@@ -87,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
     learns = args.noise is None
     sensor = Sensor(NOISE_MPS2 if learns else args.noise, step_of(drive, args.step))
-    found = assessed(drive, model, sensor, window_m, learns)
+    found = assessed(drive, model, sensor, window_m, learns, warned, args.anyway)
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")

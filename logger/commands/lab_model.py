@@ -55,7 +55,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def add_anyway(parser: argparse.ArgumentParser) -> None:
     """--anyway."""
     parser.add_argument("--anyway", action="store_true",
-                        help="go on where a run does not seem to be of this road, or in these units")
+                        help="go on where a run does not seem to be of this road or this car, or in these units")
 
 
 def _add_tolerance(parser: argparse.ArgumentParser) -> None:

@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
+from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import read_run, write_profile
 
 from ..support.lab.runs_with_effects import write_runs
@@ -22,7 +24,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 COMMANDS = {
     "compare": ["compare"], "diagnose": ["diagnose"], "lab": ["lab", "--out", "lab"],
     "add-effect": ["add-effect", "sensor_gain", "--out", "new.yaml"],
-    "identify": ["identify", "--free", "sprung_mass_kg"],
+    "identify": ["identify", "--free", "sprung_mass_kg"], "estimate": ["estimate"],
+    "learn": ["learn", "--out", "law.py"],
 }
 
 
@@ -52,6 +55,35 @@ def test_who_wants_to_go_on_is_warned(runs: list[str], tmp_path: Path, capsys: p
     assert main(["compare", "--vehicle", "rav4-2009", wrong, "--anyway"]) == 0
     said = capsys.readouterr()
     assert "does not follow it" in said.err and "error" in said.out
+
+
+def test_an_estimate_beside_another_road_goes_on_only_where_it_is_asked_to(
+    runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    wrong = with_track(runs[0], tmp_path, read_run(runs[1]).track)
+    assert main(["estimate", "--vehicle", "rav4-2009", wrong, "--anyway"]) == 0
+    assert "does not follow it" in capsys.readouterr().err
+    assert main(["estimate", "--vehicle", "rav4-2009", runs[0]]) == 0
+
+
+def test_another_cars_file_is_refused_but_by_identify(
+    runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The record is of a car that the file says is twice as stiff and half as heavy at one end."""
+    own = yaml.safe_load(vehicle_path("rav4-2009").read_text("utf-8"))
+    own["sprung_mass_kg"] *= 0.5
+    for axle, factor in (("front", 2.0), ("rear", 1.4)):
+        own[axle]["suspension_stiffness_n_per_m"] *= factor
+        own[axle]["suspension_damping_n_s_per_m"] *= 0.8
+        own[axle]["unsprung_mass_kg"] *= 0.6
+    other = tmp_path / "other.yaml"
+    other.write_text(yaml.safe_dump(own), "utf-8")
+    with pytest.raises(BadInput, match=r"found one of another car: .* ridelog identify fits .*\(--anyway goes on\)"):
+        main(["compare", "--vehicle", str(other), *runs])
+    assert main(["identify", "--vehicle", str(other), "--free", "sprung_mass_kg", runs[0]]) == 0
+    capsys.readouterr()
+    assert main(["compare", "--vehicle", str(other), runs[0], "--anyway"]) == 0
+    assert "found one of another car" in capsys.readouterr().err
 
 
 def with_track(run: str, folder: Path, track: Track) -> str:

@@ -24,6 +24,7 @@ from pathlib import Path
 from .cases.random_case import KINDS
 from .cases.seeds import add_seed_options, first_seed, seeds
 from .marking.marks import hidden, right, said
+from .marking.results import appended, read_results
 from .marking.sitting import Question, Record, sit
 from .report.pages import Matrix, markdown, page
 
@@ -40,25 +41,9 @@ def questions(counts: dict[str, int], first: int, release: bool = False) -> list
     return [question for _, question in sorted(planned)]
 
 
-def read_results(path: Path) -> dict[Question, Record]:
-    """What was recorded; a line that was torn by a stop is left out."""
-    found = {}
-    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
-        try:
-            record = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        found[Question(record["kind"], record["seed"])] = record
-    return found
-
-
 def examine(asked: Sequence[Question], results: Path, workers: int, in_process: bool) -> None:
     """Put cases before the lab and append what it says to the results."""
-    results.parent.mkdir(parents=True, exist_ok=True)
-    torn = results.exists() and not results.read_bytes().endswith(b"\n")
-    with results.open("a", encoding="utf-8") as file, ProcessPoolExecutor(workers) as pool:
-        if torn:
-            file.write("\n")
+    with appended(results) as file, ProcessPoolExecutor(workers) as pool:
         jobs = [pool.submit(sit, question, in_process) for question in asked]
         try:
             for done, job in enumerate(as_completed(jobs), 1):

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from .simulator.cars import GRAVITY_MPS2, Axle, Car, Physics, assemble, damper_force, damper_rate_of, integrate, ride
+from .simulator.cars import GRAVITY_MPS2, Axle, Car, Physics, assemble, integrate, ride
+from .simulator.corner_laws import INNER, damper_force, damper_rate_of
 
 CAR = Car("half_car", 650.0, 1000.0, Axle(1.2, 45.0, 24_000.0, 1500.0, 210_000.0),
           Axle(1.5, 40.0, 21_000.0, 1350.0, 190_000.0), 0.2)
@@ -23,9 +24,11 @@ def dynamic_stiffness(car: Car, extra: Physics, omega: float) -> tuple[np.ndarra
     ahead = [0.0]
     if car.rear:
         ahead = [car.front.cg_distance_m - extra.cg_shift_m, -car.rear.cg_distance_m - extra.cg_shift_m]
-    size = 4 + len(axles)
+    count = len(axles)
+    size = 4 + 2 * count
     mass = [car.sprung_mass_kg + extra.payload_kg, car.pitch_inertia_kg_m2 if car.rear else 1.0,
-            extra.seat_mass_kg or 1.0, extra.tow_mass_kg or 1.0] + [axle.unsprung_mass_kg for axle in axles]
+            extra.seat_mass_kg or 1.0, extra.tow_mass_kg or 1.0] + [axle.unsprung_mass_kg for axle in axles] + [
+                extra.absorber_kg or 1.0] * count
     z = np.diag(np.array(mass) * s**2)
     roads = np.zeros((size, len(axles)), complex)
 
@@ -40,7 +43,12 @@ def dynamic_stiffness(car: Car, extra: Physics, omega: float) -> tuple[np.ndarra
         if extra.mount:
             damper = damper * extra.mount / (damper + extra.mount)
         rubber = extra.rubber * s * extra.rubber_s / (1 + s * extra.rubber_s)
-        link(axle.suspension_stiffness_n_per_m + damper + rubber, {0: -1.0, 1: -x, 4 + i: 1.0})
+        inerter = extra.inertance_kg * s**2 + extra.inerter_damper * s
+        if inerter:
+            inerter = inerter * extra.inerter_spring / (inerter + extra.inerter_spring)
+        link(axle.suspension_stiffness_n_per_m + damper + rubber + inerter, {0: -1.0, 1: -x, 4 + i: 1.0})
+        own = 2 * np.pi * extra.absorber_hz
+        link(extra.absorber_kg * (own**2 + 2 * extra.absorber_zeta * own * s), {4 + i: -1.0, 4 + count + i: 1.0})
         tire = axle.tire_stiffness_n_per_m + s * extra.tire_damping
         link(tire, {4 + i: 1.0})
         roads[4 + i, i] = tire
@@ -59,6 +67,8 @@ EXTRAS = {
     "rubber": Physics(rubber=9000.0, rubber_s=0.1),
     "seat": Physics(seat_mass_kg=70.0, seat_hz=4.0, seat_zeta=0.25),
     "payload, shift": Physics(payload_kg=90.0, cg_shift_m=0.2),
+    "inerter": Physics(inertance_kg=20.0, inerter_spring=2e5, inerter_damper=250.0),
+    "absorber": Physics(absorber_kg=8.0, absorber_hz=12.0, absorber_zeta=0.1),
     "trailer": Physics(tow_mass_kg=80.0, tow_hz=3.0, tow_zeta=0.15, tow_behind_axle_m=0.8),
 }
 
@@ -121,7 +131,7 @@ def released(car: Car, extra: Physics, lift_m: float, turn: float, seconds: floa
     """States after the body is let go from above its rest; the road is flat."""
     ready = assemble(car, extra)
     n = ready.corners.size
-    first = np.zeros(2 * (6 + n) + 3 * n)
+    first = np.zeros(2 * (6 + n) + INNER * n)
     first[HEAVE], first[PITCH] = lift_m, turn
     first[2 * (6 + n):2 * (6 + n) + n] = -lift_m - turn * ready.corners["ahead"]  # the mounts are at ease
     flat = np.zeros((2 * round(seconds / step_s) + 1, n))
@@ -233,7 +243,7 @@ def test_static_loads_carry_the_weight_without_a_moment(extra: Physics) -> None:
 def test_a_car_over_a_cliff_falls_freely() -> None:
     ready = assemble(CAR, Physics(wheel_lift=True))
     road = np.full((2 * 1200 + 1, 2), -3.0)
-    first = np.zeros(2 * 8 + 6)
+    first = np.zeros(2 * 8 + INNER * 2)
     _, states = integrate(ready.body, ready.corners, road, np.zeros_like(road), STEP_S, False, first, True)
     masses = np.array([CAR.sprung_mass_kg, CAR.front.unsprung_mass_kg, CAR.rear.unsprung_mass_kg])
     centre = states[:, [0, 6, 7]] @ masses / masses.sum()

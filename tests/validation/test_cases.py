@@ -14,12 +14,13 @@ from .cases import random_case as cases
 from .cases.case_files import write_case
 from .cases.random_case import Hidden, case, draw_car, mistaken, with_effects, without
 from .simulator.effects import EFFECTS
+from .simulator.newcomers import NEWCOMERS
 from .simulator.outsiders import OUTSIDERS
 from .simulator.roads import random_road
 from .simulator.scene import Drive, Scene, clean_acceleration, measured
 
 RNG = np.random.default_rng
-ALL = EFFECTS | OUTSIDERS
+ALL = EFFECTS | OUTSIDERS | NEWCOMERS
 
 
 @pytest.fixture(autouse=True)
@@ -38,8 +39,8 @@ def rough_scene(seed: int) -> Scene:
 
 def test_the_list_is_the_contract_and_the_outsiders_are_not_on_it() -> None:
     assert len(EFFECTS) == 20
-    assert not EFFECTS.keys() & OUTSIDERS.keys()
-    assert all(near in EFFECTS for outsider in OUTSIDERS.values() for near in outsider.akin)
+    assert len(ALL) == len(EFFECTS) + len(OUTSIDERS) + len(NEWCOMERS)
+    assert all(near in EFFECTS for outsider in (OUTSIDERS | NEWCOMERS).values() for near in outsider.akin)
 
 
 # These begin where the errors of a speed signal itself end, and that is no longer faint.

@@ -15,8 +15,9 @@ from .cases import random_case as cases
 from .cases.random_case import case
 from .cases.seeds import DEVELOPMENT_SEEDS, RELEASE_SEEDS
 from .cases.visibility import UNSEEN, remainders
-from .examine import questions, read_results
+from .examine import questions
 from .marking.marks import Share, alarm, all_named, first_right, goals, numbers, numbers_right, said, share
+from .marking.results import read_results
 from .marking.sitting import Question, Record, examined
 from .report.pages import Matrix, markdown, page
 

@@ -20,6 +20,7 @@ from scipy.signal import lfilter
 
 from ..simulator.cars import STEP_S, Axle, Car
 from ..simulator.effects import EFFECTS, NEVER_TOGETHER, Effect
+from ..simulator.newcomers import NEWCOMERS
 from ..simulator.outsiders import OUTSIDERS
 from ..simulator.recorder import HUNDREDTH_G_MPS2, RATE_HZ, Noise
 from ..simulator.roads import Road, random_road
@@ -191,14 +192,14 @@ def without(scene: Scene, hidden: tuple[Hidden, ...], *gone: int) -> Scene:
     return rest
 
 
-def _difference_rms(one: tuple[Array, ...], other: tuple[Array, ...]) -> float:
+def difference_rms(one: tuple[Array, ...], other: tuple[Array, ...]) -> float:
     skipped = int(SKIPPED_S * RATE_HZ)
     return float(np.sqrt(np.mean(np.concatenate([(a - b)[skipped:] for a, b in zip(one, other, strict=True)]) ** 2)))
 
 
 def strength(scene: Scene, hidden: tuple[Hidden, ...], which: int, noise: Noise) -> float:
     """R.m.s. of what one effect changes in the clean record, over the noise; roughly, by long steps."""
-    changed = _difference_rms(measured(with_effects(scene, hidden), _SEARCH_STEP_S),
+    changed = difference_rms(measured(with_effects(scene, hidden), _SEARCH_STEP_S),
                               measured(without(scene, hidden, which), _SEARCH_STEP_S))
     return changed / _noise_rms(noise)
 
@@ -215,7 +216,7 @@ def hide(
         both = (*before, found)
         if staged is not scene or "blur_m" in found.parameters:  # then the other side of the comparison moves too
             return staged, found, strength(staged, both, len(both) - 1, noise)
-        changed = _difference_rms(measured(with_effects(scene, both), _SEARCH_STEP_S), bare)
+        changed = difference_rms(measured(with_effects(scene, both), _SEARCH_STEP_S), bare)
         return staged, found, changed / _noise_rms(noise)
 
     goal = np.log(wanted)
@@ -248,7 +249,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def _choose(rng: np.random.Generator, kind: str, seed: int, effect: str | None) -> list[tuple[Effect, float, float]]:
     """The effects of a case with the strength each shall have and the least it must have."""
     names, outside = list(EFFECTS), list(OUTSIDERS)
-    first = (EFFECTS | OUTSIDERS)[effect] if effect else None
+    first = (EFFECTS | OUTSIDERS | NEWCOMERS)[effect] if effect else None
     if kind == "none":
         return []
     if kind == "wandering":
@@ -323,18 +324,18 @@ def recorded(
         for drive, run in zip(scene.drives, recordings, strict=True))
     taken = tuple(run.accel_z_mps2 for run in recordings)
     silence = tuple(np.zeros_like(one) for one in taken)
-    size = _difference_rms(taken, silence)
-    noise_rms = _difference_rms(taken, clean)
+    size = difference_rms(taken, silence)
+    noise_rms = difference_rms(taken, clean)
     found = tuple(
-        replace(each, strength=_difference_rms(clean, measured(without(scene, hidden, i), STEP_S * 2)) / noise_rms)
+        replace(each, strength=difference_rms(clean, measured(without(scene, hidden, i), STEP_S * 2)) / noise_rms)
         for i, each in enumerate(hidden))
     has_roll = full.physics.track_m is not None
     return Case(
         kind, seed, mistaken(rng, scene.car), full, noise, found, recordings,
         tuple(full.written_road(drive) for drive in full.drives),
         has_roll or bool(rng.random() < 0.3), noise_rms,
-        {"noise_floor_error": noise_rms / size, "attainable_error": _difference_rms(taken, by_way) / size,
-         "error_without_effects": _difference_rms(taken, plain) / size},
+        {"noise_floor_error": noise_rms / size, "attainable_error": difference_rms(taken, by_way) / size,
+         "error_without_effects": difference_rms(taken, plain) / size},
     )
 
 

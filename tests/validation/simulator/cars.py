@@ -21,23 +21,26 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .corner_laws import ABSORBER, INNER, SLIP_MPS, absorber_force, damper_force, force_by_travel, force_with_memory
+
 Array = NDArray[np.float64]
 
 GRAVITY_MPS2 = 9.80665
 STEP_S = 1 / 4000
-SLIP_MPS = 0.002
 _STIFFEST = 1.2  # fastest rate of decay times step: Runge-Kutta is stable to 2.78
 
 _CORNER = np.dtype([(name, np.float64) for name in (
     "ahead", "left", "mass", "spring", "cubic", "clearance", "stop", "bump", "rebound", "knee", "slope", "square",
     "mount", "gap", "rubber", "rubber_damper", "bushing", "bushing_yield", "friction", "tire", "tire_cubic",
-    "tire_damper", "load",
+    "tire_damper", "load", "gas", "by_place", "stribeck", "stribeck_mps", "droop", "droop_stop", "droop_damper",
+    "inertance", "inerter_spring", "inerter_damper", "inerter_square", "absorber", "absorber_spring", "absorber_damper",
 )])
 _BODY = np.dtype([(name, np.float64) for name in (
     "mass", "pitch", "roll", "seat_mass", "seat_spring", "seat_damper", "tow_mass", "tow_spring", "tow_damper",
-    "tow_ahead", "bend_omega", "bend_zeta", "bend_gain", "fade", "fade_s", "slip",
+    "tow_ahead", "bend_omega", "bend_zeta", "bend_gain", "fade", "fade_s", "heat", "heat_s", "warm", "warm_s", "slip",
 )])
-# Places in the state: heave, pitch, roll, bending, seat, trailer, wheels; their rates; three inner states per corner.
+# Places in the state: heave, pitch, roll, bending, seat, trailer, wheels; their rates; then the inner states of all
+# corners, kind by kind (``corner_laws``).
 _HEAVE, _PITCH, _ROLL, _BEND, _SEAT, _TOW, _WHEELS = range(7)
 
 
@@ -112,6 +115,28 @@ class Physics:
     patch_m: float | None = None
     track_m: float | None = None
     roll_inertia_kg_m2: float = 0.0
+    gas_height_m: float = np.inf
+    damping_by_place_per_m2: float = 0.0
+    stribeck_n: float = 0.0
+    stribeck_mps: float = 0.05
+    droop_m: float = np.inf
+    droop_stop: float = 0.0
+    droop_damper: float = 0.0
+    inertance_kg: float = 0.0
+    inerter_spring: float = 0.0
+    inerter_damper: float = 0.0
+    inerter_square: float = 0.0
+    absorber_kg: float = 0.0
+    absorber_hz: float = 0.0
+    absorber_zeta: float = 0.0
+    heat_per_j: float = 0.0  # what a joule that the dampers turn into heat takes from the logarithm of their damping
+    heat_s: float = 1.0
+    warm: float = 0.0  # share by which the tires stiffen
+    warm_s: float = 1.0
+    driveline_mps2: float = 0.0
+    driveline_per_m: float = 0.0
+    flat_m: float = 0.0  # depth of a flat spot of the front tire
+    flat_length_m: float = 0.2
     unround_m: float = 0.0  # a heavy spot: its centrifugal force over tire stiffness, at one radian per second
     tire_radius_m: float = 0.31
 
@@ -152,6 +177,8 @@ def assemble(car: Car, extra: Physics) -> Ready:
     # Per side or for both: the sum of forces and the mass that divides it double together.
     body["bend_gain"] = extra.bend_gain / (count * car.sprung_mass_kg)
     body["fade"], body["fade_s"] = extra.fade, extra.fade_s
+    body["heat"], body["heat_s"] = extra.heat_per_j / count, extra.heat_s
+    body["warm"], body["warm_s"] = extra.warm, extra.warm_s
     friction = (extra.friction_front_n, extra.friction_rear_n)
     sticks = extra.friction_law == "stick" and max(friction) > 0
     body["slip"] = 0.0 if sticks else SLIP_MPS
@@ -203,27 +230,33 @@ def _fit(corner: np.void, axle: Axle, extra: Physics) -> None:
     corner["bushing"], corner["bushing_yield"] = extra.bushing, extra.bushing_yield_m
     corner["tire"], corner["tire_cubic"] = axle.tire_stiffness_n_per_m, extra.tire_cubic
     corner["tire_damper"] = extra.tire_damping
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def damper_force(rate, bump, rebound, knee, slope):
-    """Force of a damper on the body at a compression rate: two slopes, each smaller beyond the knee."""
-    speed = abs(rate)
-    shape = speed if speed <= knee else knee + slope * (speed - knee)
-    return bump * shape if rate >= 0 else -rebound * shape
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def damper_rate_of(force, bump, rebound, knee, slope):
-    """The rate at which the same damper gives this force."""
-    shape = force / bump if force >= 0 else -force / rebound
-    speed = shape if shape <= knee else knee + (shape - knee) / slope
-    return speed if force >= 0 else -speed
+    corner["gas"], corner["by_place"] = 1 / extra.gas_height_m, extra.damping_by_place_per_m2
+    corner["stribeck"], corner["stribeck_mps"] = extra.stribeck_n, extra.stribeck_mps
+    corner["droop"], corner["droop_stop"], corner["droop_damper"] = extra.droop_m, extra.droop_stop, extra.droop_damper
+    corner["inertance"], corner["inerter_spring"] = extra.inertance_kg, extra.inerter_spring
+    corner["inerter_damper"], corner["inerter_square"] = extra.inerter_damper, extra.inerter_square
+    omega = 2 * np.pi * extra.absorber_hz
+    corner["absorber"], corner["absorber_spring"] = extra.absorber_kg, extra.absorber_kg * omega**2
+    corner["absorber_damper"] = 2 * extra.absorber_zeta * omega * extra.absorber_kg
 
 
 @njit(cache=True, error_model="numpy")
-def _rates(state, out, body, corners, road, road_rate, dry, health):
-    """d(state)/dt into ``out``; ``dry`` is each corner's present friction force, ``health`` what fading left."""
+def _dissipated(state, corners, health):
+    """The power [W] that all dampers turn into heat, where nothing is in series with them."""
+    n = corners.size
+    m = _WHEELS + n
+    power = 0.0
+    for i in range(n):
+        c = corners[i]
+        v = state[m + _WHEELS + i] - state[m + _HEAVE] - c.ahead * state[m + _PITCH] - c.left * state[m + _ROLL]
+        power += v * damper_force(v, health * c.bump, health * c.rebound, c.knee, c.slope)
+    return power
+
+
+@njit(cache=True, error_model="numpy")
+def _rates(state, out, body, corners, road, road_rate, dry, health, warmth):
+    """d(state)/dt into ``out``; ``dry`` is each corner's present friction force, ``health`` what fading left of the
+    dampers, ``warmth`` what warming made of the tires."""
     n = corners.size
     m = _WHEELS + n
     inner = 2 * m
@@ -233,39 +266,16 @@ def _rates(state, out, body, corners, road, road_rate, dry, health):
         wheel, wheel_rate = state[_WHEELS + i], state[m + _WHEELS + i]
         x = wheel - state[_HEAVE] - c.ahead * state[_PITCH] - c.left * state[_ROLL]
         v = wheel_rate - state[m + _HEAVE] - c.ahead * state[m + _PITCH] - c.left * state[m + _ROLL]
-        force = c.spring * x + c.cubic * x * x * x + c.square * v * abs(v) + dry[i]
-        if x > c.clearance:
-            force += c.stop * (x - c.clearance)
-        bump, rebound = health * c.bump, health * c.rebound
-        if c.mount > 0:
-            strain = x - state[inner + i]
-            strain = max(strain - c.gap, 0.0) + min(strain + c.gap, 0.0)
-            pull = c.mount * strain
-            out[inner + i] = damper_rate_of(pull, bump, rebound, c.knee, c.slope)
-            force += pull
-        else:
-            force += damper_force(v, bump, rebound, c.knee, c.slope)
-            out[inner + i] = v
-        if c.rubber > 0:
-            pull = c.rubber * (x - state[inner + n + i])
-            out[inner + n + i] = pull / c.rubber_damper
-            force += pull
-        else:
-            out[inner + n + i] = 0.0
-        if c.bushing > 0:
-            bent = state[inner + 2 * n + i]
-            out[inner + 2 * n + i] = v - 0.5 * (abs(v) * bent + v * abs(bent)) / c.bushing_yield
-            force += c.bushing * bent
-        else:
-            out[inner + 2 * n + i] = 0.0
+        force = force_by_travel(x, v, c) + dry[i] + force_with_memory(state, out, c, x, v, inner + i, n, health)
         if c.friction > 0 and body.slip > 0:
             force += c.friction * np.tanh(v / body.slip)
+        hung = absorber_force(state, out, c, wheel, wheel_rate, inner + i, n)
         squash = road[i] - wheel
-        tire = c.tire * squash + c.tire_cubic * squash**3 + c.tire_damper * (road_rate[i] - wheel_rate)
+        tire = warmth * c.tire * squash + c.tire_cubic * squash**3 + c.tire_damper * (road_rate[i] - wheel_rate)
         if tire < -c.load:
             tire = -c.load
         out[_WHEELS + i] = wheel_rate
-        out[m + _WHEELS + i] = (tire - force) / c.mass
+        out[m + _WHEELS + i] = (tire - force + hung) / c.mass
         heave += force
         turn += c.ahead * force
         tilt += c.left * force
@@ -321,7 +331,7 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
     Returns the rates of heave, pitch and bending after every step (N + 1, 3), and all states if ``keep``.
     """
     n = corners.size
-    size = 2 * (_WHEELS + n) + 3 * n
+    size = 2 * (_WHEELS + n) + INNER * n
     m = _WHEELS + n
     steps = (road.shape[0] - 1) // 2
     motion = np.zeros((steps + 1, 3))
@@ -329,7 +339,8 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
     state, trial = first.copy(), np.zeros(size)
     k1, k2, k3, k4 = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
     dry = np.zeros(n)
-    health = 1.0
+    health = warmth = 1.0
+    heat = 0.0
     for step in range(steps + 1):
         motion[step, 0] = state[m + _HEAVE]
         motion[step, 1] = state[m + _PITCH]
@@ -340,17 +351,22 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep):
             break
         if body.fade > 0:
             health = 1 - body.fade * (1 - np.exp(-step * dt / body.fade_s))
+        if body.heat > 0:
+            heat += dt * (body.heat * _dissipated(state, corners, health) - heat / body.heat_s)
+            health = np.exp(-heat)
+        if body.warm > 0:
+            warmth = 1 + body.warm * (1 - np.exp(-step * dt / body.warm_s))
         h = 2 * step
-        _rates(state, k1, body, corners, road[h], road_rate[h], dry, health)
+        _rates(state, k1, body, corners, road[h], road_rate[h], dry, health, warmth)
         for j in range(size):
             trial[j] = state[j] + 0.5 * dt * k1[j]
-        _rates(trial, k2, body, corners, road[h + 1], road_rate[h + 1], dry, health)
+        _rates(trial, k2, body, corners, road[h + 1], road_rate[h + 1], dry, health, warmth)
         for j in range(size):
             trial[j] = state[j] + 0.5 * dt * k2[j]
-        _rates(trial, k3, body, corners, road[h + 1], road_rate[h + 1], dry, health)
+        _rates(trial, k3, body, corners, road[h + 1], road_rate[h + 1], dry, health, warmth)
         for j in range(size):
             trial[j] = state[j] + dt * k3[j]
-        _rates(trial, k4, body, corners, road[h + 2], road_rate[h + 2], dry, health)
+        _rates(trial, k4, body, corners, road[h + 2], road_rate[h + 2], dry, health, warmth)
         for j in range(size):
             state[j] += dt / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
         if sticks:
@@ -365,6 +381,7 @@ def finer(ready: Ready, step_s: float) -> int:
     steepest = float(np.max(corners["mount"] / slopes))
     if not ready.sticks:
         steepest = max(steepest, float(np.max(corners["friction"] / corners["mass"])) * 1.2 / SLIP_MPS)
+    steepest = max(steepest, float(np.max(corners["stribeck"] / corners["mass"])) * 1.2 / SLIP_MPS)
     return max(1, int(np.ceil(steepest * step_s / _STIFFEST)))
 
 
@@ -374,9 +391,11 @@ def ride(ready: Ready, road: Array, road_rate: Array, step_s: float, keep: bool 
     Returns rates (N + 1, 3) of heave [m/s], pitch [rad/s], bending [m/s] and, if asked, all states.
     """
     n = ready.corners.size
-    first = np.zeros(2 * (_WHEELS + n) + 3 * n)
+    first = np.zeros(2 * (_WHEELS + n) + INNER * n)
     start = road[0]
     first[_WHEELS:_WHEELS + n] = start
+    absorbers = 2 * (_WHEELS + n) + ABSORBER * n
+    first[absorbers:absorbers + n] = start
     places = np.column_stack([np.ones(n), ready.corners["ahead"], ready.corners["left"]])
     first[:3] = np.linalg.lstsq(places, start, rcond=None)[0]
     first[_SEAT] = first[_HEAVE]

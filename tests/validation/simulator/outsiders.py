@@ -23,7 +23,7 @@ class Outsider(Effect):
     akin: tuple[str, ...] = ()
 
 
-def _damping(car: Car) -> float:
+def damping_of(car: Car) -> float:
     return car.front.suspension_damping_n_s_per_m
 
 
@@ -52,7 +52,7 @@ def _out_of_balance(rng: np.random.Generator, car: Car) -> Path:
     return one("imbalance_m_s2", heaviest / 200, heaviest, tire_radius_m=rng.uniform(0.28, 0.35))
 
 
-def _field(**names: str) -> Callable[[Scene, Parameters], Scene]:
+def fields_of(**names: str) -> Callable[[Scene, Parameters], Scene]:
     return lambda scene, p: scene.with_physics(**{field: p[name] for field, name in names.items()})
 
 
@@ -63,31 +63,31 @@ def _drift(rng: np.random.Generator, car: Car) -> Path:
 
 OUTSIDERS: dict[str, Outsider] = {outsider.name: outsider for outsider in (
     Outsider("quadratic_damping",
-             lambda rng, car: one("square_n_s2_per_m2", 0.02 * _damping(car), 8 * _damping(car)),
-             _field(damper_square="square_n_s2_per_m2"), rough=1, akin=("damper_blow_off",)),
-    Outsider("bushing_hysteresis", _bushing, _field(bushing="stiffness_n_per_m", bushing_yield_m="yield_m"),
+             lambda rng, car: one("square_n_s2_per_m2", 0.02 * damping_of(car), 8 * damping_of(car)),
+             fields_of(damper_square="square_n_s2_per_m2"), rough=1, akin=("damper_blow_off",)),
+    Outsider("bushing_hysteresis", _bushing, fields_of(bushing="stiffness_n_per_m", bushing_yield_m="yield_m"),
              akin=("dry_friction",)),
     Outsider("hardening_tire",
              lambda rng, car: one("cubic_n_per_m3", 20 * car.front.tire_stiffness_n_per_m,
                                   4e4 * car.front.tire_stiffness_n_per_m),
-             _field(tire_cubic="cubic_n_per_m3"), rough=1, akin=("bump_stop", "progressive_spring")),
+             fields_of(tire_cubic="cubic_n_per_m3"), rough=1, akin=("bump_stop", "progressive_spring")),
     Outsider("one_axle_friction", _axle_friction, _rub_one, akin=("dry_friction",), models=("half_car",)),
     Outsider("damper_backlash",
              lambda rng, car: one("gap_m", 1e-5, 0.006, stiffness_n_per_m=3e6),
-             _field(mount_gap_m="gap_m", mount="stiffness_n_per_m"), akin=("top_mount_compliance",)),
-    Outsider("wheel_imbalance", _out_of_balance, _field(unround_m="imbalance_m_s2", tire_radius_m="tire_radius_m")),
+             fields_of(mount_gap_m="gap_m", mount="stiffness_n_per_m"), akin=("top_mount_compliance",)),
+    Outsider("wheel_imbalance", _out_of_balance, fields_of(unround_m="imbalance_m_s2", tire_radius_m="tire_radius_m")),
     Outsider("engine_vibration", _engine, lambda scene, p: scene.with_sensor(
         engine_mps2=p["rms_mps2"], engine_hz=p["frequency_hz"], engine_wander=p["wander_s"], engine_phase=p["phase"])),
     Outsider("damper_fading", lambda rng, car: one("lost_share", 0.01, 0.7, time_s=rng.uniform(10, 30)),
-             _field(fade="lost_share", fade_s="time_s")),
+             fields_of(fade="lost_share", fade_s="time_s")),
     Outsider("rubber_spring",
              lambda rng, car: one("stiffness_n_per_m", 300.0, 3 * car.front.suspension_stiffness_n_per_m,
                                   time_s=float(np.exp(rng.uniform(*np.log([0.03, 0.3]))))),
-             _field(rubber="stiffness_n_per_m", rubber_s="time_s"), akin=("top_mount_compliance",)),
+             fields_of(rubber="stiffness_n_per_m", rubber_s="time_s"), akin=("top_mount_compliance",)),
     Outsider("trailer",
              lambda rng, car: one("mass_kg", 5.0, 0.35 * car.sprung_mass_kg, frequency_hz=rng.uniform(1.5, 5.0),
                                   damping_ratio=rng.uniform(0.05, 0.3), behind_axle_m=rng.uniform(0.5, 1.1)),
-             _field(tow_mass_kg="mass_kg", tow_hz="frequency_hz", tow_zeta="damping_ratio",
+             fields_of(tow_mass_kg="mass_kg", tow_hz="frequency_hz", tow_zeta="damping_ratio",
                     tow_behind_axle_m="behind_axle_m"), akin=("occupant",), models=("half_car",)),
     Outsider("clipping", lambda rng, car: one("limit_mps2", 15.0, 0.4),
              lambda scene, p: scene.with_sensor(clip_mps2=p["limit_mps2"])),

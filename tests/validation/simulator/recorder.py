@@ -43,6 +43,10 @@ class Sensor:
     engine_hz: float = 0.0
     engine_wander: float = 0.0
     engine_phase: float = 0.0
+    held_mps2: float = np.inf  # a loose sensor leaves its seat where the body falls away faster
+    soft_mps2: float = np.inf  # tanh saturates towards it
+    offset_mps2: float = 0.0  # at the start; it decays
+    offset_s: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,24 @@ def _through(numerator: list[float], denominator: list[float], signal: Array, st
     return lfilter(b.ravel(), a, signal)
 
 
+@njit(cache=True, error_model="numpy")
+def _loose(body_mps2, held_mps2, step_s):
+    """The acceleration of a mass that is held down on the body by a constant force and lands without a bounce."""
+    out = body_mps2.copy()
+    gap = apart = 0.0
+    flies = False
+    for k in range(body_mps2.size):
+        if not flies and body_mps2[k] < -held_mps2:
+            flies, gap, apart = True, 0.0, 0.0
+        if flies:
+            apart += (-held_mps2 - body_mps2[k]) * step_s
+            gap += apart * step_s
+            out[k] = -held_mps2
+            if gap <= 0:
+                out[k], flies = body_mps2[k] - apart / step_s, False
+    return out
+
+
 def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float, until_s: float) -> Array:
     """The sensor's output from the acceleration [m/s2] of the place where it is mounted, both fine."""
     signal = acceleration
@@ -112,6 +134,8 @@ def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float, un
         slow = sensor.engine_wander * np.sin(2 * np.pi * 0.05 * at)
         phase = 2 * np.pi * sensor.engine_hz * (at + slow) + sensor.engine_phase
         signal = signal + sensor.engine_mps2 * np.sqrt(2) * np.sin(phase)
+    if np.isfinite(sensor.held_mps2):
+        signal = _loose(signal, sensor.held_mps2, step_s)
     if sensor.mount_hz:
         omega = 2 * np.pi * sensor.mount_hz
         signal = _through([2 * sensor.mount_zeta * omega, omega**2],
@@ -123,6 +147,10 @@ def sense(acceleration: Array, step_s: float, sensor: Sensor, first_s: float, un
     gain = sensor.gain
     if sensor.drift:
         gain = gain * (1 + sensor.drift * np.clip(at / until_s, 0, 1))
+    if np.isfinite(sensor.soft_mps2):
+        signal = sensor.soft_mps2 * np.tanh(signal / sensor.soft_mps2)
+    if sensor.offset_mps2:
+        signal = signal + sensor.offset_mps2 * np.exp(-np.maximum(at, 0.0) / sensor.offset_s)
     return np.clip(gain * signal, -sensor.clip_mps2, sensor.clip_mps2)
 
 

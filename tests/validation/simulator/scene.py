@@ -103,7 +103,26 @@ def wheel_paths(
             size = unround * speed**2 / scene.physics.tire_radius_m**2
             height[:, i] += size * np.sin(wheel_turns + 2.4 * i)
             rate[:, i] += size * np.cos(wheel_turns + 2.4 * i) * speed / scene.physics.tire_radius_m
+    if scene.physics.flat_m:
+        dent, slope = _flat_spot(scene.physics, distance)
+        height[:, 0] += dent
+        rate[:, 0] += slope * speed
     return height, rate
+
+
+def _flat_spot(physics: Physics, distance_m: Array) -> tuple[Array, Array]:
+    """By how much the front tire is lower for its flat spot [m], and the slope of that: a raised cosine each turn."""
+    turn = 2 * np.pi * physics.tire_radius_m
+    angle = 2 * np.pi * ((distance_m + 0.5 * turn) % turn - 0.5 * turn) / physics.flat_length_m
+    on = np.abs(angle) < np.pi
+    return (np.where(on, -0.5 * physics.flat_m * (1 + np.cos(angle)), 0.0),
+            np.where(on, np.pi * physics.flat_m / physics.flat_length_m * np.sin(angle), 0.0))
+
+
+def _driveline(physics: Physics, distance_m: Array, speed_mps: Array) -> Array:
+    """The rate [m/s] of a body that a shaft shakes, so many times a metre."""
+    wave = 2 * np.pi * physics.driveline_per_m
+    return -np.sqrt(2) * physics.driveline_mps2 * np.cos(wave * distance_m) / (wave * np.maximum(speed_mps, 1.0))
 
 
 def clean_acceleration(
@@ -123,6 +142,9 @@ def clean_acceleration(
     height, rate = wheel_paths(scene, drive, half_steps, way)
     motion, _ = ride(ready, height, rate, step_s)
     sensor_rate = motion[:, 0] + scene.physics.sensor_m * motion[:, 1] + motion[:, 2]
+    if scene.physics.driveline_mps2:
+        shaft_m, shaft_mps = way or (drive.distance_m(half_steps), drive.speed_at_mps(half_steps))
+        sensor_rate = sensor_rate + _driveline(scene.physics, shaft_m[::2], shaft_mps[::2])
     return record(sensor_rate, step_s, 0.0, scene.sensor, drive.times_s)
 
 

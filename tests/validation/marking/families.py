@@ -1,0 +1,78 @@
+"""Which families of a learned law are right for which hidden effect off the list.
+
+A family is right where its meaning is the effect's: the law need not have the effect's own equation, but it must say
+what kind of thing is there. Two are right where both are said of the same thing in the field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+BY_TRAVEL, BY_RATE, BY_BOTH, BY_TIRE = "force by travel", "force by rate", "damping by travel", "force by the tire"
+FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading by heat"
+MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
+DRIFT, CHANGE = "sensor drift", "number that changes"
+
+NAMES: dict[str, frozenset[str]] = {
+    BY_TRAVEL: frozenset({"force_by_travel"}),
+    BY_RATE: frozenset({"force_by_rate"}),
+    BY_BOTH: frozenset({"damping_by_travel"}),
+    BY_TIRE: frozenset({"tire_force"}),
+    FRICTION: frozenset({"axle_friction", "friction_with_memory"}),
+    RUBBER: frozenset({"spring_with_memory"}),
+    PLAY: frozenset({"damper_backlash"}),
+    HEAT: frozenset({"damper_heat"}),
+    MASS: frozenset({"hung_mass"}),
+    CORRECTION: frozenset({"record_filter"}),
+    REPEATS: frozenset({"periodic"}),
+    DRIFT: frozenset({"sensor_drift"}),
+    CHANGE: frozenset({"changing_number"}),
+}
+"""What ``ridelog learn`` calls the families of each meaning."""
+
+
+@dataclass(frozen=True)
+class Right:
+    """Meanings that are right for an effect, and why."""
+
+    meanings: tuple[str, ...]
+    because: str
+
+
+RIGHT: dict[str, Right] = {
+    "quadratic_damping": Right((BY_RATE,), "a force by the suspension's rate"),
+    "bushing_hysteresis": Right((FRICTION,), "Bouc-Wen: the force depends on where the motion turned"),
+    "hardening_tire": Right((BY_TIRE,), "a force by the tire's deflection"),
+    "one_axle_friction": Right((FRICTION, BY_RATE), "a force by the sign of the rate"),
+    "damper_backlash": Right((PLAY,), "play in series with a damper: where its ends stand is a state"),
+    "wheel_imbalance": Right((REPEATS,), "once a turn of the wheel"),
+    "engine_vibration": Right((REPEATS,), "a line in time"),
+    "damper_fading": Right((CHANGE, HEAT), "the damping changes with time, as if it warmed"),
+    "rubber_spring": Right((RUBBER,), "a Maxwell branch"),
+    "trailer": Right((MASS,), "a mass on a spring behind the rear axle"),
+    "clipping": Right((CORRECTION,), "of the sensor's reading alone"),
+    "gain_drift": Right((CHANGE, DRIFT), "the gain is a number that was taken for fixed, and it is the sensor's"),
+    "blurred_profile": Right((CORRECTION,), "what was compared lacks short waves, as if it were filtered"),
+    "gas_spring": Right((BY_TRAVEL,), "a force by travel, stiffer in compression"),
+    "place_damper": Right((BY_BOTH,), "a force by travel and rate together"),
+    "stribeck_friction": Right((FRICTION, BY_RATE), "a force by rate that falls; friction"),
+    "rebound_stop": Right((BY_TRAVEL,), "a force by travel and rate, in extension"),
+    "inerter": Right((MASS, RUBBER), "inertia behind a spring: a resonance, or a spring that gives way with time"),
+    "hydraulic_mount": Right((MASS, RUBBER), "a column of fluid behind a spring, as an inerter"),
+    "wheel_absorber": Right((MASS,), "a mass on a spring at each wheel"),
+    "tire_warming": Right((CHANGE,), "the tires' stiffness changes with time"),
+    "damper_heating": Right((HEAT, CHANGE), "the damping falls with the heat that it made"),
+    "flat_spot": Right((REPEATS,), "once a turn of the wheel, with its multiples"),
+    "driveline_order": Right((REPEATS,), "so many times a turn of the wheel"),
+    "warming_sensor": Right((DRIFT,), "an offset that decays"),
+    "soft_saturation": Right((CORRECTION,), "of the sensor's reading alone"),
+    "rattling_sensor": Right((CORRECTION,), "between the body and the record"),
+}
+
+PHASES_OF_THEIR_OWN = frozenset({"wheel_imbalance", "engine_vibration", "flat_spot", "driveline_order"})
+"""Effects that begin each drive somewhere else: no law can say where a run begins that it has not seen."""
+
+
+def named(kind: str, family: str | None) -> bool:
+    """Whether a family is right for a hidden effect. KeyError: not an effect off the list."""
+    return any(family in NAMES[meaning] for meaning in RIGHT[kind].meanings)
