@@ -31,12 +31,14 @@ class Lags:
     """Windows (k,) of all runs in which the model and the measurement are alike.
 
     run           which run it is in
+    middle        the sample in its middle
     along_m       how far into the run [m]
     lag_s, error_s    how much later than the model the measurement is: the model is ahead where it is above 0
     speed_mps     in the window; NaN on a rig
     """
 
     run: npt.NDArray[np.intp]
+    middle: npt.NDArray[np.intp]
     along_m: Array
     lag_s: Array
     error_s: Array
@@ -62,8 +64,8 @@ def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
     rows: list[tuple[float, ...]] = []
     for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
         rows += _windows(number, run, run.main(prediction))
-    table = np.array(rows).reshape(-1, 5).T
-    return Lags(table[0].astype(np.intp), *table[1:])
+    table = np.array(rows).reshape(-1, 6).T
+    return Lags(table[0].astype(np.intp), table[1].astype(np.intp), *table[2:])
 
 
 def followed_m(run: Run, prediction: Array) -> Array:
@@ -152,7 +154,7 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
         lag = start - best
         step, about = (lag - about, lag) if found else (0, lag)
         middle = start + size // 2
-        found.append((number, run.distance_m[middle] - run.distance_m[0],
+        found.append((number, middle, run.distance_m[middle] - run.distance_m[0],
                       lag / run.rate_hz + (late / gain if gain else 0.0), error_s,
                       np.nan if run.timed else max(float(run.speed_mps[start : start + size].mean()), SLOWEST_MPS)))
     return found
