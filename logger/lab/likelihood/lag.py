@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
 _LEAST_WINDOWS = 5
+_LEAST_READ = 0.9
+"""Of a window, lest what stands where nothing was read decides; a tenth moves a lag by less than its error."""
 _GRID_M = 0.1  # a fifth of the shortest wave that is felt
 _LOUD_M = 20.0  # places are compared by their loudness over so much road
 SLOWEST_MPS = 0.5
@@ -131,13 +133,14 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
              least_correlation: float = 0.5) -> list[tuple[float, ...]]:
     size, reach = round(WINDOW_S * run.rate_hz), round(reach_s * run.rate_hz)
     rate_of_change = np.gradient(prediction, 1 / run.rate_hz)
+    read = run.read
     found: list[tuple[float, ...]] = []
     about = step = 0
     for start in range(run.first, run.count - size + 1, size):
         measured = run.measured_mps2[start : start + size]
         low = max(0, start - about - step - reach)
         high = min(run.count - size, start - about - step + reach)
-        if high < low:
+        if high < low or np.mean(read[start : start + size]) < _LEAST_READ:
             continue
         shifted = np.lib.stride_tricks.sliding_window_view(prediction[low : high + size], size)
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))

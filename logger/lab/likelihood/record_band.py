@@ -39,9 +39,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.butterworth import butterworth
-from logger.dsp.pass_band import in_band
+from logger.dsp.pass_band import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
-from logger.runs import LowPass, Run
+from logger.runs import NO_READING, READING, LowPass, Run
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -121,8 +121,17 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
             raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
                              f"to {high_hz:.3g} Hz")
         cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
-        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut))
+        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
+                        usable=run.usable if cut is None else _without_its_end(run))
         found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2)))
+    return found
+
+
+def _without_its_end(run: Run) -> Array:
+    """What each sample is (n,), of a run whose band is cut: at its end a record that was filtered before and a model
+    that was not are cut differently, because neither filter knows how the drive went on."""
+    found = np.full(run.count, READING) if run.usable is None else run.usable.copy()
+    found[max(run.first, run.count - reach(run.rate_hz)):] = NO_READING
     return found
 
 
