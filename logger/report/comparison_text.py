@@ -45,7 +45,9 @@ def headline(found: Comparison) -> list[str]:
     if found.far:
         named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
         lines.append(f"The refit moved {named}, more than {FAR_SIGMA:g} standard deviations of their tolerance. An "
-                     "effect that the model lacks biases them: do not trust these values.")
+                     "effect that the model lacks biases them, or the vehicle's file is of another car: do not trust "
+                     f"these values. ridelog identify --free {','.join(found.far[:_MOST_MOVES])} finds them from the "
+                     "runs alone.")
     return lines
 
 
