@@ -35,8 +35,7 @@ def summary(found: Diagnosis) -> list[str]:
     if found.conflicts:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
         lines.append(f"The fit needs numbers outside their tolerance: {off}. Either the vehicle's file is wrong "
-                     "there, or an effect is missing that no candidate explains. If these effects are all, ridelog "
-                     f"identify --free {','.join(found.conflicts)} finds the numbers from the runs alone.")
+                     "there, or an effect is missing that no candidate explains.")
     lines += distance_error(found.distance_error_m)
     lines.append(_errors(found))
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
