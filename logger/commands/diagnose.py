@@ -85,10 +85,10 @@ def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
         return (f"Next: ridelog add-effect {name} --vehicle {args.vehicle} --out with-{one.effect.name}.yaml "
                 f"{' '.join(map(str, args.runs))}")
     if found.conflicts and not found.left_over:
-        return paragraphs([f"Next: see whether {', '.join(found.conflicts)} of the vehicle's file can be right. From the "
-                           "runs alone they are found by"]) + (
-            f"\nridelog identify --free {','.join(found.conflicts)} --vehicle {args.vehicle} "
-            f"{' '.join(map(str, args.runs))}")
+        names = ", ".join(found.conflicts)
+        words = f"Next: see whether {names} of the vehicle's file can be right. From the runs alone they are found by"
+        return (f"{paragraphs([words])}\nridelog identify --free {','.join(found.conflicts)} --vehicle {args.vehicle} "
+                f"{' '.join(map(str, args.runs))}")
     if found.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where what is left sits."])

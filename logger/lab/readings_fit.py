@@ -63,7 +63,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
         return ReadingsFit(first, model)
     for turn in range(_ROUNDS):
         if moves:
-            at, _ = _moved(model, found, errors, at)
+            at = _moved(model, found, errors, at).at
         there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
         predictions = _whole(model_of(there), _values(found))
         readings = [Readings.of(one).beside(prediction) for one, prediction in zip(there, predictions, strict=True)]
@@ -77,8 +77,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
         if turn and _rests(before, found):
             break
     if moves:
-        _, spread = _moved(model, found, errors, at)
-        found = _with_spread(found, spread)
+        found = _with_spread(found, _moved(model, found, errors, at))
     off_m = max((float(np.abs(error.moved_m(k)).max()) for error, k in zip(errors, at, strict=True)
                  if error is not None and k is not None), default=0.0)
     return ReadingsFit(_as_read(found, first, model, records), model, rounded, off_m)
@@ -115,14 +114,23 @@ def _followed(model: DriveModel, errors: Sequence[RecordError | None]) -> list[A
             for record, error, prediction in zip(model.records, errors, predictions, strict=True)]
 
 
-def _moved(model: DriveModel, found: Fit, errors: Sequence[RecordError | None],
-           at: Sequence[Array | None]) -> tuple[list[Array | None], Array]:
-    """Numbers of the distance errors one step of Gauss and Newton farther, and by which matrix (p, p) the information
-    of the free numbers falls when these errors are integrated out."""
+@dataclass(frozen=True, eq=False)
+class _Moved:
+    """Numbers of the distance errors one step of Gauss and Newton farther; by which matrix (p, p) the information of
+    the free numbers falls when these errors are integrated out; and how many numbers the records told of them."""
+
+    at: list[Array | None]
+    lost: Array
+    freedom: float
+
+
+def _moved(model: DriveModel, found: Fit, errors: Sequence[RecordError | None], at: Sequence[Array | None]) -> _Moved:
+    """How the distance errors follow a fit."""
     predictions, white = _whole(model, _values(found)), found.white
     parts = np.split(found.sensitivities, np.cumsum([len(one) for one in white])[:-1])
     information, pull = found.sensitivities.T @ found.sensitivities, np.zeros(found.sensitivities.shape[1])
     lost = np.zeros_like(information)
+    freedom = 0.0
     solved: list[Array | None] = []
     for run, (error, k) in enumerate(zip(errors, at, strict=True)):
         slopes, left = parts[run], white[run]
@@ -137,6 +145,7 @@ def _moved(model: DriveModel, found: Fit, errors: Sequence[RecordError | None],
         whole = columns.T @ columns + prior
         crossed, gradient = columns.T @ slopes, columns.T @ left - prior @ k[:places]
         both = np.linalg.solve(whole, np.column_stack([crossed, gradient]))
+        freedom += places - float(np.trace(np.linalg.solve(whole, prior)))
         lost += crossed.T @ both[:, :-1]
         pull -= crossed.T @ both[:, -1]
         solved.append(np.asarray(both, float))
@@ -149,7 +158,7 @@ def _moved(model: DriveModel, found: Fit, errors: Sequence[RecordError | None],
         there = k.copy()
         there[: len(error.basis)] += own[:, -1] - own[:, :-1] @ step
         moved.append(there)
-    return moved, lost
+    return _Moved(moved, lost, freedom)
 
 
 def _again(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOptions]) -> Fit:
@@ -164,13 +173,15 @@ def _rests(before: Fit, found: Fit) -> bool:
                for name, error in found.standard_errors.items())
 
 
-def _with_spread(found: Fit, lost: Array) -> Fit:
-    """A fit with the covariance that it has when so much (p, p) of its information is lost."""
+def _with_spread(found: Fit, places: _Moved) -> Fit:
+    """A fit with the covariance that it has with the distance errors integrated out."""
     information = found.sensitivities.T @ found.sensitivities
     alone = np.linalg.pinv(information, rcond=1e-15, hermitian=True)
-    scale = np.sqrt(np.diag(found.covariance) / np.maximum(np.diag(alone), 1e-300))
-    covariance = np.linalg.pinv(information - lost, rcond=1e-15, hermitian=True) * np.outer(scale, scale)
-    errors = np.sqrt(np.maximum(np.diag(covariance), np.diag(found.covariance)))
+    count = len(found.sensitivities)
+    own = found.covariance * count / max(count - places.freedom, 1.0)  # what was fitted to places leaves less
+    scale = np.sqrt(np.diag(own) / np.maximum(np.diag(alone), 1e-300))
+    covariance = np.linalg.pinv(information - places.lost, rcond=1e-15, hermitian=True) * np.outer(scale, scale)
+    errors = np.sqrt(np.maximum(np.diag(covariance), np.diag(own)))
     np.fill_diagonal(covariance, errors**2)
     return replace(found, covariance=covariance, correlation=covariance / np.outer(errors, errors),
                    standard_errors=dict(zip(found.parameters, errors.tolist(), strict=True)))

@@ -48,4 +48,4 @@ def test_places_that_are_off_are_found_and_their_errors_are_counted() -> None:
     assert found.error_after < 1.1 * exact.error_after
     for name, value in TRUE.items():
         assert abs(found.parameters[name] - value) < 3 * found.standard_errors[name]
-        assert found.standard_errors[name] > exact.standard_errors[name]
+        assert found.standard_errors[name] > 0.99 * exact.standard_errors[name]
