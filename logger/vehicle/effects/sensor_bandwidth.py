@@ -48,13 +48,13 @@ class SensorBandwidth(SensorEffect):
     stage = 3
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        """Also those of filters of every order that were run on the record's samples, and those of the filter that the
+        """Also those of filters of low order that were run on the record's samples, and those of the filter that the
         record seems to have gone through, and of the orders beside it.
         """
         found = super().trials(seen)
         if seen is None or not seen.rate_hz:
             return found
-        ways = [(_ON_SAMPLES * seen.rate_hz, order, seen.rate_hz) for order in range(1, _HIGHEST + 1)]
+        ways = [(_ON_SAMPLES * seen.rate_hz, order, seen.rate_hz) for order in (1, 2)]
         if seen.low_pass is not None:
             cutoff_hz, order = seen.low_pass
             ways += [(cutoff_hz, one, sampled_hz) for sampled_hz in (0.0, seen.rate_hz)
