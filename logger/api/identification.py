@@ -116,7 +116,8 @@ def identify(
     """Find numbers of a vehicle, of its effects, and of what is not known of the road, each with its standard error.
 
     vehicle       as in ``read_vehicle``; what is not free stays as it says
-    runs          of one sample rate, with their profiles unless ``obstacles`` or ``road`` say otherwise
+    runs          of one sample rate, with their profiles unless ``obstacles`` or ``road`` say otherwise; what their
+                  run.yaml says of steps, samples and places is used (``lab.readings_fit``)
     free          names as in the vehicle's file (``sprung_mass_kg``, ``front.suspension_damping_n_s_per_m``; ``both.``
                   for the two axles together), ``dry_friction.friction_force_n`` of an effect that the vehicle has,
                   ``bump.height_m``, ``step.start_m``, ``speed_scale`` of the road; ``run2.`` before them for one run
@@ -210,9 +211,10 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     warn    told where it will take long
     """
     from logger.identification.identifiability import NotIdentifiable
-    from logger.identification.session import UnusableRun, error_before, upright_fit
+    from logger.identification.session import UnusableRun, error_before
     from logger.identification.shared_road_covariance import with_common_roughness
-    from logger.report.identification_text import as_json, common_words, lines, tests
+    from logger.lab.readings_fit import fit_to_readings
+    from logger.report.identification_text import as_json, common_words, lines, record_json, record_words, tests
     from logger.simulation.simulated_runs import SimulatedRuns
 
     _check_effects(given, word, records, question, warn)
@@ -224,23 +226,22 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     def model_of_records(of: list[Record]) -> DriveModel:
         return _drive_model(given, of, road, unplaced, question)
 
-    model = model_of_records(records)
     try:
-        fit = upright_fit(model_of_records, records, lambda one: _options(one, question))
+        found = fit_to_readings(model_of_records, records, lambda one: _options(one, question))
     except UnusableRun as error:
         raise BadInput(f"{records[error.run].name}: {error}") from None
     except ValueError as error:
         raise BadInput(f"{records[0].name}: {error}") from None
     except NotIdentifiable as refusal:
-        raise NotIdentifiable(refusal.findings, error_before(model)) from None
-    checks = tests(model, fit)
-    common = with_common_roughness(model, fit)
-    fit = common.fit
+        raise NotIdentifiable(refusal.findings, error_before(model_of_records(records))) from None
+    model, checks = found.model, tests(found.model, found.fit)
+    fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
     return FittedNumbers(
         fit, _fitted(given, model, fit),
-        {**as_json(fit, *checks), "common_roughness": common.share, "runs": [record.name for record in records]},
-        [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common)])
+        as_json(fit, *checks) | record_json(found, common, records),
+        [_head(given, len(fit.free), records, low), *lines(fit, *checks), *common_words(model, common),
+         *record_words(found)])
 
 
 def _check_effects(given: vehicle_file.Model, word: str, records: Sequence[Record], question: Question,

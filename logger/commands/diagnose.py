@@ -86,7 +86,9 @@ def _next(args: argparse.Namespace, given: Bench, found: Diagnosis) -> str:
                 f"{' '.join(map(str, args.runs))}")
     if found.conflicts and not found.left_over:
         names = ", ".join(found.conflicts)
-        return paragraphs([f"Next: see whether {names} of the vehicle's file can be right."])
+        words = f"Next: see whether {names} of the vehicle's file can be right. From the runs alone they are found by"
+        return (f"{paragraphs([words])}\nridelog identify --free {','.join(found.conflicts)} --vehicle {args.vehicle} "
+                f"{' '.join(map(str, args.runs))}")
     if found.unexplained:
         return paragraphs(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where what is left sits."])

@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 HALF_WIDTH_HZ = 1.0
 """From an end of the band to where the filter passes all, and to where it passes nothing. It costs 0.9 s of record on
-either side; half of the 2 s that are left out of every run."""
+either side (``reach``): in front of it half of the 2 s that are left out of every run."""
 _STOP_DB = 60.0
 
 
@@ -32,6 +32,11 @@ def in_band(samples: Array, rate_hz: float, low_hz: float, high_hz: float) -> Ar
     if low_hz > 0:
         found = found - _through(found, _taps(low_hz, min(HALF_WIDTH_HZ, 0.5 * low_hz), rate_hz))
     return found
+
+
+def reach(rate_hz: float) -> int:
+    """How many samples at an end of a record are not what they would be, had it gone on, where its band is cut."""
+    return ceil(kaiser.half_length(_STOP_DB, 4 * np.pi * HALF_WIDTH_HZ / rate_hz))
 
 
 @cache

@@ -64,7 +64,8 @@ def conclusion(found: Comparison) -> str:
     if found.missing and not any(test.road for test in found.tests_found):
         return ("The residual is hardly more than noise, but only with numbers far from those of the vehicle's file. "
                 "Either the file is wrong, or such numbers imitate an effect that is missing. Next: ridelog diagnose "
-                "with the same arguments.")
+                f"with the same arguments; where it finds none, ridelog identify --free {','.join(found.far)} with "
+                "them finds the numbers from the runs alone.")
     if found.missing:
         return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
                 "diagnose with the same arguments says which physical effect would explain it.")

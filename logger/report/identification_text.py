@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, least_share
 from logger.identification.residual_whiteness import UNTESTED, Test, autocorrelation, cross_correlation
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
+from logger.lab.readings_fit import ReadingsFit
+from logger.runs import Run
 from logger.vehicle.named_parameters import Coordinates
 
 NORMAL_95 = 1.959964
@@ -103,6 +105,21 @@ def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
     elif may_have_common(model) and common.fit.noise.name != "road":
         yield (f"If these {runs} runs are over one and the same place, what the road's shape there is off by is the "
                f"same in all of them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
+
+
+def record_words(found: ReadingsFit) -> Iterator[str]:
+    """What of the records was used beside their samples."""
+    if found.rounded:
+        yield "Readings are rounded: each says in which step it was, and no more (step_mps2 in run.yaml)."
+    if found.moved_m:
+        yield (f"Places are about known (place_std_m in run.yaml): they were moved by up to {found.moved_m:.2g} m, and "
+               "the standard errors allow for what is uncertain of them.")
+
+
+def record_json(found: ReadingsFit, common: CommonRoughness, records: Sequence[Run]) -> dict[str, Any]:
+    """The same as an object."""
+    return {"common_roughness": common.share, "rounding_by_bounds": found.rounded, "moved_m": found.moved_m,
+            "runs": [record.name for record in records]}
 
 
 def _ends(fit: Fit) -> str:

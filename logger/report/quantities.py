@@ -50,8 +50,11 @@ def measured(value: float, error: float | None) -> str:
 
 
 def numbers_of(one: Chosen) -> str:
-    """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none."""
-    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items())
+    """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none. Numbers that are given
+    and are as they are when nothing is said are left out."""
+    usual = {parameter.name: parameter.default for parameter in one.effect.parameters if parameter.given}
+    return ", ".join(f"{name} {_with_unit(value, one.standard_errors, name)}" for name, value in one.values.items()
+                     if usual.get(name) != value)
 
 
 def _with_unit(value: float, errors: Mapping[str, float], name: str) -> str:

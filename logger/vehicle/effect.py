@@ -71,6 +71,7 @@ class Parameter:
     choices    if not empty, the only values there are; a fit tries each
     default    what it is when nothing is said; None: it must be said
     step       slopes are taken over so much of it, on its scale; None: a small share of it
+    given      it is what it was given, or what a search begins at: no fit moves it
     """
 
     name: str
@@ -84,6 +85,7 @@ class Parameter:
     choices: tuple[float, ...] = ()
     default: float | None = None
     step: float | None = None
+    given: bool = False
 
     @property
     def allowed(self) -> str:
@@ -111,7 +113,7 @@ class Parameter:
     @property
     def moves(self) -> bool:
         """Whether a fit may move it."""
-        return not self.choices and self.low < self.high
+        return not (self.choices or self.given) and self.low < self.high
 
     def usual_way(self, origin: float = 0.0) -> float:
         """How far the values that it usually has lie from a coordinate: that of its start or, where that is there, the

@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
 _LEAST_WINDOWS = 5
+_LEAST_READ = 0.9
+"""Of a window, lest what stands where nothing was read decides; a tenth moves a lag by less than its error."""
 _GRID_M = 0.1  # a fifth of the shortest wave that is felt
 _LOUD_M = 20.0  # places are compared by their loudness over so much road
 SLOWEST_MPS = 0.5
@@ -31,12 +33,14 @@ class Lags:
     """Windows (k,) of all runs in which the model and the measurement are alike.
 
     run           which run it is in
+    middle        the sample in its middle
     along_m       how far into the run [m]
     lag_s, error_s    how much later than the model the measurement is: the model is ahead where it is above 0
     speed_mps     in the window; NaN on a rig
     """
 
     run: npt.NDArray[np.intp]
+    middle: npt.NDArray[np.intp]
     along_m: Array
     lag_s: Array
     error_s: Array
@@ -62,8 +66,8 @@ def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
     rows: list[tuple[float, ...]] = []
     for number, (run, prediction) in enumerate(zip(runs, predictions, strict=True)):
         rows += _windows(number, run, run.main(prediction))
-    table = np.array(rows).reshape(-1, 5).T
-    return Lags(table[0].astype(np.intp), *table[1:])
+    table = np.array(rows).reshape(-1, 6).T
+    return Lags(table[0].astype(np.intp), table[1].astype(np.intp), *table[2:])
 
 
 def followed_m(run: Run, prediction: Array) -> Array:
@@ -129,13 +133,14 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
              least_correlation: float = 0.5) -> list[tuple[float, ...]]:
     size, reach = round(WINDOW_S * run.rate_hz), round(reach_s * run.rate_hz)
     rate_of_change = np.gradient(prediction, 1 / run.rate_hz)
+    read = run.read
     found: list[tuple[float, ...]] = []
     about = step = 0
     for start in range(run.first, run.count - size + 1, size):
         measured = run.measured_mps2[start : start + size]
         low = max(0, start - about - step - reach)
         high = min(run.count - size, start - about - step + reach)
-        if high < low:
+        if high < low or np.mean(read[start : start + size]) < _LEAST_READ:
             continue
         shifted = np.lib.stride_tricks.sliding_window_view(prediction[low : high + size], size)
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))
@@ -152,7 +157,7 @@ def _windows(number: int, run: Run, prediction: Array, reach_s: float = 0.3,
         lag = start - best
         step, about = (lag - about, lag) if found else (0, lag)
         middle = start + size // 2
-        found.append((number, run.distance_m[middle] - run.distance_m[0],
+        found.append((number, middle, run.distance_m[middle] - run.distance_m[0],
                       lag / run.rate_hz + (late / gain if gain else 0.0), error_s,
                       np.nan if run.timed else max(float(run.speed_mps[start : start + size].mean()), SLOWEST_MPS)))
     return found

@@ -39,14 +39,17 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.butterworth import butterworth
-from logger.dsp.pass_band import in_band
-from logger.lab.likelihood.lag import lags
-from logger.runs import LowPass, Run
+from logger.dsp.pass_band import in_band, reach
+from logger.lab.likelihood.lag import WINDOW_S, lags
+from logger.runs import NO_READING, READING, LowPass, Run
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _BLOCK_S = 3.0
+# Of the loudest power: below that, a spectrum by Hann's windows shows rounding and what leaks from louder frequencies
+# (by Hann's window 110 dB, 60 of its lines away).
+_LEAST_POWER = 1e-9
 _WIDTH_HZ, _LOWEST_HZ, _HIGHEST_OF_RATE = 1.5, 1.0, 0.37
 # Cut-offs, orders, gains and shares of the spectrum that may be noise: finer ones change a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
@@ -63,7 +66,6 @@ _BETTER, _BETTER_DB = 3.5, 1.0
 _ALIKE, _SAME = 0.1, 0.02
 _LOSS = 0.05
 _HIGHEST_ORDER = 8
-_WINDOW = 256  # samples
 _REACH = 1.2  # times the cut-off, up to where phases are read
 _DELAYS_S = np.arange(-0.15, 0.15, 0.0005)  # one of order 8 at 6 Hz delays by 0.14 s
 LEAST_WIDTH_HZ = 3.0
@@ -119,8 +121,17 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
             raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
                              f"to {high_hz:.3g} Hz")
         cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
-        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut))
+        there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
+                        usable=run.usable if cut is None else _without_its_end(run))
         found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2)))
+    return found
+
+
+def _without_its_end(run: Run) -> Array:
+    """What each sample is (n,), of a run whose band is cut: at its end a record that was filtered before and a model
+    that was not are cut differently, because neither filter knows how the drive went on."""
+    found = np.full(run.count, READING) if run.usable is None else run.usable.copy()
+    found[max(run.first, run.count - reach(run.rate_hz)):] = NO_READING
     return found
 
 
@@ -164,7 +175,7 @@ def _seen(fits: Sequence[_Fits], rate_hz: float) -> LowPass | None:
 def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass) -> bool:
     """Whether the phase of the measurement against the model is that of a causal filter rather than a straight line."""
     rate_hz = runs[0].rate_hz
-    f_hz = np.fft.rfftfreq(_WINDOW, 1 / rate_hz)
+    f_hz = np.fft.rfftfreq(_window(rate_hz), 1 / rate_hz)
     cross, own, other = np.zeros(len(f_hz), complex), np.zeros(len(f_hz)), np.zeros(len(f_hz))
     for run, prediction in zip(runs, predictions, strict=True):
         for model, measured in _windows(run, prediction, seen.cutoff_hz):
@@ -191,17 +202,22 @@ def _is_causal(runs: Sequence[Run], predictions: Sequence[Array], seen: LowPass)
 def _windows(run: Run, prediction: Array, cutoff_hz: float) -> Iterator[tuple[Complex, Complex]]:
     """Spectra of the model and of the measurement in windows, the model laid where it fits best."""
     found = lags([run], [in_band(prediction, run.rate_hz, 0.0, cutoff_hz)])
-    taper = np.hanning(_WINDOW + 1)[:-1]
-    f_hz = np.fft.rfftfreq(_WINDOW, 1 / run.rate_hz)
-    way = np.maximum.accumulate(run.distance_m - run.distance_m[0])
-    for along_m, lag_s in zip(found.along_m, found.lag_s, strict=True):
-        first = int(np.searchsorted(way, along_m)) - _WINDOW // 2
+    size = _window(run.rate_hz)
+    taper = np.hanning(size + 1)[:-1]
+    f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
+    for middle, lag_s in zip(found.middle, found.lag_s, strict=True):
+        first = int(middle) - size // 2
         steps = round(lag_s * run.rate_hz)
-        if first < 0 or first - steps < 0 or max(first, first - steps) + _WINDOW > run.count:
+        if first < 0 or first - steps < 0 or max(first, first - steps) + size > run.count:
             continue
-        model = np.fft.rfft(taper * prediction[first - steps : first - steps + _WINDOW])
+        model = np.fft.rfft(taper * prediction[first - steps : first - steps + size])
         late = np.exp(2j * np.pi * f_hz * (lag_s - steps / run.rate_hz))
-        yield model, np.fft.rfft(taper * run.measured_mps2[first : first + _WINDOW]) * late
+        yield model, np.fft.rfft(taper * run.measured_mps2[first : first + size]) * late
+
+
+def _window(rate_hz: float) -> int:
+    """Samples in a window in which phases are read."""
+    return round(WINDOW_S * rate_hz)
 
 
 def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
@@ -213,7 +229,8 @@ def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """Mean sizes of what is left of log S of a run: without a filter, and with each (cut-offs, orders); samples."""
+    """Mean sizes of what is left of log S of a run, of the bands in which there is something: without a filter, and
+    with each (cut-offs, orders); samples."""
 
     plain: float
     filtered: Array
@@ -221,16 +238,17 @@ class _Fits:
 
 
 def _fits(run: Run, prediction: Array) -> _Fits:
-    measured, model = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
+    (measured, silent), (model, still) = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
+    telling = ~(silent & still)
     middles = _LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5)
     behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
     gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
-    through = np.append(0.0, np.geomspace(behind, np.median(measured), _NOISES))
+    through = np.append(0.0, np.geomspace(behind, np.median(measured[telling]), _NOISES))
     made = (gains[:, None, None] * model + through[:, None]).reshape(-1, len(model))
     target = np.log(measured)
 
     def left(power: Array) -> Array:
-        return np.asarray(np.abs(np.log(power + behind) - target).mean(axis=-1).min(axis=-1))
+        return np.asarray(np.abs(np.log(power + behind) - target).sum(axis=-1).min(axis=-1) / telling.sum())
 
     x = np.tan(np.pi * middles / run.rate_hz) / np.tan(np.pi * _cutoffs_hz(run.rate_hz)[:, None] / run.rate_hz)
     tables = [left(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
@@ -241,8 +259,8 @@ def _cutoffs_hz(rate_hz: float) -> Array:
     return np.asarray(np.exp(np.arange(np.log(_LEAST_HZ), np.log(_MOST_OF_RATE * rate_hz), _CUTOFF_STEP)))
 
 
-def _spectrum(run: Run, samples: Array) -> Array:
-    """Mean powers in bands of one width (b,), by Welch's method [m2/s4]."""
+def _spectrum(run: Run, samples: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Mean powers in bands of one width (b,), by Welch's method [m2/s4], and in which of them there is nothing."""
     kept = samples[run.first:]
     size = min(round(_BLOCK_S * run.rate_hz), len(kept))
     taper = np.hanning(size + 1)[:-1]
@@ -250,6 +268,6 @@ def _spectrum(run: Run, samples: Array) -> Array:
     power = (np.abs(np.fft.rfft(blocks * (taper / np.sqrt((taper**2).mean())), axis=1)) ** 2).mean(axis=0) / size
     f_hz = np.fft.rfftfreq(size, 1 / run.rate_hz)
     edges = np.arange(_LOWEST_HZ, _HIGHEST_OF_RATE * run.rate_hz + 0.1, _WIDTH_HZ)
-    floor = np.finfo(float).eps * power.max() + np.finfo(float).tiny
-    means = [np.log(power[(f_hz >= low) & (f_hz < high)] + floor).mean() for low, high in pairwise(edges)]
-    return np.asarray(np.exp(means))
+    floor = _LEAST_POWER * power.max() + np.finfo(float).tiny
+    means = np.exp([np.log(power[(f_hz >= low) & (f_hz < high)] + floor).mean() for low, high in pairwise(edges)])
+    return means, means < 2 * floor

@@ -105,8 +105,8 @@ class ModelResiduals:
 
     @cached_property
     def measured(self) -> list[Array]:
-        """What was measured, the samples that count, per run [m/s2]."""
-        return [run.kept_mps2 for run in self.runs]
+        """What was measured, the samples that count, per run; zeros where nothing was read [m/s2]."""
+        return [run.kept_readings_mps2 for run in self.runs]
 
     @cached_property
     def model(self) -> list[Array]:

@@ -174,7 +174,7 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Sc
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
     shape = next((one.name for one in effect.parameters if one.moves and one.null is None), "")
     for values in trials:
-        choice = tuple(values[parameter.name] for parameter in effect.parameters if parameter.choices)
+        choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.moves)
         one = chosen(effect, values)
         ways = [_as_it_is(base, one, base.state.logs)] if effect.replaces else _scaled(base, one)
         if len(base.quadratics) > 1:  # numbers that are bent towards what an effect does say little of what it does

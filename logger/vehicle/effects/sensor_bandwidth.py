@@ -1,7 +1,10 @@
 """A sensor follows slow motions and not quick ones.
 
 Its low-pass of first order is 1 / (1 + s / w); of second order, Butterworth's 1 / (1 + sqrt(2) s / w + (s / w)^2);
-higher orders are those of a filter that a program runs on the samples (``dsp.butterworth``).
+higher orders are those of a filter that a program runs on the samples (``dsp.butterworth``). Such a one of low order
+too is another filter than a sensor's where its cut-off lies above a fifth or so of the sample rate: it takes all away
+at half of that, and nearly nothing where a sensor's takes some decibels. As a sensor's it would leave the difference,
+which looks like a resonance there.
 """
 
 from __future__ import annotations
@@ -18,6 +21,8 @@ from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 Complex = npt.NDArray[np.complex128]
 
 _HIGHEST = 8
+# Of the sample rate, where a filter that was run on the samples is tried: below about a fifth a sensor's does as well.
+_ON_SAMPLES = 0.33
 # A cut-off that a spectrum tells and one that a delay tells differ by no larger factor: of a filter run on 100 samples
 # a second with 30 Hz, by tan(0.3 pi) / (0.3 pi) = 1.46.
 _NEAR = 1.5
@@ -32,6 +37,9 @@ class SensorBandwidth(SensorEffect):
         Parameter("order", 1.0, 1.0, 8.0, None, Scale.LINEAR, (1.0, 2.0),
                   "1, or 2 to 8 for Butterworth's of that order",
                   choices=tuple(map(float, range(1, _HIGHEST + 1))), default=1.0),
+        Parameter("sampled_hz", 0.0, 0.0, 1e6, None, Scale.LINEAR, (0.0,),
+                  "samples a second that a program runs it on (bilinear transform); 0: it is the sensor's own",
+                  default=0.0, given=True),
     )
     source = "S. Butterworth, On the Theory of Filter Amplifiers (1930)"
     signature = "the measurement falls behind the model more and more as the frequency rises, and comes later"
@@ -40,23 +48,26 @@ class SensorBandwidth(SensorEffect):
     stage = 3
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
-        """Also those of the filter that the record seems to have gone through, and of the orders beside it. One that
-        was run on samples, with 3 dB at the cut-off, delays as a sensor's with a higher one does (bilinear transform).
+        """Also those of filters of low order that were run on the record's samples, and those of the filter that the
+        record seems to have gone through, and of the orders beside it.
         """
         found = super().trials(seen)
-        if seen is not None and seen.low_pass is not None:
+        if seen is None or not seen.rate_hz:
+            return found
+        ways = [(_ON_SAMPLES * seen.rate_hz, order, seen.rate_hz) for order in (1, 2)]
+        if seen.low_pass is not None:
             cutoff_hz, order = seen.low_pass
-            delays_as_hz = seen.rate_hz / np.pi * np.tan(np.pi * cutoff_hz / seen.rate_hz)
-            found += [{"cutoff_hz": float(one_hz), "order": float(one)} for one_hz in (cutoff_hz, delays_as_hz)
-                      for one in range(max(order - 1, 1), min(order + 1, _HIGHEST) + 1)]
-        return found
+            ways += [(cutoff_hz, one, sampled_hz) for sampled_hz in (0.0, seen.rate_hz)
+                     for one in range(max(order - 1, 1), min(order + 1, _HIGHEST) + 1)]
+        return found + [{"cutoff_hz": float(one_hz), "order": float(one), "sampled_hz": float(sampled_hz)}
+                        for one_hz, one, sampled_hz in ways]
 
     def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
         """Where the record has lost what lies above."""
         return seen.low_pass is not None and abs(np.log(values["cutoff_hz"] / seen.low_pass[0])) < np.log(_NEAR)
 
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
-        return butterworth(int(p.order), s, p.cutoff_hz)
+        return butterworth(int(p.order), s, p.cutoff_hz, p.sampled_hz)
 
 
 EFFECT = SensorBandwidth()

@@ -388,7 +388,7 @@ def test_a_car_without_effects_is_a_model_too(tmp_path: Path) -> None:
 def test_what_is_not_said_is_the_default(tmp_path: Path) -> None:
     path = tmp_path / "car.yaml"
     path.write_text(TEXT.replace("effects: []", "effects: [{name: sensor_bandwidth, cutoff_hz: 20}]"))
-    assert read_model(path).effects[0].values == {"cutoff_hz": 20.0, "order": 1.0}
+    assert read_model(path).effects[0].values == {"cutoff_hz": 20.0, "order": 1.0, "sampled_hz": 0.0}
 
 
 def test_an_effect_of_ones_own_is_found_beside_the_vehicles_file(
