@@ -74,8 +74,11 @@ def known_vehicle(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> KnownCar:
 def known_car(car: Car) -> KnownCar:
     """A car with its effects as readings are judged by: exact if its laws are linear.
 
-    ValueError for a law that is another one at another place or time.
+    ValueError for a law that is another one at another place or time, and for effects on the record in time.
     """
+    if car.records:
+        raise ValueError(f"{car.records[0].effect.name} acts on the record as it runs and has no linear stand-in: "
+                         "expected effects without it here")
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     if not car.bends_laws:
         return LinearCar(car.structure, output, sensors=car.sensors)
