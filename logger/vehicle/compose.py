@@ -166,7 +166,8 @@ def respond(car: Car, passage: Passage) -> Response:
     coordinates, velocities = states[:, :n], states[:, n:]
     road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
     return Response(
-        car.written(passage, passage.recorded(accel, car.factor)), coordinates @ structure.travel.T, velocities @ structure.travel.T,
+        car.written(passage, passage.recorded(accel, car.factor)),
+        coordinates @ structure.travel.T, velocities @ structure.travel.T,
         coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps,
     )
 
