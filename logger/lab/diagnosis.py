@@ -147,13 +147,27 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
     ValueError where the vehicle lacks what an effect needs.
     """
+    search, selection = searched(posterior, effects, present, progress, workers)
+    return judged(posterior, effects, present, search, selection)
+
+
+def searched(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+             progress: Progress = lambda words: None, workers: int = 2) -> tuple[Search, Selection]:
+    """The search of a diagnosis, and what it came to; as ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
     before = refitted(posterior, nominal)
     search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers)
-    selection = search.run(before)
+    return search, search.run(before)
+
+
+def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
+           selection: Selection) -> Diagnosis:
+    """What a search came to, fitted finely, with all that is to be said of it."""
+    progress, tried = search.progress, search.effects
+    nominal = posterior.start(present)
     progress("fitting it finely")
     selection, after = _finely_fitted(search, selection)
     fine, state = after.posterior, after.state
@@ -169,11 +183,10 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
         baseline_error=fine.error(stood), final_error=fine.error(state),
         noise=read, noise_floor_error=floor_error(fine, read), candidates=_candidates(selection, state, len(tried)),
-        obstacles=obstacles, verdict=tuple(selection.gains), excess=above, conflicts=_conflicts(fine, state),
-        steps=_steps(selection, posterior.error(nominal)), effects=with_errors, undetectable=hidden,
-        shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
-        removed=removed, band=compared_band(fine.runs.runs),
-        signals=signal_errors_of(fine, stood, state),
+        obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=above,
+        conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_errors,
+        undetectable=hidden, shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
+        removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, stood, state),
     )
 
 

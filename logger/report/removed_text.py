@@ -45,7 +45,8 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
     if found.drifting:
         lines.append(f"The sensor drifts ({drift_words(found)}): it is no part of the car, and makes "
                      f"{percent(found.drift_share)} of the residual's power as the model stands. Below "
-                     f"{LOWEST_HZ:g} Hz nothing is judged; without the drift the error of the refitted model is {found.error:.3f}.")
+                     f"{LOWEST_HZ:g} Hz nothing is judged; without the drift the error of the refitted model is "
+                     f"{found.error:.3f}.")
     return lines
 
 

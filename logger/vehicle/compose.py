@@ -126,7 +126,7 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     forces = [one for one in ordered if isinstance(one.effect, ForceEffect)]
     laws = []
     for axle in _axles(vehicle):
-        corner = linear(axle.suspension_damping_n_s_per_m)
+        corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear)
         for one in forces:
             assert isinstance(one.effect, ForceEffect)
             corner = one.effect.laws(one.p, corner)

@@ -251,7 +251,8 @@ class BodyEffect(Effect):
 
 
 class ForceEffect(Effect):
-    """A law of springs, dampers and tires, the same at every wheel."""
+    """A law of springs, dampers and tires: the same at every wheel, unless it asks which axle it is at (``laws.rear``).
+    """
 
     @abstractmethod
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

@@ -42,6 +42,7 @@ class Seen(NamedTuple):
     wheel_mps, body_mps             how fast the wheel, and the body's end of the suspension, rise against the ground
     distance_m                      where this wheel stands along the road
     time_s                          since the record's first sample
+    speed_mps                       of the car along the road
     memory                          the law's own states
     """
 
@@ -53,6 +54,7 @@ class Seen(NamedTuple):
     body_mps: Any
     distance_m: Any
     time_s: Any
+    speed_mps: Any
     memory: tuple[Any, ...]
 
 
@@ -96,6 +98,7 @@ class CornerLaws:
     tire_damping_n_s_per_m  of the tire
     tires                   forces by deflection beyond the linear tire: deflection [m] -> force [N]
     tire_pulls              whether the tire holds on to the road, as the linear model has it
+    rear                    whether it is a corner of the rear axle, for laws that the two axles do not share
     """
 
     damping_n_s_per_m: float
@@ -112,6 +115,7 @@ class CornerLaws:
     tire_damping_n_s_per_m: float = 0.0
     tires: tuple[Law, ...] = ()
     tire_pulls: bool = True
+    rear: bool = False
 
     @property
     def rubs(self) -> bool:
@@ -137,6 +141,6 @@ class CornerLaws:
         return replace(self, tires=(*self.tires, law))
 
 
-def linear(damping_n_s_per_m: float) -> CornerLaws:
+def linear(damping_n_s_per_m: float, rear: bool = False) -> CornerLaws:
     """The laws of the linear car, which its matrices hold already."""
-    return CornerLaws(damping_n_s_per_m, lambda rate: damping_n_s_per_m * rate)
+    return CornerLaws(damping_n_s_per_m, lambda rate: damping_n_s_per_m * rate, rear=rear)

@@ -101,12 +101,13 @@ def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
     elif isinstance(effect, BodyEffect):
         effect.structure(p, structure_of(vehicle))
     elif isinstance(effect, ForceEffect):
-        laws = effect.laws(p, linear(vehicle.front.suspension_damping_n_s_per_m))
-        laws.damper(_RATE_MPS)
-        for law in (*laws.springs, *laws.tires):
-            law(_TRAVEL_M)
-        for force in laws.others:
-            force(*np.meshgrid(_TRAVEL_M, _RATE_MPS, indexing="ij"))
+        for rear in (False, True)[: 1 + (vehicle.rear is not None)]:
+            laws = effect.laws(p, linear(vehicle.front.suspension_damping_n_s_per_m, rear))
+            laws.damper(_RATE_MPS)
+            for law in (*laws.springs, *laws.tires):
+                law(_TRAVEL_M)
+            for force in laws.others:
+                force(*np.meshgrid(_TRAVEL_M, _RATE_MPS, indexing="ij"))
     elif isinstance(effect, SensorEffect):
         effect.factor(p, np.asarray(2j * np.pi * np.arange(0.0, 50.0), dtype=np.complex128))
     elif isinstance(effect, RecordEffect):

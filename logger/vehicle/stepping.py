@@ -156,7 +156,7 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     places = way.distance_m[:, None] - structure.behind_m
     return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),
             np.array(memories, dtype=float), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places,
-            np.asarray(way.time_s, dtype=float))
+            np.stack([way.time_s, np.gradient(way.distance_m, way.time_s)], axis=1))
 
 
 def _tabulated(
@@ -170,12 +170,13 @@ def _tabulated(
     rate = np.linspace(-RATE_MPS, RATE_MPS, _POINTS)
     loads = static_tire_loads_n(structure)
     tables, pairs, numbers = [], [], []
+    paired = any(one.others for one in laws)
     for i, one in enumerate(laws):
         mounted = bool(np.isfinite(one.mount_n_per_m))
         mount, low, step = _mount(one, rate, step_s) if mounted else (np.zeros(_POINTS), 0.0, 1.0)
         damper = one.damper(rate) - one.damping_n_s_per_m * rate
         tables.append([_sum(one.springs, travel), damper, mount, _sum(one.tires, travel)])
-        pairs.append(_pairs(one.others))
+        pairs.append(_pairs(one.others, paired))
         numbers.append([
             bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
             one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
@@ -198,15 +199,15 @@ def _mount(laws: CornerLaws, rate: Array, step_s: float) -> tuple[Array, float, 
     return own, float(at[0]), float(2 * reach / (_POINTS - 1))
 
 
-def _pairs(laws: Sequence[Law2]) -> Array:
-    """The sum of laws of travel and rate, as a table."""
+def _pairs(laws: Sequence[Law2], paired: bool) -> Array:
+    """The sum of laws of travel and rate, as a table; of one point in a car where no corner has such a law."""
     from logger.vehicle.stepping_loop import RATE_MPS, TRAVEL_M, UNIT_M, UNIT_MPS
 
-    if not laws:
+    if not paired:
         return np.zeros((1, 1))
     at_m = _even_in_arsinh(UNIT_M, TRAVEL_M, _TRAVEL_SIDE)
     at_mps = _even_in_arsinh(UNIT_MPS, RATE_MPS, _RATE_SIDE)
-    return _sum(laws, *np.meshgrid(at_m, at_mps, indexing="ij"))
+    return np.ascontiguousarray(_sum(laws, *np.meshgrid(at_m, at_mps, indexing="ij")))
 
 
 def _sum(laws: Sequence[Law] | Sequence[Law2], *at: Array) -> Array:

@@ -204,6 +204,8 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
     if laws.damping_n_s_per_m != before.damping_n_s_per_m:
         raise ValueError("expected laws to leave damping_n_s_per_m as it was: another damper is "
                          "replace(laws, damper=...)")
+    if laws.rear is not before.rear:
+        raise ValueError("expected laws to leave rear as it was: it says at which axle they are")
     for name in ("springs", "others", "tires"):
         some = getattr(laws, name)
         if not isinstance(some, tuple) or not all(map(callable, some)):
@@ -215,8 +217,8 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
 
 
 # Motions that a law is tried at: up to what tables of other laws reach to, each as far as it usually goes, and rest.
-_TRIED = np.vstack([np.zeros(8), np.random.default_rng(1).uniform(-1, 1, (30, 8))]) * [
-    0.4, 8.0, 0.1, 8.0, 8.0, 8.0, 1000.0, 100.0]
+_TRIED = np.vstack([np.zeros(9), np.random.default_rng(1).uniform(-1, 1, (30, 9))]) * [
+    0.4, 8.0, 0.1, 8.0, 8.0, 8.0, 1000.0, 100.0, 40.0]
 
 
 def _check_motion(law: MotionLaw) -> None:

@@ -11,8 +11,8 @@ import pytest
 from logger.lab.diagnosis import HAS_IT, Candidate, Diagnosis, Step
 from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.residuals.breakdown import breakdown
-from logger.lab.residuals.residual_tests import run_residual_tests
 from logger.lab.residuals.removed import Removed
+from logger.lab.residuals.residual_tests import run_residual_tests
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
 from logger.report.diagnosis_text import JUDGED_ON, as_json, looks_like, summary, table, untested
@@ -99,7 +99,8 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
 
 
 def test_distances_that_are_off_are_told_of() -> None:
-    assert any("up to 0.34 m" in one for one in summary(replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34))))
+    off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
+    assert any("up to 0.34 m. That makes 40% of" in one for one in summary(off))
 
 
 def test_what_explains_as_well_is_named_with_the_drives_that_would_tell() -> None:

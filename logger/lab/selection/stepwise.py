@@ -110,19 +110,19 @@ class Search:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
             self._rivals[best.effect.name] = self._alike(now, best.gain, best.effect.name, tried)
-            now = self._refit(best)
+            now = self.refit(best)
             earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
             steps.append((best.effect.name, now.hold_out))
             for name in earlier:
                 now, _ = self._reconsidered(now, name)
-        now, gains = self._needed(before, now)
+        now, gains = self.needed(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps))
 
     def left_out(self, found: Selection, name: str) -> Selection:
         """The same without one of the effects that were chosen."""
-        now, gains = self._needed(found.before, self.without(found.now, name))
+        now, gains = self.needed(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
     def round(self, now: Baseline, effects: Sequence[Effect], enough: float = 0.0) -> Round:
@@ -210,7 +210,8 @@ class Search:
         start = LinearModel(posterior, posterior.at(rest, now.state.logs, now.state.record, now.state.size))
         return Baseline.of(fit(start, now.linear.numbers, worth=self.effort.worth_a_round * now.explanation))
 
-    def _refit(self, one: CandidateFit) -> Baseline:
+    def refit(self, one: CandidateFit) -> Baseline:
+        """A model with one more effect, fitted in full."""
         posterior = one.found.posterior
         return Baseline.of(fit(aligned(posterior, one.found.state), one.found.numbers))
 
@@ -224,7 +225,7 @@ class Search:
             one.name == name or one.name not in now.state.names)], gain)
         best = self._simplest(without, tried)
         if best is not None and best.gain > gain + CONFUSED:
-            now, gain = self._refit(best), best.gain
+            now, gain = self.refit(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
         self._rivals[name] = self._alike(without, gain, name, tried)
@@ -236,7 +237,7 @@ class Search:
                      if one.effect.name != name and abs(one.gain - gain) < CONFUSED
                      and not out_of_sight(without.posterior, one.chosen))
 
-    def _needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
+    def needed(self, before: Baseline, now: Baseline) -> tuple[Baseline, dict[str, float]]:
         """The model without effects that are not needed beside the others, or with which the error on what no fit saw
         is larger than without; and what each of those that stay gains."""
         names = list(now.state.names[self.present:])

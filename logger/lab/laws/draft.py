@@ -1,0 +1,152 @@
+"""A law as the text of its file, and the effect that this text makes.
+
+Problem: what is learned is written for people to read, and whatever reads it afterwards has to find the very law that
+was fitted. Solution: a law is drafted as the Python text of an own effect (``docs/own-effect.md``), and what is fitted
+is the effect that this text makes when it is run. What is written in the end is the same text, its numbers where the
+fit found them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from textwrap import fill, indent
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.vehicle.effect import Chosen, Effect, Parameter
+
+Array = npt.NDArray[np.float64]
+
+LEARNED = "learned_"
+"""What the names of learned effects begin with."""
+_WIDTH = 118
+_AXLES = {"front": "if laws.rear:", "rear": "if not laws.rear:"}
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A law before it is fitted.
+
+    family       name of the family that it is of
+    kind         name of the class of ``logger.vehicle.effect`` that it is made from
+    title        in a few words
+    parameters   its numbers
+    source       where the law is from
+    signature    what it leaves in a measurement
+    shown_by     the drive that would show it best
+    method       the function of its class, as its lines stand in the class without their indentation
+    functions    what stands before the class: constants, and functions that the method hands on
+    imports      lines beside those of numpy and of the class
+    axle         "front" or "rear": a force at this axle alone; "": at every wheel
+    variant      tells laws of one family from each other
+    at           what a picture draws its force over: "rate", "travel" or "deflection"; "loop": over the travel as it
+                 goes to and fro; "": there is no picture
+    reference    where a force is what its number says, if there is such a place
+    words        the other lines of its class (``needs_road = True``)
+    """
+
+    family: str
+    kind: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    source: str
+    signature: str
+    shown_by: str
+    method: str
+    functions: str = ""
+    imports: tuple[str, ...] = ()
+    axle: str = ""
+    variant: str = ""
+    at: str = ""
+    reference: float = 0.0
+    words: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return "_".join([LEARNED + self.family, *([self.axle] if self.axle else [])])
+
+    @property
+    def strengths(self) -> tuple[str, ...]:
+        """Names of the numbers at whose null the law does nothing."""
+        return tuple(one.name for one in self.parameters if one.moves and one.null is not None)
+
+    def text(self, values: Mapping[str, float] | None = None, said: Sequence[str] = ()) -> str:
+        """The law's file.
+
+        values    where fits and searches begin; None: as it was drafted
+        said      paragraphs of what is known of it, for the head of the file
+        """
+        parameters = self.parameters if values is None else tuple(_at(one, values[one.name]) for one in self.parameters)
+        head = "\n\n".join(fill(one, _WIDTH) for one in (f"{self.title[0].upper()}{self.title[1:]}.", *said))
+        guard = f"{_AXLES[self.axle]}\n    return laws\n" if self.axle else ""
+        signature, body = self.method.strip("\n").split("\n", 1)
+        method = f"{signature}\n{indent(guard, '    ')}{body}"
+        lines = ["from logger.vehicle.effect import " + ", ".join(sorted({self.kind, "Parameter", "Scale"})),
+                 *self.imports]
+        return "\n".join([
+            f'"""{head}\n"""', "", "import numpy as np", "", *sorted(lines), "",
+            *([self.functions.strip("\n"), ""] if self.functions else []), "",
+            f"class Learned({self.kind}):", f"    name = {self.name!r}", f"    title = {self.title!r}",
+            "    parameters = (", *(indent(_written(one), " " * 8) for one in parameters), "    )",
+            *(f"    {name} = (\n{_long(getattr(self, name))})" for name in ("source", "signature", "shown_by")),
+            *(f"    {one}" for one in self.words), "", indent(method, "    "), "", "", "EFFECT = Learned()", ""])
+
+    @cached_property
+    def effect(self) -> Effect:
+        """What the text makes."""
+        place = {"__name__": f"ridelog_{self.name}"}
+        exec(compile(self.text(), f"<{self.name}>", "exec"), place)
+        effect: object = place["EFFECT"]
+        assert isinstance(effect, Effect)
+        return effect
+
+    def of_axle(self, axle: str) -> Draft:
+        """The same at one axle alone."""
+        return replace(self, axle=axle, title=f"{self.title}, {axle} axle only")
+
+    def force_n(self, values: Mapping[str, float], at: Array, damping_n_s_per_m: float) -> Array:
+        """What it adds over what a picture draws it over (n,) [m, or m/s] [N]; a loop over a travel in time has its own
+        function, ``loop_n``."""
+        from logger.vehicle.effect import ForceEffect
+        from logger.vehicle.laws import linear
+
+        assert isinstance(self.effect, ForceEffect)
+        before = linear(damping_n_s_per_m, self.axle == "rear")
+        laws, still = self.effect.laws(SimpleNamespace(**values), before), np.zeros_like(at)
+        if self.at == "rate":
+            found = laws.damper(at) - before.damper(at) + sum(one(still, at) for one in laws.others)
+            return np.asarray(found + laws.dry_friction_n * np.sign(at))
+        some = laws.tires if self.at == "deflection" else laws.springs
+        others = sum(one(at, still) for one in laws.others) if self.at == "travel" else 0.0
+        return np.asarray(sum((one(at) for one in some), still) + others)
+
+
+def learned(one: Chosen) -> bool:
+    """Whether an effect was learned."""
+    return one.effect.name.startswith(LEARNED)
+
+
+def _at(one: Parameter, value: float) -> Parameter:
+    """A parameter that was found: fits begin there, and nowhere else; within bounds that leave room around it."""
+    return replace(one, start=value, trials=(value,), default=value)
+
+
+def _written(one: Parameter) -> str:
+    """A parameter as it stands in the file."""
+    null = 'float("inf")' if one.null == np.inf else repr(one.null)
+    more = "".join(f", {name}={value!r}" for name, value in (("default", one.default), ("step", one.step))
+                   if value is not None)
+    return (f"Parameter({one.name!r}, start={one.start!r}, low={one.low!r}, high={one.high!r}, null={null},\n"
+            f"          scale=Scale.{one.scale.name}, trials={one.trials!r}{more},\n"
+            f"          meaning={one.meaning!r}),")
+
+
+def _long(text: str) -> str:
+    """A text in lines of the file's width, as it stands between brackets."""
+    lines = fill(text, _WIDTH - 12).split("\n")
+    return "\n".join(f"        {line + ' ' * (number < len(lines))!r}" for number, line in enumerate(lines, 1))

@@ -1,0 +1,1 @@
+"""Families of laws that may be learned: one file each, which offers ``FAMILY``."""

@@ -1,0 +1,113 @@
+"""What a family of laws is to the search that learns one.
+
+A family is one file that offers ``FAMILY``: in the field's words what it is, the laws to be tried (``drafts``), given
+what the runs show of the car's motions, and the sentence with numbers for one that was found.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.laws.draft import Draft
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.runs import Run
+from logger.vehicle.compose import Response
+from logger.vehicle.effect import Chosen
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+Say = Callable[..., str]
+"""A number of the law in words, with its standard error and unit, by its name: ``say("yield_force_n")`` is "161 ± 4 N";
+``say("yield_travel_m", 1000.0, "mm")`` the number in another unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What is known before a law is drafted: the fitted model, and what it does on the runs.
+
+    posterior    what is fitted
+    state        the model as it was fitted without the law
+    """
+
+    posterior: Posterior
+    state: State
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car, as it was fitted."""
+        return self.posterior.prior.vehicle(self.posterior.vehicle, self.state.logs)
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        """Those that were measured."""
+        return self.posterior.runs.runs
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Measured minus predicted acceleration (n,), per run, whole [m/s2]."""
+        return [run.measured_mps2 - run.main(one)
+                for run, one in zip(self.runs, self.state.predictions, strict=True)]
+
+    @cached_property
+    def responses(self) -> list[Response]:
+        """Motions of the suspensions and tires in each run."""
+        return self.posterior.runs.respond(self.posterior.car(self.state.effects, self.state.logs),
+                                           self.posterior.moved_m(self.state.record))
+
+    def reach(self, what: str, share: float) -> float:
+        """Within which a motion stays for such a share of the time, of all wheels: ``travel_m``, ``rate_mps`` or
+        ``deflection_m``; rounded to two digits, as it stands in a file."""
+        size = np.concatenate([np.abs(getattr(one, what)[run.first:]).ravel()
+                               for run, one in zip(self.runs, self.responses, strict=True)])
+        return rounded(float(np.quantile(size, share)))
+
+    @property
+    def axles(self) -> tuple[str, ...]:
+        """Axles that a law may be of alone."""
+        return () if self.vehicle.rear is None else ("front", "rear")
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether all runs are of a road, with a speed and a distance."""
+        return not any(run.timed for run in self.runs)
+
+
+class Family(ABC):
+    """A family of laws.
+
+    name        as the file's
+    title       in a few words
+    akin        names of effects of the list that one of its laws may nearly be
+    shown_by    the drive that shows it best, as an instruction
+    """
+
+    name: str
+    title: str
+    akin: tuple[str, ...] = ()
+    shown_by: str
+
+    @abstractmethod
+    def drafts(self, look: Look) -> list[Draft]:
+        """Laws to be tried, simple ones first; none where such a law cannot be there."""
+
+    def narrower(self, draft: Draft, look: Look) -> list[Draft]:
+        """Variations of a law that promises something: a force at one axle alone."""
+        if draft.kind != "ForceEffect" or draft.axle:
+            return []
+        return [draft.of_axle(axle) for axle in look.axles]
+
+    @abstractmethod
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        """What it is, with numbers and their standard errors: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm".
+        Which axle it is at is added by others."""
+
+
+def rounded(value: float, digits: int = 2) -> float:
+    """A number to so many digits."""
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,85 @@
+"""What no effect of the list is, is learned as a law; what one of them is, or nothing, is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Look
+from logger.lab.laws.learn import Learning, learn
+from logger.plugins import catalogue
+from logger.store.formats.effect_file import own_effect, shipped_effects
+from logger.vehicle.effect import Chosen, ForceEffect, chosen
+from logger.vehicle.laws import CornerLaws, linear
+
+from ...support.lab.secret_runs import EFFECTS, hidden, posterior_of, secret_runs
+
+FAMILIES = catalogue("logger.lab.laws.families", "FAMILY")
+FEW = ("sensor_gain", "sensor_offset", "tire_damping", "damper_asymmetry")
+SQUARE_N_S2_PER_M2 = 2500.0
+
+
+class QuadraticDamping(ForceEffect):
+    """As in ``docs/own-effect.md``; no family has this formula."""
+
+    name = "quadratic_damping"
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return laws.with_force(lambda travel_m, rate_mps: SQUARE_N_S2_PER_M2 * rate_mps * np.abs(rate_mps))
+
+
+def learned(effects: Sequence[Chosen], **how: Any) -> Learning:
+    posterior = posterior_of(secret_runs(effects, **how))
+    return learn(posterior, {name: EFFECTS[name] for name in FEW}, FAMILIES, EFFECTS)
+
+
+def drafts() -> list[Draft]:
+    posterior = posterior_of(secret_runs())
+    look = Look(posterior, posterior.start())
+    found = [(family, draft) for family in FAMILIES.values() for draft in family.drafts(look)]
+    return [*(draft for _, draft in found), *(more for family, draft in found for more in family.narrower(draft, look))]
+
+
+@pytest.mark.parametrize("draft", drafts(), ids=lambda draft: f"{draft.name}-{draft.variant}")
+def test_the_file_of_a_law_is_an_effect_of_ones_own(draft: Draft, tmp_path: Path) -> None:
+    """Whatever a family drafts stands in a file that is read as any user's, with the numbers that it was given."""
+    values = {one.name: one.value(one.coordinate(one.start)) for one in draft.parameters}
+    path = tmp_path / "law.py"
+    path.write_text(draft.text(values, ["A sentence with numbers."]), "utf-8")
+    effect = own_effect(path)
+    assert effect.name == draft.name not in shipped_effects()
+    assert effect.usual == pytest.approx(values) and effect.trials() == [pytest.approx(values)]
+    assert "A sentence with numbers." in path.read_text("utf-8")
+    assert max(map(len, path.read_text("utf-8").splitlines())) <= 120
+
+
+def test_a_law_of_one_axle_leaves_the_other_alone() -> None:
+    one = next(one for one in drafts() if one.axle == "rear")
+    assert isinstance(one.effect, ForceEffect)
+    p = SimpleNamespace(**{parameter.name: parameter.start for parameter in one.parameters})
+    front, rear = linear(1000.0), linear(1000.0, rear=True)
+    assert one.effect.laws(p, front) is front and one.effect.laws(p, rear) is not rear
+
+
+@pytest.mark.slow
+def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
+    found = learned([chosen(QuadraticDamping(), {})], rougher=2.0)
+    law = found.law
+    assert found.diagnosis.unexplained and law is not None
+    assert law.family.name == "force_by_rate" and not law.beside and not law.draft.axle
+    assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
+    true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
+    assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effects", [[], [hidden("damper_asymmetry", rebound_to_bump_ratio=2.0)]], ids=["nothing", "listed"])
+def test_nothing_is_learned_where_nothing_is_missing_or_a_known_effect_is(effects: list[Chosen]) -> None:
+    found = learned(effects, rougher=2.0)
+    assert found.law is None and list(found.diagnosis.verdict) == [one.effect.name for one in effects]
