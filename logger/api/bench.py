@@ -103,7 +103,7 @@ class Bench:
         from logger.lab.compare import compare
         from logger.lab.likelihood.priors import Tolerance
 
-        with self._blamed():
+        with self.blamed():
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given,
                            Tolerance(numbers=self.numbers))
 
@@ -112,7 +112,7 @@ class Bench:
         from logger.lab.diagnosis import diagnose
 
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
-        with self._blamed():
+        with self.blamed():
             return diagnose(self.posterior(searches=True), effects, self.model.effects, tell)
 
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
@@ -153,7 +153,7 @@ class Bench:
 
         if set(values) >= {one.name for one in effect.parameters}:
             return chosen(effect, values)
-        with self._blamed():
+        with self.blamed():
             posterior = self.posterior(searches=True)
             tell("refitting the car's own numbers")
             nominal = posterior.start(self.model.effects)
@@ -171,7 +171,7 @@ class Bench:
         from logger.lab.selection.add_effect import add
 
         tell(f"fitting the car without and with {start.effect.name}")
-        with self._blamed():
+        with self.blamed():
             return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 
     def model_with(self, found: AddedEffects) -> Model:
@@ -191,7 +191,7 @@ class Bench:
                      self.model.given or self.model.vehicle, found.errors)
 
     @contextmanager
-    def _blamed(self) -> Iterator[None]:
+    def blamed(self) -> Iterator[None]:
         """What is wrong with the vehicle names it."""
         try:
             yield

@@ -37,6 +37,7 @@ VERBS = {
     "compare": "model against measurement: the error, where it is, and what kind of thing is missing",
     "diagnose": "which physical effect a model lacks, how certain that is, and what else it could be",
     "add-effect": "add a physical effect to a vehicle: its numbers, the error before and after, what it changed",
+    "learn": "a law out of the data, where no known effect explains what a model lacks",
     "lab": "compare, diagnose, add, compare again, until nothing is missing; writes the story as a page",
     "study": "a table or figure of the reference dissertation beside its printed values",
     "modes": "natural frequencies, damping ratios and mode shapes of a vibration record",

@@ -16,6 +16,7 @@ from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simul
 from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
 from logger.api.lab_loop import LabStory, lab
+from logger.api.learning import LearnedLaw, learn
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.modal import Channels, Modes, make_channels, modes, read_channels
 from logger.api.rides import Comfort, Record, comfort, read_record
@@ -41,6 +42,7 @@ __all__ = [
     "Identification",
     "Iri",
     "LabStory",
+    "LearnedLaw",
     "Log",
     "Model",
     "Modes",
@@ -65,6 +67,7 @@ __all__ = [
     "identify",
     "iri",
     "lab",
+    "learn",
     "make_channels",
     "make_run",
     "modes",

@@ -79,7 +79,8 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effects", [[], [hidden("damper_asymmetry", rebound_to_bump_ratio=2.0)]], ids=["nothing", "listed"])
+@pytest.mark.parametrize("effects", [[], [hidden("damper_asymmetry", rebound_to_bump_ratio=2.0)]],
+                         ids=["nothing", "listed"])
 def test_nothing_is_learned_where_nothing_is_missing_or_a_known_effect_is(effects: list[Chosen]) -> None:
     found = learned(effects, rougher=2.0)
     assert found.law is None and list(found.diagnosis.verdict) == [one.effect.name for one in effects]

@@ -1,0 +1,59 @@
+"""Play in the mount of the dampers: within a gap the damper does not answer.
+
+The gap's state z goes from -1 to 1, and moves with the suspension until it is taken up on either side: Bouc's law with
+a sharp yield. As long as it moves, the damper does not: what the linear damper would have answered, c z' g, is taken
+away, g the gap either way.
+"""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say
+from logger.lab.laws.families.friction_with_memory import BETWEEN
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_FUNCTIONS = """
+SHARP = 12.0  # exponent: the gap is taken up within its last tenth
+
+
+def force(p, seen):
+    z = seen.memory[0]
+    held = 0.5 * np.minimum(np.abs(z), 1.0) ** SHARP * (1.0 + np.sign(seen.rate_mps * z))
+    return -p.damping_n_s_per_m * seen.rate_mps * (1.0 - held)
+
+
+def rates(p, seen):
+    z = seen.memory[0]
+    held = 0.5 * np.abs(z) ** SHARP * (1.0 + np.sign(seen.rate_mps * z))
+    return (seen.rate_mps / p.gap_m * (1.0 - held),)
+"""
+_METHOD = """
+def laws(self, p, laws):
+    if p.gap_m == 0:
+        return laws
+    p = SimpleNamespace(gap_m=p.gap_m, damping_n_s_per_m=laws.damping_n_s_per_m)
+    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))
+"""
+
+
+class DamperBacklash(Family):
+    name = "damper_backlash"
+    title = "play in the mounts of the dampers"
+    akin = ("top_mount_compliance",)
+    shown_by = "drive a smooth road, so that the suspension moves by little more than the play"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        return [Draft(
+            family=self.name, kind="ForceEffect", title=self.title, shown_by=self.shown_by,
+            parameters=(Parameter("gap_m", 0.001, 0.0, 0.05, 0.0, Scale.LINEAR, (0.0003, 0.001, 0.003),
+                                  "either way, within which the damper does not answer"),),
+            source="M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash",
+            signature="small motions are hardly damped; larger ones are, but late",
+            functions=_FUNCTIONS,
+            method=_METHOD, imports=(*BETWEEN, "from types import SimpleNamespace"), at="loop")]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        return f"play in the dampers' mounts, {say('gap_m', 1000.0, 'mm')} either way"
+
+
+FAMILY = DamperBacklash()

@@ -1,0 +1,49 @@
+"""Friction that gives before it slides: bushings, leaves, belts of a tire. The law of Bouc and Wen with one memory."""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_FUNCTIONS = """
+def force(p, seen):
+    return p.yield_force_n * seen.memory[0]
+
+
+def rates(p, seen):
+    z = seen.memory[0]
+    held = 0.5 * np.abs(z) ** p.sharpness_ratio * (1.0 + np.sign(seen.rate_mps * z))
+    return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
+"""
+HANDED_ON = ("def laws(self, p, laws):\n"
+             "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))")
+BETWEEN = ("from logger.vehicle.laws import Between",)
+
+
+class FrictionWithMemory(Family):
+    name = "friction_with_memory"
+    title = "friction with memory in the suspensions"
+    akin = ("hysteresis", "dry_friction")
+    shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        return [Draft(
+            family=self.name, kind="ForceEffect", title="friction that gives before it slides", shown_by=self.shown_by,
+            parameters=(
+                Parameter("yield_force_n", 100.0, 0.0, 20000.0, 0.0, Scale.LINEAR, (100.0,),
+                          "at which each suspension slides"),
+                Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
+                          "over which it would come to that at its first stiffness"),
+                Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
+                          "exponent of the law: the higher, the sharper the yield", default=1.0)),
+            source="R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
+                   "ASCE 102 (1976) 249",
+            signature="small motions meet a stiffer spring, larger ones friction",
+            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        return f"friction with memory, {say('yield_force_n')} over {say('yield_travel_m', 1000.0, 'mm')}"
+
+
+FAMILY = FrictionWithMemory()

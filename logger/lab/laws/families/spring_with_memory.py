@@ -1,0 +1,48 @@
+"""A spring whose rubber creeps: a spring and a damper in series beside the suspension's own (Maxwell's branch)."""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.lab.laws.families.friction_with_memory import BETWEEN, HANDED_ON
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_SHARE = 0.5  # of the suspension's own stiffness
+
+_FUNCTIONS = """
+def force(p, seen):
+    return p.stiffness_n_per_m * (seen.travel_m - seen.memory[0])
+
+
+def rates(p, seen):
+    return ((seen.travel_m - seen.memory[0]) / p.creep_time_s,)
+"""
+
+
+class SpringWithMemory(Family):
+    name = "spring_with_memory"
+    title = "a spring with memory in the suspensions: rubber that creeps"
+    akin = ("top_mount_compliance", "hysteresis")
+    shown_by = "drive the same road slowly and fast: quick motions meet a stiffer spring than slow ones"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        stiffness = rounded(_SHARE * look.vehicle.front.suspension_stiffness_n_per_m)
+        return [Draft(
+            family=self.name, kind="ForceEffect", title="rubber beside the springs that creeps",
+            shown_by=self.shown_by,
+            parameters=(
+                Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
+                          "of the rubber where it has no time to creep"),
+                Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
+                          "in which its force falls to 37 %")),
+            source="J. C. Maxwell, Phil. Trans. R. Soc. 157 (1867) 49; for rubber: M. Berg, Vehicle System Dynamics 30 "
+                   "(1998) 197",
+            signature="the suspension is stiffer for quick motions than for slow ones",
+            functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        return (f"a spring with memory, {say('stiffness_n_per_m', 0.001, 'N/mm')} that creeps within "
+                f"{say('creep_time_s', 1000.0, 'ms')}")
+
+
+FAMILY = SpringWithMemory()

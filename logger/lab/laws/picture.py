@@ -1,0 +1,78 @@
+"""A learned law as a curve with its band over the motions that the runs had, or as the loop that a memory makes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.chart_data import Curves, Line
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Look
+from logger.vehicle.effect import Chosen, ForceEffect
+from logger.vehicle.laws import Seen, linear
+from logger.vehicle.uncertain import NumberErrors
+
+Array = npt.NDArray[np.float64]
+
+_AXES = {"rate": ("rate_mps", "rate of the suspension in m/s, positive in extension"),
+         "travel": ("travel_m", "travel of the suspension in m, positive in extension"),
+         "deflection": ("deflection_m", "height of the wheel over the road from rest in m")}
+_POINTS, _STEP = 201, 1e-4
+_LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 4000
+
+
+def picture(draft: Draft, found: Chosen, errors: NumberErrors, look: Look) -> Curves | None:
+    """What a law adds, over the motions of the runs; None where it is no force that a picture shows."""
+    if draft.at == "loop":
+        return _loops(draft, found, look)
+    if draft.at not in _AXES:
+        return None
+    motion, name = _AXES[draft.at]
+    reach = look.reach(motion, 0.999)
+    at = np.linspace(-reach, reach, _POINTS)
+    damping = look.vehicle.front.suspension_damping_n_s_per_m
+    line = Line("learned", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
+    return Curves(draft.title, name, "force in N", (line,))
+
+
+def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping: float) -> Array:
+    """Standard errors of the curve (n,), to first order in those of its numbers."""
+    kept = [(index, name.partition(".")[2]) for index, name in enumerate(errors.standard_errors)
+            if name.startswith(f"{draft.name}.")]
+    if not kept:
+        return np.zeros_like(at)
+    matrix = errors.matrix()[np.ix_([index for index, _ in kept], [index for index, _ in kept])]
+    columns = []
+    for _, name in kept:
+        deviation = errors.standard_errors[f"{draft.name}.{name}"]
+        high, low = (draft.force_n({**found.values, name: found.values[name] + way * _STEP * deviation}, at, damping)
+                     for way in (1, -1))
+        columns.append((high - low) / (2 * _STEP))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("in,ij,jn->n", columns, matrix, columns), 0.0)))
+
+
+def _loops(draft: Draft, found: Chosen, look: Look) -> Curves | None:
+    """Its force while the suspension goes to and fro, by small and large ways, at the pace of a car's bounce."""
+    assert isinstance(draft.effect, ForceEffect)
+    before = linear(look.vehicle.front.suspension_damping_n_s_per_m, draft.axle == "rear")
+    laws = draft.effect.laws(SimpleNamespace(**found.values), before)
+    lines = []
+    for way_m in sorted({look.reach("travel_m", share) for share in _LOOP_SHARES}):
+        phase = 2 * np.pi * np.linspace(0, _LOOP_TURNS, _LOOP_TURNS * _LOOP_STEPS + 1)
+        travel, rate = way_m * np.sin(phase), way_m * 2 * np.pi * _LOOP_HZ * np.cos(phase)
+        force = sum((one(travel, rate) for one in laws.others), np.zeros_like(travel))
+        force = force + laws.dry_friction_n * np.sign(rate)
+        for law in laws.motions:
+            memory, step_s = np.array(law.memory, dtype=float), 1 / _LOOP_HZ / _LOOP_STEPS
+            still = np.zeros(6)
+            for index, (x, v) in enumerate(zip(travel, rate, strict=True)):
+                seen = Seen._make([x, v, *still, tuple(memory)])
+                force[index] += law.force(law.p, seen)
+                if law.rates is not None:
+                    memory = memory + step_s * np.array(law.rates(law.p, seen))
+        last = slice(-_LOOP_STEPS - 1, None, 20)
+        lines.append(Line(f"{1000 * way_m:.3g} mm", travel[last], force[last]))
+    return Curves(draft.title, "travel of the suspension in m, to and fro at a car's bounce", "force in N",
+                  tuple(lines))

@@ -1,0 +1,50 @@
+"""The page of a learned law: what it is, its picture, what it brings, and what it may be instead."""
+
+from __future__ import annotations
+
+from logger.chart_data import Chart
+from logger.lab.laws.learn import Learning
+from logger.lab.selection.add_effect import AddedEffects
+from logger.report.charts import chart
+from logger.report.diagnosis_page import falling, shape_sections
+from logger.report.document import document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.html import EMPTY, Html
+from logger.report.law_text import as_json, law_lines, learned, sentences, steps_of
+from logger.report.quantities import measured, unit_of
+
+_BAND = "The band is one standard error either way; the curve ends where the runs' motions do."
+
+
+def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, vehicle: str, file: str) -> Html:
+    """What was learned as one HTML document; ``file``: of the law."""
+    title = f"{vehicle}: a law out of the data"
+    runs = ", ".join(found.diagnosis.runs)
+    summary = as_json(found, addition, file)
+    law = found.law
+    if law is None or addition is None:
+        return document(title, [
+            heading(title, runs), _tiles(summary, "no law"), paragraphs(law_lines(found, addition)),
+            shape_sections(found.diagnosis)])
+    one = learned(law, addition)
+    numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
+               for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
+    picture = EMPTY if drawn is None else section(
+        "The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY))
+    return document(title, [
+        heading(title, runs), _tiles(summary, law.family.title), paragraphs(sentences(law, addition)), picture,
+        section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3))),
+        section("How the error fell", falling("Error on all samples", steps_of(law, addition),
+                                              addition.noise_floor_error)),
+        section("Where it is", paragraphs([f"{file}: an effect of your own, which compare, simulate, add-effect and "
+                                           "diagnose --effect-file take.", law.draft.source]))])
+
+
+def _tiles(summary: dict[str, object], name: str) -> Html:
+    def error(key: str) -> str:
+        value = summary[key]
+        return f"{value:.3f}" if isinstance(value, float) else "not known"
+
+    return tiles([("Error of the model as it stands", error("error_before"), "as recorded"),
+                  ("As it ends", error("error_after"), "refitted"),
+                  ("On what no fit saw", error("error_after_unseen"), ""),
+                  ("The sensor's noise alone", error("noise_floor_error"), ""), ("Learned", name, "")])

@@ -1,0 +1,168 @@
+"""A learned law in sentences for a person, as one object for a program, and as its file."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from logger.lab.laws.learn import Law, Learning, Nearest
+from logger.lab.selection.add_effect import AddedEffects
+from logger.report.diagnosis_text import JUDGED_ON, looks_like
+from logger.report.quantities import finite, measured, numbers_of, unit_of
+from logger.report.text_layout import paragraphs
+from logger.vehicle.effect import Chosen
+
+NOTHING = "nothing is missing; no law is learned"
+
+
+def words(law: Law, addition: AddedEffects) -> str:
+    """What it is: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm, front axle only"."""
+    one = learned(law, addition)
+    said = law.family.words(law.draft, one, partial(_number, one))
+    return said + (f", {law.draft.axle} axle only" if law.draft.axle else "")
+
+
+def _number(one: Chosen, name: str, factor: float = 1.0, unit: str | None = None) -> str:
+    error = one.standard_errors.get(name)
+    said = measured(one.values[name] * factor, None if error is None else error * factor)
+    return f"{said} {unit_of(name) if unit is None else unit}".rstrip()
+
+
+def learned(law: Law, addition: AddedEffects) -> Chosen:
+    """The law with its numbers and their errors."""
+    return next(one for one in addition.new if one.effect.name == law.draft.name)
+
+
+def why_none(found: Learning) -> str:
+    """Why no law is learned."""
+    diagnosis = found.diagnosis
+    if not diagnosis.verdict and not diagnosis.unexplained:
+        return NOTHING
+    if not diagnosis.verdict:
+        return "something is missing that no known effect and no law of these families explains; no law is learned"
+    names = " and ".join(diagnosis.verdict)
+    many = len(diagnosis.verdict) > 1
+    if diagnosis.unexplained:
+        return (f"{names} explain{'s' * (not many)} part of what is missing, and no law of these families explains it "
+                "better; no law is learned")
+    return f"{names} explain{'s' * (not many)} it; no law is learned"
+
+
+def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
+    """What a person reads."""
+    if found.law is None or addition is None:
+        said = why_none(found)
+        lines = [paragraphs([f"{said[0].upper()}{said[1:]}."])]
+        lines += [f"  {numbers_of(one)}" if one.values else "" for one in found.diagnosis.missing]
+        if shape := looks_like(found.diagnosis):
+            lines += ["", paragraphs(shape, "- ")]
+        return [*lines, "", paragraphs([_without(found)])]
+    return [paragraphs(sentences(found.law, addition))]
+
+
+def sentences(law: Law, addition: AddedEffects) -> list[str]:
+    """The law, what it brings, and what it may be instead: paragraphs."""
+    said = words(law, addition)
+    lines = [f"Learned: {said}.", _errors(addition)]
+    if law.beside:
+        beside = [one for one in addition.new if one.effect.name != law.draft.name]
+        lines.append("Beside it is missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
+                     + ". Add these to the vehicle first.")
+    share = max(law.listed, 0.0) / law.with_law
+    lines.append(f"The known effects alone explain {share:.0%} of what the model with the law does (2 ln of the "
+                 f"evidence {law.listed:.0f} of {law.with_law:.0f}).")
+    lines += _nearest(law.nearest, law)
+    if law.rivals:
+        others = [f"{one.draft.title}: {one.family.shown_by}" for one in law.rivals]
+        lines.append(f"These runs cannot tell it from {' or '.join(one.draft.title for one in law.rivals)}: each "
+                     "explains about as much. What shows each best, and so would separate them: "
+                     + "; ".join([f"{law.draft.title}: {law.family.shown_by}", *others]) + ".")
+    return lines
+
+
+def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
+    if nearest is None:
+        return ["No known effect of its kind explains any of it."]
+    name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
+    numbers = f" ({numbers_of(nearest.one)})" if nearest.one.values else ""
+    if nearest.as_good:
+        return [f"It is nearly a known law: {name}{numbers} explains {nearest.share:.1%} of what it does, and these "
+                f"runs do not tell the two apart (2 ln of the evidence differs by {gap:+.0f}). Prefer the known one: "
+                f"ridelog add-effect {name}."]
+    return [f"The known effect that comes nearest is {name}{numbers}: in its place it explains {nearest.share:.0%} of "
+            f"what it does (2 ln of the evidence {gap:.0f} less)."]
+
+
+def _errors(addition: AddedEffects) -> str:
+    before, after = addition.unseen_before, addition.unseen_after
+    unseen = "" if before is None or after is None else (
+        f"; on {JUDGED_ON} from {before.error:.3f} to {after.error:.3f}")
+    return (f"Error {addition.error_before:.3f} as the model stands, {addition.error_refitted:.3f} with its numbers "
+            f"refitted, {addition.error_after:.3f} with the law{unseen}. The sensor's noise alone makes about "
+            f"{addition.noise_floor_error:.3f}.")
+
+
+def _without(found: Learning) -> str:
+    diagnosis = found.diagnosis
+    return (f"Error {diagnosis.baseline_error:.3f} as the model stands, {diagnosis.final_error:.3f} with "
+            f"{' and '.join(diagnosis.verdict) or 'its numbers refitted'}. The sensor's noise alone makes about "
+            f"{diagnosis.noise_floor_error:.3f}.")
+
+
+def source_of(found: Learning, addition: AddedEffects | None) -> str:
+    """The law's file; empty where there is none."""
+    law = found.law
+    if law is None or addition is None:
+        return ""
+    said = words(law, addition)
+    seconds = sum((run.count - run.first) / run.rate_hz for run in found.look.runs)
+    count = len(found.look.runs)
+    head = [f"{said[0].upper()}{said[1:]}.",
+            f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
+            "Its numbers begin where that fit ended: ridelog add-effect with this file fits them again, with the car."]
+    return law.draft.text(learned(law, addition).values, head)
+
+
+# --- for a program ---
+
+
+def as_json(found: Learning, addition: AddedEffects | None, path: str | None) -> dict[str, Any]:
+    """What was learned as one JSON object; ``path``: of the law's file."""
+    law, diagnosis = found.law, found.diagnosis
+    if law is None or addition is None:
+        return {
+            "law": None, "family": None, "words": why_none(found), "parameters": {}, "standard_errors": {},
+            "error_before": diagnosis.baseline_error, "error_after": diagnosis.final_error,
+            "error_after_unseen": diagnosis.steps[-1].error, "noise_floor_error": diagnosis.noise_floor_error,
+            "verdict": list(diagnosis.verdict), "unexplained": diagnosis.unexplained,
+            "steps": [{"step": one.words, "error": one.error} for one in diagnosis.steps],
+        }
+    one = learned(law, addition)
+    unseen = addition.unseen_after
+    return {
+        "law": path, "family": law.family.name, "words": words(law, addition), "effect": law.draft.name,
+        "axle": law.draft.axle or None, "parameters": dict(one.values),
+        "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
+        "error_refitted": addition.error_refitted, "error_after": addition.error_after,
+        "error_after_unseen": None if unseen is None else unseen.error,
+        "error_before_unseen": None if addition.unseen_before is None else addition.unseen_before.error,
+        "noise_floor_error": addition.noise_floor_error,
+        "verdict": [other.effect.name for other in law.beside], "unexplained": diagnosis.unexplained,
+        "log_likelihood_gain": law.gain / 2,
+        "listed": {"verdict": list(diagnosis.verdict), "error_unseen": diagnosis.steps[-1].error,
+                   "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
+        "nearest": None if law.nearest is None else {
+            "effect": law.nearest.one.effect.name, "parameters": dict(law.nearest.one.values),
+            "share": law.nearest.share, "as_good": law.nearest.as_good,
+            "log_likelihood_less": (law.nearest.law_gain - law.nearest.gain) / 2},
+        "confused_with": [other.family.name for other in law.rivals],
+        "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
+        "sentences": sentences(law, addition),
+    }
+
+
+def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
+    """How the error fell."""
+    return [("as it was given", addition.error_before), ("numbers refitted", addition.error_refitted),
+            (f"with {' and '.join([*(one.effect.name for one in law.beside), law.draft.title])}",
+             addition.error_after)]
