@@ -7,6 +7,7 @@ added; the loudest wave number is refined where the sum of squares of all cohere
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -76,3 +77,127 @@ def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
             found[index] = abs(turned.sum()) ** 2
             turned = turned * step
     return found / len(signal)
+
+
+# --- a tone whose frequency wanders ---
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A tone whose phase is 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], by how much
+    it is early and late (c, s) [s], and the period T of that [s]; power, in units of the noise's."""
+
+    frequency_hz: float
+    wander_cos_s: float
+    wander_sin_s: float
+    period_s: float
+    power: float
+
+    @property
+    def wanders(self) -> bool:
+        """Whether its frequency changes."""
+        return self.wander_cos_s != 0 or self.wander_sin_s != 0
+
+
+_WINDOW_S, _HOP = 1.0, 0.5
+_DEPTHS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
+"""Of the frequency, as shares: an engine in one gear seldom changes by more."""
+_PERIODS_S = np.array([7.0, 10.0, 14.0, 20.0, 28.0, 40.0])
+_PHASES = np.arange(12) * 2 * np.pi / 12
+_STEPS_HZ = 0.25
+_COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
+
+
+def tone_in_time(look: Look, hz: tuple[float, float], wanders: bool) -> Tone | None:
+    """The tone that is loudest, at the same time since each run began; None where none stands out.
+
+    hz         its mean frequency is between these
+    wanders    its frequency may wander by a sinusoid
+    """
+    signals = white_residuals(look)
+    rate = look.runs[0].rate_hz
+    began_s = look.runs[0].first / rate
+    begin = _steady(signals, rate, hz) if not wanders else _ridge(signals, rate, began_s, hz)
+    at = np.array([begin.frequency_hz, begin.frequency_hz * begin.wander_cos_s,
+                   begin.frequency_hz * begin.wander_sin_s, 1 / begin.period_s])
+    for coherent_s in _COHERENT_S:
+        at = _refined(signals, rate, began_s, at, coherent_s, wanders)
+    power = _coherent(signals, rate, began_s, at, _COHERENT_S[-1])
+    if power < _LOUD * len(signals) or not hz[0] < at[0] < hz[1]:
+        return None
+    return Tone(float(at[0]), float(at[1] / at[0]), float(at[2] / at[0]), float(1 / at[3]), power)
+
+
+def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+    size = _FINER * max(map(len, signals))
+    power = sum(np.abs(np.fft.rfft(one, size)) ** 2 / len(one) for one in signals)
+    f_hz = np.fft.rfftfreq(size, 1 / rate_hz)
+    inside = (f_hz > hz[0]) & (f_hz < hz[1])
+    best = int(np.argmax(np.where(inside, power, 0.0)))
+    return Tone(float(f_hz[best]), 0.0, 0.0, _PERIODS_S[-1], 0.0)
+
+
+def _ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
+    """Where the powers of short windows add up to most along a frequency that goes up and down."""
+    size, hop = round(_WINDOW_S * rate_hz), round(_WINDOW_S * _HOP * rate_hz)
+    taper = np.hanning(size + 1)[:-1]
+    padded = round(rate_hz / _STEPS_HZ)
+    count = 1 + (max(map(len, signals)) - size) // hop
+    power = np.zeros((count, padded // 2 + 1))
+    for one in signals:
+        windows = np.lib.stride_tricks.sliding_window_view(one, size)[::hop]
+        power[: len(windows)] += np.abs(np.fft.rfft(windows * taper, padded, axis=1)) ** 2
+    power -= np.median(power, axis=0)  # what is as loud all along is no tone that wanders
+    middle_s = began_s + (np.arange(count) * hop + 0.5 * size) / rate_hz
+    best = (-np.inf, 0.0, 0.0, 0.0, 1.0)
+    f_hz = np.arange(*hz, _STEPS_HZ)
+    rows = np.arange(count)
+    for period_s in _PERIODS_S:
+        for phase in _PHASES:
+            swing = np.cos(2 * np.pi * middle_s / period_s + phase)
+            for depth in _DEPTHS:
+                place = np.rint(f_hz[:, None] * (1 + depth * swing) / _STEPS_HZ).astype(int)
+                inside = place < power.shape[1]
+                sums = (power[rows, np.where(inside, place, 0)] * inside).sum(axis=1)
+                top = int(sums.argmax())
+                if sums[top] > best[0]:
+                    best = (float(sums[top]), float(f_hz[top]), float(depth), float(phase), float(period_s))
+    _, frequency_hz, depth, phase, period_s = best
+    late_s = depth * period_s / (2 * np.pi)  # the integral of the swing
+    return Tone(frequency_hz, late_s * np.sin(phase), late_s * np.cos(phase), period_s, 0.0)
+
+
+def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float) -> float:
+    """Power along a phase, coherent within so long."""
+    found = 0.0
+    for one in signals:
+        time_s = began_s + np.arange(len(one)) / rate_hz
+        turn = 2 * np.pi * time_s * at[3]
+        turned = one * np.exp(-2j * np.pi * (at[0] * time_s + at[1] * np.cos(turn) + at[2] * np.sin(turn)))
+        pieces = max(1, int(len(one) / (coherent_s * rate_hz)))
+        size = len(one) // pieces
+        sums = turned[: pieces * size].reshape(pieces, size).sum(axis=1)
+        found += float((np.abs(sums) ** 2).sum()) / size / pieces
+    return found
+
+
+def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
+             wanders: bool) -> Array:
+    from scipy.optimize import minimize
+
+    lasts_s = min(coherent_s, max(map(len, signals)) / rate_hz)
+    # A quarter of a cycle within what is coherent, by each number.
+    sizes = np.array([0.25 / lasts_s, 0.1, 0.1, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
+    free = [0, 1, 2, 3] if wanders else [0]
+
+    def lack(x: Array) -> float:
+        there = at.copy()
+        there[free] += x * sizes[free]
+        return -_coherent(signals, rate_hz, began_s, there, coherent_s)
+
+    simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
+    found = minimize(lack, np.zeros(len(free)), method="Nelder-Mead",
+                     options={"initial_simplex": simplex, "maxfev": 60 * len(free), "xatol": 0.02, "fatol": 0.1})
+    there = at.copy()
+    there[free] += found.x * sizes[free]
+    return there

@@ -21,7 +21,8 @@ class Clipping(Family):
 
     def drafts(self, look: Look) -> list[Draft]:
         greatest = max(float(np.abs(run.kept_mps2).max()) for run in look.runs)
-        reach = max(float(np.abs(run.main(one)).max()) for run, one in zip(look.runs, look.state.predictions, strict=True))
+        predictions = look.state.predictions
+        reach = max(float(np.abs(run.main(one)).max()) for run, one in zip(look.runs, predictions, strict=True))
         if reach < _AT_LIMIT[1] * greatest:
             return []
         limit = Parameter("limit_mps2", rounded(greatest, 4), rounded(0.1 * greatest), rounded(10 * greatest),

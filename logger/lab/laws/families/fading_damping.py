@@ -39,7 +39,7 @@ class FadingDamping(Family):
                       imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))]
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
-        return f"a damping of which a share of {say('lost_ratio')} is lost as a run goes on, within about {say('time_s')}"
+        return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"
 
 
 FAMILY = FadingDamping()

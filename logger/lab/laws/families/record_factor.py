@@ -6,6 +6,9 @@ rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, Look, Say
 from logger.vehicle.effect import Chosen, Parameter, Scale
@@ -33,7 +36,7 @@ class RecordFactor(Family):
                          step=0.01)
         frequency = Parameter("frequency_hz", 10.0, 0.5, 60.0, None, Scale.LOG, _HZ, "of the pole")
         damping = Parameter("damping_ratio", 0.2, 0.02, 2.0, None, Scale.LOG, (0.2,), "of the pair of poles")
-        common = {"family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
+        common: dict[str, Any] = {"family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
                   "source": "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)",
                   "signature": "the measurement is the model times one function of frequency, whatever the road"}
         return [Draft(parameters=(added, frequency), method=_POLE, variant="pole", **common),
@@ -48,8 +51,6 @@ class RecordFactor(Family):
 
 
 def _begun(frequency: Parameter, at_hz: float) -> Parameter:
-    from dataclasses import replace
-
     return replace(frequency, start=at_hz, trials=(at_hz,))
 
 

@@ -8,14 +8,11 @@ radius is divided. Where a wheel stood when the recording began nobody knows: ea
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, Look, Say
 from logger.lab.laws.repeating import along_the_way
 from logger.vehicle.effect import Chosen, Parameter, Scale
-
-Array = npt.NDArray[np.float64]
 
 _FUNCTIONS = """
 def turning(p, seen):
@@ -68,13 +65,16 @@ class WheelTurns(Family):
         return []
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
-        sizes = {axle: float(np.hypot(*(found.values["_".join(filter(None, (axle, part, "kg_m")))]
-                                        for part in ("cos", "sin"))))
-                 for axle in (("front", "rear") if "front_cos_kg_m" in found.values else ("",))}
+        sizes = {axle: _size(found, axle) for axle in (("front", "rear") if "front_cos_kg_m" in found.values else ("",))}
         each = " and ".join(f"{size * 1000:.2g} g m{f' at the {axle}' * bool(axle)}" for axle, size in sizes.items())
-        return (f"a force that comes round once in each {2 * np.pi * found.values['turn_radius_m']:.2f} m of the way, "
-                f"as a wheel of {say('turn_radius_m')} turns, and grows with the square of the speed: out of balance by "
-                f"{each}")
+        every_m = 2 * np.pi * found.values["turn_radius_m"]
+        return (f"a force that comes round once in each {every_m:.2f} m of the way, as a wheel of "
+                f"{say('turn_radius_m')} turns, and grows with the square of the speed: out of balance by {each}")
+
+
+def _size(found: Chosen, axle: str) -> float:
+    cosine, sine = (found.values["_".join(filter(None, (axle, part, "kg_m")))] for part in ("cos", "sin"))
+    return float(np.hypot(cosine, sine))
 
 
 FAMILY = WheelTurns()
