@@ -25,9 +25,11 @@ class ChangingGain(Family):
                            f"what is added to the gain over {lasts_s:g} s", step=0.01)
         first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "the gain as a run begins",
                           default=1.0)
-        common: dict[str, Any] = {"family": self.name, "kind": "RecordEffect", "title": self.title, "shown_by": self.shown_by,
-                  "source": "data sheets of accelerometers give a change of sensitivity with temperature",
-                  "signature": "the residual is in proportion to the model, more so the longer a run lasts"}
+        common: dict[str, Any] = {
+            "family": self.name, "kind": "RecordEffect", "title": self.title, "shown_by": self.shown_by,
+            "source": "data sheets of accelerometers give a change of sensitivity with temperature",
+            "signature": "the residual is in proportion to the model, more so the longer a run lasts",
+        }
         from_one = _METHOD.format(lasts_s=lasts_s).replace("p.gain_at_first_ratio", "1.0")
         return [Draft(parameters=(change,), method=from_one, variant="from_one", **common),
                 Draft(parameters=(change, first), method=_METHOD.format(lasts_s=lasts_s), variant="from_any", **common)]

@@ -36,9 +36,11 @@ class RecordFactor(Family):
                          step=0.01)
         frequency = Parameter("frequency_hz", 10.0, 0.5, 60.0, None, Scale.LOG, _HZ, "of the pole")
         damping = Parameter("damping_ratio", 0.2, 0.02, 2.0, None, Scale.LOG, (0.2,), "of the pair of poles")
-        common: dict[str, Any] = {"family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
-                  "source": "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)",
-                  "signature": "the measurement is the model times one function of frequency, whatever the road"}
+        common: dict[str, Any] = {
+            "family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
+            "source": "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)",
+            "signature": "the measurement is the model times one function of frequency, whatever the road",
+        }
         return [Draft(parameters=(added, frequency), method=_POLE, variant="pole", **common),
                 *(Draft(parameters=(added, rate, _begun(frequency, one), damping), method=_PAIR,
                         variant=f"pair_{one:g}", **common) for one in _HZ)]

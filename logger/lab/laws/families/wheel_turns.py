@@ -45,7 +45,7 @@ class WheelTurns(Family):
         radius_m = 1 / (2 * np.pi * per_m)
         axles = look.axles or ("",)
         strengths = [
-            Parameter("_".join(filter(None, (axle, part, "kg_m"))), _USUAL_KG_M, -_MOST_KG_M, _MOST_KG_M, 0.0,
+            Parameter(_name(axle, part), _USUAL_KG_M, -_MOST_KG_M, _MOST_KG_M, 0.0,
                       Scale.LINEAR, (_USUAL_KG_M,), f"mass times distance from the {axle or 'wheel'} axle, {words}",
                       step=0.1 * _USUAL_KG_M)
             for axle in axles for part, words in (("cos", "down where the way is 0"), ("sin", "a quarter turn later"))]
@@ -65,16 +65,17 @@ class WheelTurns(Family):
         return []
 
     def words(self, draft: Draft, found: Chosen, say: Say) -> str:
-        sizes = {axle: _size(found, axle) for axle in (("front", "rear") if "front_cos_kg_m" in found.values else ("",))}
-        each = " and ".join(f"{size * 1000:.2g} g m{f' at the {axle}' * bool(axle)}" for axle, size in sizes.items())
+        axles = ("front", "rear") if "front_cos_kg_m" in found.values else ("",)
+        each = " and ".join(f"{say(_name(axle, 'cos'))} and {say(_name(axle, 'sin'))}{f' at the {axle}' * bool(axle)}"
+                            for axle in axles)
         every_m = 2 * np.pi * found.values["turn_radius_m"]
         return (f"a force that comes round once in each {every_m:.2f} m of the way, as a wheel of "
-                f"{say('turn_radius_m')} turns, and grows with the square of the speed: out of balance by {each}")
+                f"{say('turn_radius_m')} turns, and grows with the square of the speed: out of balance (even "
+                f"and odd part) by {each}")
 
 
-def _size(found: Chosen, axle: str) -> float:
-    cosine, sine = (found.values["_".join(filter(None, (axle, part, "kg_m")))] for part in ("cos", "sin"))
-    return float(np.hypot(cosine, sine))
+def _name(axle: str, part: str) -> str:
+    return "_".join(filter(None, (axle, part, "kg_m")))
 
 
 FAMILY = WheelTurns()
