@@ -35,7 +35,7 @@ from logger.lab.selection.detectability import Undetectable, undetectable_effect
 from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.stepwise import Search, Selection, out_of_sight
+from logger.lab.selection.stepwise import Effort, Search, Selection, out_of_sight
 from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effect_parameters import moves_of
 
@@ -152,14 +152,16 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 
 def searched(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, workers: int = 2) -> tuple[Search, Selection]:
+             progress: Progress = lambda words: None, workers: int = 2, effort: Effort | None = None
+             ) -> tuple[Search, Selection]:
     """The search of a diagnosis, and what it came to; as ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the car's own numbers")
     nominal = posterior.start(present)
     before = refitted(posterior, nominal)
-    search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers)
+    search = Search(tried, len(present), misalignment(posterior, nominal), progress, workers,
+                    effort or Effort())
     return search, search.run(before)
 
 

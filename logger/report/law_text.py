@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from logger.lab.diagnosis import Diagnosis
 from logger.lab.laws.learn import Law, Learning, Nearest
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.diagnosis_text import JUDGED_ON, looks_like
@@ -35,14 +36,13 @@ def learned(law: Law, addition: AddedEffects) -> Chosen:
 
 def why_none(found: Learning) -> str:
     """Why no law is learned."""
-    diagnosis = found.diagnosis
-    if not diagnosis.verdict and not diagnosis.unexplained:
+    if not found.verdict and not found.unexplained:
         return NOTHING
-    if not diagnosis.verdict:
+    if not found.verdict:
         return "something is missing that no known effect and no law of these families explains; no law is learned"
-    names = " and ".join(diagnosis.verdict)
-    many = len(diagnosis.verdict) > 1
-    if diagnosis.unexplained:
+    names = " and ".join(found.verdict)
+    many = len(found.verdict) > 1
+    if found.unexplained:
         return (f"{names} explain{'s' * (not many)} part of what is missing, and no law of these families explains it "
                 "better; no law is learned")
     return f"{names} explain{'s' * (not many)} it; no law is learned"
@@ -51,12 +51,13 @@ def why_none(found: Learning) -> str:
 def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
     """What a person reads."""
     if found.law is None or addition is None:
+        assert found.diagnosis is not None
         said = why_none(found)
         lines = [paragraphs([f"{said[0].upper()}{said[1:]}."])]
-        lines += [f"  {numbers_of(one)}" if one.values else "" for one in found.diagnosis.missing]
+        lines += [f"  {one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values]
         if shape := looks_like(found.diagnosis):
             lines += ["", paragraphs(shape, "- ")]
-        return [*lines, "", paragraphs([_without(found)])]
+        return [*lines, "", paragraphs([_without(found.diagnosis)])]
     return [paragraphs(sentences(found.law, addition))]
 
 
@@ -102,8 +103,7 @@ def _errors(addition: AddedEffects) -> str:
             f"{addition.noise_floor_error:.3f}.")
 
 
-def _without(found: Learning) -> str:
-    diagnosis = found.diagnosis
+def _without(diagnosis: Diagnosis) -> str:
     return (f"Error {diagnosis.baseline_error:.3f} as the model stands, {diagnosis.final_error:.3f} with "
             f"{' and '.join(diagnosis.verdict) or 'its numbers refitted'}. The sensor's noise alone makes about "
             f"{diagnosis.noise_floor_error:.3f}.")
@@ -130,6 +130,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
     """What was learned as one JSON object; ``path``: of the law's file."""
     law, diagnosis = found.law, found.diagnosis
     if law is None or addition is None:
+        assert diagnosis is not None
         return {
             "law": None, "family": None, "words": why_none(found), "parameters": {}, "standard_errors": {},
             "error_before": diagnosis.baseline_error, "error_after": diagnosis.final_error,
@@ -147,9 +148,9 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "error_after_unseen": None if unseen is None else unseen.error,
         "error_before_unseen": None if addition.unseen_before is None else addition.unseen_before.error,
         "noise_floor_error": addition.noise_floor_error,
-        "verdict": [other.effect.name for other in law.beside], "unexplained": diagnosis.unexplained,
+        "verdict": [other.effect.name for other in law.beside], "unexplained": found.unexplained,
         "log_likelihood_gain": law.gain / 2,
-        "listed": {"verdict": list(diagnosis.verdict), "error_unseen": diagnosis.steps[-1].error,
+        "listed": {"verdict": list(found.verdict), "error_unseen": found.listed_error,
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
         "nearest": None if law.nearest is None else {
             "effect": law.nearest.one.effect.name, "parameters": dict(law.nearest.one.values),

@@ -1,18 +1,18 @@
 """A law out of the data, where no known effect explains it.
 
 Problem: something differs, none of the known effects is it, and the user is left with a shape. Solution: first the
-known effects are searched, as a diagnosis does. Where they explain all, nothing is learned. Where something is left, or
-a known effect may only imitate it, families of laws are screened beside the models on the way (without what was found,
-without each of it, with all of it), the promising ones are fitted, and the same evidence that chooses among effects
-chooses among laws: every number counts, so that a curve has to be worth its points. A law takes the place of known
-effects only by decisive evidence.
+known effects are searched, as a diagnosis does. Where nothing is missing, nothing is learned. Else families of laws are
+screened beside the model without any effect, the promising ones are fitted, and the same evidence that chooses among
+effects chooses among laws: every number counts, so that a curve has to be worth its points. Where no law alone explains
+what is missing, laws are tried beside the known effects that were found. Where these leave nothing, a law takes their
+place only by decisive evidence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,10 +20,12 @@ from logger.lab.diagnosis import Diagnosis, judged, searched
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.families.family import Family, Look
 from logger.lab.laws.screening import count_of, screened_law
+from logger.lab.likelihood.noise_floor import UNEXPLAINED, excess
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
-from logger.lab.selection.evidence import CONFUSED
+from logger.lab.selection.evidence import CONFUSED, FALSE_ALARM
 from logger.lab.selection.screening import Baseline, Screened, screened
+from logger.lab.selection.stepwise import Effort as Usual
 from logger.lab.selection.stepwise import Search, Selection
 from logger.vehicle.effect import Chosen, Effect
 
@@ -37,15 +39,19 @@ DECISIVE = 2 * CONFUSED
 class Effort:
     """How much work the choice of a law takes.
 
-    worth_narrowing    families of which one axle alone is tried
-    fitted, refined    how many laws are fitted on a model, and how many of these with slopes of their own
-    worth_fitting      of what the best one promises
+    listed                          how many known effects are sought first; all as usual where no law alone explains
+                                    what is left
+    worth_narrowing                 families of which one axle alone is tried
+    fitted, refined                 how many laws are fitted on a model, and how many of these with slopes of their own
+    worth_fitting, worth_refining   of what the best one promises, and gains
     """
 
-    worth_narrowing: int = 4
-    fitted: int = 6
-    refined: int = 3
+    listed: int = 2
+    worth_narrowing: int = 3
+    fitted: int = 5
+    refined: int = 2
     worth_fitting: float = 0.2
+    worth_refining: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +120,20 @@ class Law:
 class Learning:
     """What came of it.
 
-    diagnosis    of the known effects alone
-    law          None: none is learned
-    look         at what the car does, which pictures of the law need
+    law             None: none is learned
+    look            at what the car does, which pictures of the law need
+    verdict         names of the known effects that are missing where no law is learned, the most certain first
+    listed_error    of the model with these, on what its fit did not see
+    unexplained     whether these leave something
+    diagnosis       of the known effects alone, in full; None where a law is learned
     """
 
-    diagnosis: Diagnosis
     law: Law | None
     look: Look
+    verdict: tuple[str, ...]
+    listed_error: float
+    unexplained: bool
+    diagnosis: Diagnosis | None
 
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
@@ -134,13 +146,28 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    search, selection = searched(posterior, effects, present, progress, workers)
-    diagnosis = judged(posterior, effects, present, search, selection)
+    effort = effort or Effort()
+    few = replace(Usual(), effects=effort.listed)
+    search, selection = searched(posterior, effects, present, progress, workers, few)
+    chooser = _Chooser(search, selection, families, known, effort)
+    law = chooser.alone()
+    if law is None and is_left_over(selection.now) and len(selection.gains) == effort.listed:
+        search.effort = Usual()
+        selection = search.run(selection.before)
+        chooser = replace(chooser, selection=selection)
+    if law is None and is_left_over(selection.now):
+        law = chooser.beside()
     look = Look(selection.before.posterior, selection.before.state)
-    if not diagnosis.unexplained and not diagnosis.verdict:
-        return Learning(diagnosis, None, look)
-    chooser = _Chooser(search, selection, families, known, effort or Effort())
-    return Learning(diagnosis, chooser.law(diagnosis.unexplained), look)
+    diagnosis = judged(posterior, effects, present, search, selection) if law is None else None
+    verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
+    left = is_left_over(selection.now) if diagnosis is None else diagnosis.unexplained
+    return Learning(law, look, verdict, selection.now.hold_out.error, left, diagnosis)
+
+
+def is_left_over(model: Baseline) -> bool:
+    """Whether a model leaves more than the sensor's noise, or bends the car as far as its prior lets it."""
+    posterior, state = model.posterior, model.state
+    return (excess(posterior, state, FALSE_ALARM) > UNEXPLAINED) or posterior.prior.at_the_wall(state.logs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,35 +180,43 @@ class _Chooser:
     known: Mapping[str, Effect]
     effort: Effort
 
-    def law(self, unexplained: bool) -> Law | None:
-        """That with the most evidence; None where none is there."""
-        now = self.selection.now
-        fits = sorted((one for base in self._bases() for one in self._fitted_beside(base)), key=lambda one: one.score)
-        least = 0.0 if unexplained else DECISIVE
-        there = [one for one in fits if one.score < now.score - least and self._is_there(one)]
-        if not there:
+    def alone(self) -> Law | None:
+        """A law that explains all that is missing by itself, better than the known effects do; None where none does, or
+        nothing is missing."""
+        now, before = self.selection.now, self.selection.before
+        if now is before and not is_left_over(now):
             return None
+        least = 0.0 if is_left_over(now) else DECISIVE
+        law, model = self._best(self._fitted_beside(before), now.score - least)
+        return None if model is None or is_left_over(model) else law
+
+    def beside(self) -> Law | None:
+        """A law beside known effects, or one that explains more than they do, though not all."""
+        now, before = self.selection.now, self.selection.before
+        names = now.state.names[self.search.present:]
+        bases = [before, now] if names else [before]
+        if len(names) == 2:  # one of them may only be there in the place of the law
+            bases += [self.search.without(now, name) for name in names]
+        return self._best([one for base in bases for one in self._fitted_beside(base)], now.score)[0]
+
+    def _best(self, fits: Sequence[LawFit], least: float) -> tuple[Law | None, Baseline | None]:
+        """The law with the most evidence, with its model; none where none scores less than ``least``."""
+        there = sorted((one for one in fits if one.score < least and self._is_there(one)), key=lambda one: one.score)
+        if not there:
+            return None, None
         best = self._simplest(there)
         self.search.progress(f"{best.family.title}: fitting the car with it")
         model, gains = self.search.needed(self.selection.before, self.search.refit(best.fit))
-        if best.draft.name not in gains or model.score > now.score - least:
-            return None
+        if best.draft.name not in gains or model.score > least:
+            return None, None
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
         beside = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
         rivals = tuple(_best_of_each(other for other in there if other.family is not best.family
                                      and other.score < best.score + CONFUSED))
-        before = self.selection.before.score
-        return Law(best.family, best.draft, one, beside, gains[best.draft.name], before - now.score,
-                   before - model.score, rivals, self._nearest(model, best, gains[best.draft.name]))
-
-    def _bases(self) -> list[Baseline]:
-        """Models that a law is tried beside: with all that was found, without each of it, and without any."""
-        now, before = self.selection.now, self.selection.before
-        names = now.state.names[self.search.present:]
-        if not names:
-            return [now]
-        others = [self.search.without(now, name) for name in names] if len(names) > 1 else []
-        return [now, *others, before]
+        before, now = self.selection.before.score, self.selection.now.score
+        law = Law(best.family, best.draft, one, beside, gains[best.draft.name], before - now, before - model.score,
+                  rivals, self._nearest(model, best, gains[best.draft.name]))
+        return law, model
 
     def _fitted_beside(self, base: Baseline) -> list[LawFit]:
         """Laws fitted beside a model."""
@@ -200,10 +235,11 @@ class _Chooser:
             search.progress(f"fitting {len(worth)} laws")
             rough = list(pool.map(lambda each: roughly_fitted(base.score, base, each[2])[0], worth))
             found = sorted(zip(worth, rough, strict=True), key=lambda pair: -pair[1].gain)
-            search.progress(f"refining {min(len(found), effort.refined)} laws")
-            fine = list(pool.map(lambda pair: refined(
-                base.score, pair[1], search.effort.worth_a_round * base.explanation), found[: effort.refined]))
-        fits = [*fine, *(fit for _, fit in found[effort.refined:])]
+            near = [fit for _, fit in found[: effort.refined] if fit.gain > effort.worth_refining * found[0][1].gain]
+            search.progress(f"refining {len(near)} laws")
+            fine = list(pool.map(lambda fit: refined(
+                base.score, fit, search.effort.worth_a_round * base.explanation), near))
+        fits = [*fine, *(fit for _, fit in found[len(near):])]
         return [LawFit(family, draft, base, fit)
                 for ((family, draft, _), _), fit in zip(found, fits, strict=True)]
 
@@ -240,9 +276,10 @@ class _Chooser:
         with ThreadPoolExecutor(self.search.workers) as pool:
             tries = list(pool.map(lambda name: roughly_fitted(
                 without.score, without, screened(without, self.known[name], [self.search.seen]))[0], names))
-            fits = list(pool.map(lambda one: refined(without.score, one), tries))
-        nearest = max(fits, key=lambda one: one.gain, default=None)
-        if nearest is None or nearest.gain <= 0:
+        if not tries:
+            return None
+        nearest = refined(without.score, max(tries, key=lambda one: one.gain))
+        if nearest.gain <= 0:
             return None
         return Nearest(nearest.chosen, nearest.gain, law_gain)
 

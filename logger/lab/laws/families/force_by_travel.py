@@ -23,7 +23,7 @@ class ForceByTravel(Family):
     def drafts(self, look: Look) -> list[Draft]:
         common = {
             "family": self.name, "at": "travel", "shown_by": self.shown_by,
-            "source": "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), chapter 5: springs and stops",
+            "source": "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), chapter 5: springs, stops",
             "signature": "large motions meet another spring than small ones",
         }
         usual_m, reach_m = look.reach("travel_m", 0.98), look.reach("travel_m", 0.9999)

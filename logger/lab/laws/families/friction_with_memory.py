@@ -37,8 +37,8 @@ class FrictionWithMemory(Family):
                           "over which it would come to that at its first stiffness"),
                 Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
                           "exponent of the law: the higher, the sharper the yield", default=1.0)),
-            source="R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
-                   "ASCE 102 (1976) 249",
+            source="R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. "
+                   "Div. ASCE 102 (1976) 249",
             signature="small motions meet a stiffer spring, larger ones friction",
             functions=_FUNCTIONS, method=HANDED_ON, imports=BETWEEN, at="loop")]
 

@@ -23,7 +23,7 @@ class TireForce(Family):
     def drafts(self, look: Look) -> list[Draft]:
         common = {
             "family": self.name, "at": "deflection", "shown_by": self.shown_by,
-            "source": "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: radial stiffness grows with the load",
+            "source": "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: stiffness grows with the load",
             "signature": "wheels hop at another frequency where the road is rough",
         }
         usual_m, reach_m = look.reach("deflection_m", 0.98), look.reach("deflection_m", 0.9999)
