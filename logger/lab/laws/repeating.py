@@ -102,7 +102,7 @@ class Tone:
 _WINDOW_S, _HOP = 1.0, 0.5
 _DEPTHS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
 """Of the frequency, as shares: an engine in one gear seldom changes by more."""
-_PERIODS_S = np.array([7.0, 10.0, 14.0, 20.0, 28.0, 40.0])
+_PERIODS_S = np.array([7.0, 8.5, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0, 34.0, 40.0])
 _PHASES = np.arange(12) * 2 * np.pi / 12
 _STEPS_HZ = 0.25
 _COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
@@ -187,7 +187,8 @@ def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, co
 
     lasts_s = min(coherent_s, max(map(len, signals)) / rate_hz)
     # A quarter of a cycle within what is coherent, by each number.
-    sizes = np.array([0.25 / lasts_s, 0.1, 0.1, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
+    late = max(0.1, 0.25 / (2 * np.pi * lasts_s * at[3]))
+    sizes = np.array([0.25 / lasts_s, late, late, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
     free = [0, 1, 2, 3] if wanders else [0]
 
     def lack(x: Array) -> float:
@@ -197,7 +198,7 @@ def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, co
 
     simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
     found = minimize(lack, np.zeros(len(free)), method="Nelder-Mead",
-                     options={"initial_simplex": simplex, "maxfev": 60 * len(free), "xatol": 0.02, "fatol": 0.1})
+                     options={"initial_simplex": simplex, "maxfev": 80 * len(free), "xatol": 0.02, "fatol": 0.1})
     there = at.copy()
     there[free] += found.x * sizes[free]
     return there
