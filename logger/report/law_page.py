@@ -24,7 +24,7 @@ def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, ve
     if law is None or addition is None:
         assert found.diagnosis is not None
         return document(title, [
-            heading(title, runs), _tiles(summary, "no law"), paragraphs(law_lines(found, addition)),
+            heading(title, runs), _tiles(summary), paragraphs(law_lines(found, addition)),
             shape_sections(found.diagnosis)])
     one = learned(law, addition)
     numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
@@ -32,7 +32,7 @@ def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, ve
     picture = EMPTY if drawn is None else section(
         "The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY))
     return document(title, [
-        heading(title, runs), _tiles(summary, law.family.title), paragraphs(sentences(law, addition)), picture,
+        heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)), picture,
         section("Its numbers", grid(("Number", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3))),
         section("How the error fell", falling("Error on all samples", steps_of(law, addition),
                                               addition.noise_floor_error)),
@@ -40,7 +40,7 @@ def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, ve
                                            "diagnose --effect-file take.", law.draft.source]))])
 
 
-def _tiles(summary: dict[str, object], name: str) -> Html:
+def _tiles(summary: dict[str, object]) -> Html:
     def error(key: str) -> str:
         value = summary[key]
         return f"{value:.3f}" if isinstance(value, float) else "not known"
@@ -48,4 +48,4 @@ def _tiles(summary: dict[str, object], name: str) -> Html:
     return tiles([("Error of the model as it stands", error("error_before"), "as recorded"),
                   ("As it ends", error("error_after"), "refitted"),
                   ("On what no fit saw", error("error_after_unseen"), ""),
-                  ("The sensor's noise alone", error("noise_floor_error"), ""), ("Learned", name, "")])
+                  ("The sensor's noise alone", error("noise_floor_error"), "")])

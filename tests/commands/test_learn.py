@@ -1,0 +1,45 @@
+"""ridelog learn: what it writes, what it prints, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import ridelog
+from logger.commands.main import main
+from logger.errors import BadInput
+
+
+@pytest.fixture(scope="module")
+def plain_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive of a car that is as its file says."""
+    folder = tmp_path_factory.mktemp("runs") / "plain"
+    road = ridelog.random_road(iso_class="C", length_m=180.0, seed=2)
+    ridelog.write_run(folder, ridelog.simulate("rav4-2009", road, speed_mps=12.0, noise_mps2=0.05))
+    return folder
+
+
+@pytest.mark.parametrize(("out", "says"), [("law.txt", r"ends in \.py"), ("nowhere/law.py", "a folder that there is")])
+def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=says):
+        main(["learn", "--vehicle", "rav4-2009", "--out", str(tmp_path / out), str(plain_run)])
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_page_is_not_the_law(plain_run: Path, tmp_path: Path) -> None:
+    law = str(tmp_path / "law.py")
+    with pytest.raises(BadInput, match="another file"):
+        main(["learn", "--vehicle", "rav4-2009", "--out", law, "--page", law, str(plain_run)])
+
+
+@pytest.mark.slow
+def test_where_nothing_is_missing_nothing_is_written(plain_run: Path, tmp_path: Path,
+                                                     capsys: pytest.CaptureFixture[str]) -> None:
+    law = tmp_path / "law.py"
+    assert main(["learn", "--json", "--vehicle", "rav4-2009", "--out", str(law), str(plain_run)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["law"] is None and found["family"] is None and not law.exists()
+    assert found["words"] == "nothing is missing; no law is learned" and found["verdict"] == []
+    assert found["error_after"] == pytest.approx(found["noise_floor_error"], rel=0.1)
