@@ -102,6 +102,7 @@ class Run:
     usable           what each sample is (``NO_READING``, ``READING``, ``CLIPPED``); None: all are readings
     more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
     low_pass         what was found of it; None: nothing
+    outside_mps2     r.m.s. of what a model and the sensor differ by outside of the pass band [m/s2]
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -117,6 +118,7 @@ class Run:
     usable: Array | None = None
     more: Array = field(default_factory=lambda: np.empty((0, 0)))
     low_pass: LowPass | None = None
+    outside_mps2: float = 0.0
 
     def __post_init__(self) -> None:
         if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):
@@ -248,5 +250,10 @@ def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> flo
 
 def short_names(runs: Sequence[Run]) -> dict[str, str]:
     """What to call runs in a sentence, by name: the last folder of each, or all of the name where those are alike."""
-    last = {run.name: run.name.rstrip("/").rpartition("/")[2] for run in runs}
-    return last if len(set(last.values())) == len(runs) else {run.name: run.name for run in runs}
+    return shortened([run.name for run in runs])
+
+
+def shortened(names: Sequence[str]) -> dict[str, str]:
+    """The same of their names."""
+    last = {name: name.rstrip("/").rpartition("/")[2] for name in names}
+    return last if len(set(last.values())) == len(names) else {name: name for name in names}

@@ -9,13 +9,12 @@ move much farther than such numbers are off, that is reported: a missing effect 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
@@ -23,6 +22,7 @@ from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.repeats import Repeats, repeats_among
 from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
+from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.residual_tests import ResidualTest, ResidualTests, run_residual_tests
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.simulated_runs import SimulatedRuns
@@ -64,8 +64,8 @@ class Comparison:
     refitted    with its numbers and the distances refitted within what they are usually off
     moves       by which share each number of the car, and of its effects, moved for that
     far         those that moved farther than such numbers are usually off, the farthest first
-    distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
-    tests       of the residuals of the refitted model
+    removed     what is taken out of the error before it is judged
+    tests       of the residuals of the refitted model, without what its sensors drift
     """
 
     vehicle: str
@@ -74,7 +74,7 @@ class Comparison:
     refitted: Standing
     moves: Mapping[str, float]
     far: tuple[str, ...]
-    distance_error_m: float
+    removed: Removed
     tests: ResidualTests
 
     @property
@@ -90,7 +90,7 @@ class Comparison:
     @property
     def tells(self) -> bool:
         """Whether the residual is larger than what two right simulations of a car differ by."""
-        return self.refitted.error >= DISCREPANCY
+        return self.removed.error >= DISCREPANCY
 
     @property
     def tests_found(self) -> tuple[ResidualTest, ...]:
@@ -121,10 +121,13 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     state = read_beside(fit(aligned(posterior, posterior.start(effects)))).state
     if posterior.error(state) > plain.error:
         # The fit weighs every frequency by its noise, and may buy a better top with a worse body bounce.
-        return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), 0.0,
-                          run_residual_tests(plain.residuals, plain.where, plain.residuals))
+        state = posterior.start(effects)
+        removed = removed_from(posterior, state.predictions, state)
+        return Comparison(vehicle.name, tuple(effects), plain, plain, dict.fromkeys(names, 0.0), (), removed,
+                          _tests(plain, removed, plain))
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.moved_m(state.record)))
+    removed = removed_from(posterior, plain.residuals.predictions, state)
     away = np.abs(state.logs / deviations)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):
@@ -132,5 +135,13 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                   for name, value in before.values.items() if value}
     return Comparison(vehicle.name, tuple(effects), plain, refitted, moves,
                       tuple(names[index] for index in np.argsort(-away) if away[index] > FAR_SIGMA),
-                      unusual_m(posterior.record_errors, state.record),
-                      run_residual_tests(refitted.residuals, refitted.where, plain.residuals))
+                      removed, _tests(refitted, removed, plain))
+
+
+def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTests:
+    """Tests of what is left without what the sensors drift."""
+    residuals, where = refitted.residuals, refitted.where
+    if removed.drifting:
+        residuals = replace(residuals, predictions=removed.cleared(residuals.predictions))
+        where = breakdown(residuals)
+    return run_residual_tests(residuals, where, plain.residuals)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.noise_floor import (
@@ -29,6 +28,7 @@ from logger.lab.likelihood.noise_floor import (
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, undetectable_effects
@@ -91,7 +91,7 @@ class Diagnosis:
     effects              of the model that it ends with, with standard errors
     undetectable         effects that these runs could not show at their usual strength
     shape                of what no candidate explains; None where no more than noise is left
-    distance_error_m     by how much a distance is off at most, if that is more than usual; else 0
+    removed              what is taken out of the error before it is judged
     signals              errors of signals beside the sensor's acceleration, by name
     band                 what of the runs was compared; None: all of it
     """
@@ -111,7 +111,7 @@ class Diagnosis:
     effects: tuple[Chosen, ...]
     undetectable: tuple[Undetectable, ...]
     shape: Shape | None
-    distance_error_m: float
+    removed: Removed
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     band: ComparedBand | None = None
 
@@ -178,16 +178,17 @@ def judged(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     with_errors, _ = standard_errors(after)
     progress("what these runs could not show")
     above = excess(fine, state, FALSE_ALARM)
+    stood = fine.start(present)
+    removed = removed_from(fine, stood.predictions, state)
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return Diagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
-        baseline_error=fine.error(fine.start(present)), final_error=fine.error(state),
+        baseline_error=fine.error(stood), final_error=fine.error(state),
         noise=read, noise_floor_error=floor_error(fine, read), candidates=_candidates(selection, state, len(tried)),
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=above,
         conflicts=_conflicts(fine, state), steps=_steps(selection, posterior.error(nominal)), effects=with_errors,
-        undetectable=hidden, shape=shape_of(fine, state) if above > UNEXPLAINED else None,
-        distance_error_m=unusual_m(fine.record_errors, state.record), band=compared_band(fine.runs.runs),
-        signals=signal_errors_of(fine, fine.start(present), state),
+        undetectable=hidden, shape=shape_of(fine, state, removed) if above > UNEXPLAINED else None,
+        removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, stood, state),
     )
 
 

@@ -10,22 +10,24 @@ from logger.lab.compare import FAR_SIGMA, Comparison, Standing
 from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.residual_tests import ResidualTest
-from logger.report.band_text import band_json, band_words
-from logger.report.quantities import distance_error, signal_errors
+from logger.report.band_text import band_json
+from logger.report.quantities import signal_errors
+from logger.report.removed_text import removed_json, removed_words
 from logger.report.residual_text import sentence
 from logger.runs import normalised_rms_error
 
 _HELPS = 0.97
 _MOST_MOVES = 3
+_PLACED = {"shift"}
+"""Tests of places: what they find ties no residual to the car."""
 
 
 def headline(found: Comparison) -> list[str]:
     """How well the model does, with its numbers as they stand and refitted."""
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
-    lines = band_words(found.band)
-    lines.append(f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
-                 f"error {plain.error:.3f}.")
+    lines = [f"The residual (measured - model) is {residual:.3g} m/s2 r.m.s., of {measured:.3g} m/s2 measured: "
+             f"error {plain.error:.3f}."]
     refit = "with masses, springs, dampers and distances refitted within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += " (and the numbers of its effects)"
@@ -37,7 +39,7 @@ def headline(found: Comparison) -> list[str]:
         lines.append(f"Small mistakes in its numbers are not the cause: {refit}, the error stays {refitted.error:.3f}.")
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
-    lines += distance_error(found.distance_error_m)
+    lines += removed_words(found.removed, found.band)
     if found.repeats is not None:
         apart = found.repeats.deviation_mps2
         lines.append(f"{' and '.join(found.repeats.names)} repeat each other and differ by {apart:.2g} m/s2 r.m.s. "
@@ -69,9 +71,12 @@ def conclusion(found: Comparison) -> str:
     if found.missing:
         return ("The residual depends on the road and the car's motion, so it is more than noise. Next: ridelog "
                 "diagnose with the same arguments says which physical effect would explain it.")
-    if found.tests_found:
+    if found.tests_found and not all(test.name in _PLACED for test in found.tests_found):
         return ("The residual does not depend on the road: it looks like coloured noise of the sensor or the engine. "
                 "Nothing here asks for another effect of the car.")
+    if found.removed.drifting or found.removed.distance_error_m > 0:
+        return ("Nothing else is missing: beside what is removed above, the residual asks for no effect of the car. "
+                "Rougher roads or other speeds would test the model harder.")
     return "Nothing here asks for another effect. Rougher roads or other speeds would test the model harder."
 
 
@@ -83,7 +88,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
     return {
         **_standing_json(found.plain),
         "evidence": [*headline(found), *evidence(found), conclusion(found)],
-        "missing": found.missing, **band_json(found.band),
+        "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
         "refitted": {**_standing_json(found.refitted), "moves": dict(found.moves), "moved_far": list(found.far)},
         "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},

@@ -12,6 +12,7 @@ from logger.report.diagnosis_text import JUDGED_ON, looks_like, summary, table, 
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html
 from logger.report.lab_page import forces_section, spectra_section
+from logger.report.removed_text import drift_tile, removed_section
 from logger.report.residual_text import error_text
 
 _LEAST_SHARE = 0.01
@@ -22,7 +23,7 @@ def page(found: Diagnosis, vehicle: str) -> Html:
     title = f"{vehicle}: which effect is missing"
     return document(title, [
         heading(title, ", ".join(found.runs)),
-        _tiles(found), paragraphs(summary(found)), shape_sections(found),
+        _tiles(found), paragraphs(summary(found)), removed_section(found.removed, found.band), shape_sections(found),
         section("How the error fell", _steps(found)), section("All candidates", _candidates(found)),
         section("What these runs cannot tell", bullets(untested(found))),
         section("Where this is from", bullets(sources(found))),
@@ -60,6 +61,7 @@ def _tiles(found: Diagnosis) -> Html:
     return tiles([
         ("Error of the model as it stands", f"{found.baseline_error:.3f}", "as recorded"),
         ("With what is missing" if missing else "With its numbers refitted", f"{found.final_error:.3f}", "refitted"),
+        *drift_tile(found.removed),
         ("The sensor's noise alone", f"{found.noise_floor_error:.3f}", ""),
         ("Missing", unknown if found.unexplained else count, ""),
     ])

@@ -10,8 +10,9 @@ from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.report import residual_text
-from logger.report.band_text import band_json, band_words
-from logger.report.quantities import chance, distance_error, finite, numbers_of, signal_errors
+from logger.report.band_text import band_json
+from logger.report.quantities import chance, finite, numbers_of, signal_errors
+from logger.report.removed_text import removed_json, removed_words
 from logger.vehicle.effect import Chosen
 
 JUDGED_ON = "stretches that no fit saw"
@@ -21,11 +22,12 @@ _MOST_HIDDEN = 6
 
 def summary(found: Diagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    lines = [_missing(found, one) for one in found.missing]
-    lines = [*band_words(found.band), *lines]
+    removed = removed_words(found.removed, found.band)
+    lines = [*removed, *(_missing(found, one) for one in found.missing)]
     if not found.missing and not found.unexplained:
-        lines.append("Nothing is missing: with the car's numbers refitted within their tolerance, the residual is "
-                     "hardly more than the sensor's noise.")
+        more = " else" * bool(found.removed.drifting or found.removed.distance_error_m > 0)
+        lines.append(f"Nothing{more} is missing: with the car's numbers refitted within their tolerance, the residual "
+                     "is hardly more than the sensor's noise.")
     if found.left_over:
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no candidate explains: in the worst "
                      f"run the residual is {1 + found.excess:.3g} times the sensor's noise.")
@@ -36,7 +38,6 @@ def summary(found: Diagnosis) -> list[str]:
         off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.conflicts.items())
         lines.append(f"The fit needs numbers outside their tolerance: {off}. Either the vehicle's file is wrong "
                      "there, or an effect is missing that no candidate explains.")
-    lines += distance_error(found.distance_error_m)
     lines.append(_errors(found))
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} as the vehicle's file says, {} as it ends, its noise alone about {}")
@@ -129,7 +130,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "not_tried": found.not_tried,
         "hidden": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
-        **band_json(found.band),
+        **band_json(found.band), **removed_json(found.removed),
         "sentences": [*summary(found), *looks_like(found)],
     }
 

@@ -19,6 +19,7 @@ from logger.report.charts import chart
 from logger.report.comparison_text import conclusion, evidence, headline
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.removed_text import drift_tile, removed_section
 from logger.report.residual_text import error_text, paired
 from logger.report.worst_moment import worst_moment
 from logger.runs import short_names
@@ -38,6 +39,7 @@ def page(found: Comparison) -> Html:
     return document(title, [
         heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found), paragraphs(headline(found)),
         section("After the refit", bullets(evidence(found)) + paragraphs([conclusion(found)])),
+        removed_section(found.removed, found.band),
         _worst_place(found.refitted), spectra_section(residuals), _tables(found), _places(found.refitted),
         forces_section(found.tests.forces), _alignment(found), _tests(found), _numbers(found),
     ])
@@ -47,7 +49,8 @@ def _tiles(found: Comparison) -> Html:
     residuals = found.plain.residuals
     return tiles([("Error as the model stands", f"{found.plain.error:.3f}", ""),
                   ("Error after the refit", f"{found.refitted.error:.3f}", ""),
-                  ("ResidualTests found", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
+                  *drift_tile(found.removed),
+                  ("Tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
                   ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
 
 

@@ -10,6 +10,7 @@ from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.force_state_map import Curve
 from logger.lab.residuals.residual_tests import ResidualTest
 from logger.lab.residuals.unexplained import Shape, SpatialLine
+from logger.report.quantities import percent
 
 _MUCH_DRIFT_M = 0.3
 _WHEEL_RADII_M = (0.22, 0.5)
@@ -68,8 +69,8 @@ def _whiteness(test: ResidualTest, lag_s: float) -> str:
 
 
 def _frequency(test: ResidualTest, part: Part, white_share: float) -> str:
-    return (f"{_percent(test.value)} of the residual's power lies {_AROUND[part.name]} ({part.low:.2g} to "
-            f"{part.high:.2g} Hz), where white noise would have {_percent(white_share)}; the error there is "
+    return (f"{percent(test.value)} of the residual's power lies {_AROUND[part.name]} ({part.low:.2g} to "
+            f"{part.high:.2g} Hz), where white noise would have {percent(white_share)}; the error there is "
             f"{error_text(part, 2)}.")
 
 
@@ -88,7 +89,7 @@ def _tone(test: ResidualTest, run: str) -> str:
 
 
 def _coherence(test: ResidualTest, band: str) -> str:
-    return (f"At least {_percent(test.value)} of the residual is coherent with the road, most of it {_AROUND[band]}. "
+    return (f"At least {percent(test.value)} of the residual is coherent with the road, most of it {_AROUND[band]}. "
             "This part is not noise; a linear effect could cause it.")
 
 
@@ -125,13 +126,13 @@ def _proportion(test: ResidualTest, weak: float, strong: float, band: str) -> st
 def _by_rate(test: ResidualTest, curve: Curve, bend: float) -> str:
     both = f"like a damper that {'yields at speed' if bend < 0 else 'stiffens with speed'}"
     return (f"A force in the suspensions that depends on their velocity, {_side(curve, both)}, would explain "
-            f"{_percent(curve.share)} of the residual. In addition to linear dampers: {_ends(curve, 1, 'm/s')}.")
+            f"{percent(curve.share)} of the residual. In addition to linear dampers: {_ends(curve, 1, 'm/s')}.")
 
 
 def _by_travel(test: ResidualTest, curve: Curve, bend: float) -> str:
     both = f"like a spring that {'softens' if bend < 0 else 'hardens'} far from its rest"
     return (f"A force in the suspensions that depends on their travel, {_side(curve, both)}, would explain "
-            f"{_percent(curve.share)} of the residual. In addition to linear springs: {_ends(curve, 1000, 'mm')}.")
+            f"{percent(curve.share)} of the residual. In addition to linear springs: {_ends(curve, 1000, 'mm')}.")
 
 
 def _side(curve: Curve, both: str) -> str:
@@ -156,9 +157,9 @@ def _ends(curve: Curve, factor: float, unit: str) -> str:
 
 def _direction(test: ResidualTest, share: float, damping: float) -> str:
     more, less = ("rebound", "bump") if test.value > 0 else ("bump", "rebound")
-    ratio = f", by {_percent(2 * abs(test.value) / damping)} of the model's damping" if damping > 0 else ""
+    ratio = f", by {percent(2 * abs(test.value) / damping)} of the model's damping" if damping > 0 else ""
     return (f"The residual depends on the direction: the suspensions seem to resist {more} more than {less}{ratio} "
-            f"(this would explain {_percent(share)}).")
+            f"(this would explain {percent(share)}).")
 
 
 # --- the residual and the drive ---
@@ -187,7 +188,3 @@ _SENTENCES: Mapping[str, Callable[..., str]] = {
     "force by travel": _by_travel, "direction": _direction, "excitation": _excitation, "speed": _speed,
     "place": _place,
 }
-
-
-def _percent(share: float) -> str:
-    return f"{share:.0%}" if share >= 0.095 else f"{100 * share:.1f}%" if share >= 0.001 else "less than 0.1%"

@@ -14,7 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import BodyEffect, Chosen, DriveEffect, ForceEffect, SensorEffect, VehicleEffect
+from logger.vehicle.effect import (
+    BodyEffect,
+    Chosen,
+    DriveEffect,
+    ForceEffect,
+    RecordEffect,
+    Recording,
+    SensorEffect,
+    VehicleEffect,
+)
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.passage import Passage
@@ -40,6 +49,7 @@ class Car:
     row          (n,) of the sensor's acceleration
     sensors      effects between body and record, in order
     drives       effects on the position signal, in order
+    records      effects on the record in time, in order
     body         equal for two cars whose bodies move alike where the sensor sits
     shift_m      by how much its effects moved its centre of gravity ahead; what is bolted to the body stays
     """
@@ -53,6 +63,7 @@ class Car:
     bends_laws: bool
     body: Hashable
     shift_m: float = 0.0
+    records: tuple[Chosen, ...] = ()
 
     @property
     def rubs(self) -> bool:
@@ -73,6 +84,14 @@ class Car:
             assert isinstance(one.effect, DriveEffect)
             distance_m = one.effect.driven(one.p, distance_m)
         return distance_m
+
+    def written(self, passage: Passage, accel_z_mps2: Array) -> Array:
+        """What is recorded (N,) of an acceleration (N,) behind the recorder's filter [m/s2]."""
+        for one in self.records:
+            assert isinstance(one.effect, RecordEffect)
+            accel_z_mps2 = one.effect.record(
+                one.p, Recording(passage.time_s, passage.distance_m, passage.speed_mps, accel_z_mps2))
+        return accel_z_mps2
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +132,14 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
             corner = one.effect.laws(one.p, corner)
         laws.append(corner)
     row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
-    around = (SensorEffect, DriveEffect)
+    around = (SensorEffect, DriveEffect, RecordEffect)
     body = (vehicle, structure.sides, *(
         (one.effect, *sorted(one.values.items())) for one in ordered if not isinstance(one.effect, around)))
     return Car(vehicle, structure, tuple(laws), row,
                tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
                tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body,
-               front_m - vehicle.front.cg_distance_m)
+               front_m - vehicle.front.cg_distance_m,
+               tuple(one for one in ordered if isinstance(one.effect, RecordEffect)))
 
 
 def recorded(car: Car, passage: Passage) -> Array:
@@ -132,7 +152,7 @@ def recorded(car: Car, passage: Passage) -> Array:
             return _accelerations(car, moved(car, passage), passage.under_wheels(car.structure)[0])
         return _linear(car, passage)
 
-    return passage.recorded_of(car.body, accelerations, car.factor)
+    return car.written(passage, passage.recorded_of(car.body, accelerations, car.factor))
 
 
 def respond(car: Car, passage: Passage) -> Response:
@@ -146,7 +166,8 @@ def respond(car: Car, passage: Passage) -> Response:
     coordinates, velocities = states[:, :n], states[:, n:]
     road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
     return Response(
-        passage.recorded(accel, car.factor), coordinates @ structure.travel.T, velocities @ structure.travel.T,
+        car.written(passage, passage.recorded(accel, car.factor)),
+        coordinates @ structure.travel.T, velocities @ structure.travel.T,
         coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps,
     )
 

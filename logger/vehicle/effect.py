@@ -3,13 +3,14 @@
 Problem: a car does more than its linear model, in some twenty ways that come alone and together; and users bring ways
 of their own. Simulation, fits, diagnosis and reports must not know any of them by name. Solution: an effect is one file
 that offers ``EFFECT``: a name, its parameters with units and bounds, a source, words on what it leaves in a
-measurement, and one function. There are five kinds of function, one for each place between road and record:
+measurement, and one function. There are six kinds of function, one for each place between road and record:
 
     DriveEffect     where the car was                    distance recorded -> distance driven
     VehicleEffect   the numbers of the car               vehicle -> vehicle
     BodyEffect      what hangs on the body               structure -> structure
     ForceEffect     springs, dampers and tires           the laws of a corner -> the laws of a corner
     SensorEffect    between the body and the record      s -> transfer factor
+    RecordEffect    the record in time                   what a recorder knows -> the record
 
 They are applied in this order, and within a kind in the order of ``stage``, so that the order in which a vehicle's file
 names them does not matter. An effect changes nothing in place.
@@ -266,6 +267,31 @@ class SensorEffect(Effect):
     @abstractmethod
     def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
         """What an acceleration exp(s t) is multiplied by, s (...) [1/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a recorder knows of a run of n samples.
+
+    time_s          (n,) since the run began [s]
+    distance_m      (n,) where the front tires truly stood [m]; on a rig 0
+    speed_mps       (n,) how fast that changes [m/s]; on a rig 0
+    accel_z_mps2    (n,) what the record would be without the effect [m/s2]
+    """
+
+    time_s: Array
+    distance_m: Array
+    speed_mps: Array
+    accel_z_mps2: Array
+
+
+class RecordEffect(Effect):
+    """The record as it runs: what the road does not cause, and what changes with time or with strength. It acts on the
+    samples, behind the recorder's filter."""
+
+    @abstractmethod
+    def record(self, p: SimpleNamespace, recording: Recording) -> Array:
+        """What is recorded (n,) [m/s2]."""
 
 
 @dataclass(frozen=True)

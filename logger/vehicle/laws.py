@@ -42,6 +42,7 @@ class Seen(NamedTuple):
     wheel_mps, body_mps             how fast the wheel, and the body's end of the suspension, rise against the ground
     distance_m                      where this wheel stands along the road
     time_s                          since the record's first sample
+    speed_mps                       of the car along the road
     memory                          the law's own states
     """
 
@@ -53,6 +54,7 @@ class Seen(NamedTuple):
     body_mps: Any
     distance_m: Any
     time_s: Any
+    speed_mps: Any
     memory: tuple[Any, ...]
 
 

@@ -45,6 +45,7 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...]) ->
     sensor = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     outputs = [sensor, *(output_of(car, one) for one in signals)]
     found = passage.recorded_of((car.body, signals), lambda: _fine(car, passage, outputs), car.factor)
+    found[0] = car.written(passage, found[0])
     found[1:] -= found[1:].mean(axis=1, keepdims=True)
     return found.ravel()
 

@@ -17,6 +17,8 @@ from logger.vehicle.effect import (
     Effect,
     ForceEffect,
     Parameter,
+    RecordEffect,
+    Recording,
     Scale,
     SensorEffect,
     Sought,
@@ -26,7 +28,7 @@ from logger.vehicle.laws import linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
 
-KINDS = (DriveEffect, VehicleEffect, BodyEffect, ForceEffect, SensorEffect)
+KINDS = (DriveEffect, VehicleEffect, BodyEffect, ForceEffect, SensorEffect, RecordEffect)
 WORDS = ("name", "title", "source", "signature", "shown_by")
 # What a vehicle's file says of an effect beside its parameters.
 KEYS = ("name", "file", "standard_errors")
@@ -108,3 +110,6 @@ def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
                 force(*np.meshgrid(_TRAVEL_M, _RATE_MPS, indexing="ij"))
     elif isinstance(effect, SensorEffect):
         effect.factor(p, np.asarray(2j * np.pi * np.arange(0.0, 50.0), dtype=np.complex128))
+    elif isinstance(effect, RecordEffect):
+        time_s = np.arange(0.0, 60.0, 0.1)
+        effect.record(p, Recording(time_s, 10.0 * time_s, np.full_like(time_s, 10.0), np.sin(time_s)))

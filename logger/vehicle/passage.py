@@ -75,6 +75,16 @@ class Passage:
         return len(self._way.time_s)
 
     @property
+    def time_s(self) -> Array:
+        """When the samples are taken (N,), the first at 0 [s]."""
+        return np.arange(self.count) / self.rate_hz
+
+    @property
+    def speed_mps(self) -> Array:
+        """How fast the car is at the samples (N,) [m/s]."""
+        return np.asarray(np.gradient(self.distance_m, 1 / self.rate_hz))
+
+    @property
     def way(self) -> Way:
         """Where the front tires are at the fine instants, and when."""
         return self._way

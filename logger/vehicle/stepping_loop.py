@@ -196,12 +196,12 @@ def _rub(
 
 
 @_compiled
-def _feel(felt: Array, motion: Array, m: int, w: int, i: int, road: Array, place: float, time: float) -> None:
+def _feel(felt: Array, motion: Array, m: int, w: int, i: int, road: Array, place: float, clock: Array) -> None:
     """Fill in what a law sees of wheel i, but for its states."""
     felt[0], felt[1] = motion[m + i], motion[m + w + i]
     felt[2], felt[3] = motion[m + 2 * w + i] - road[i], motion[m + 3 * w + i] - road[w + i]
     felt[4], felt[5] = motion[m + 3 * w + i], motion[m + w + i] + motion[m + 3 * w + i]
-    felt[6], felt[7] = place, time
+    felt[6], felt[7], felt[8] = place, clock[0], clock[1]
 
 
 @_compiled
@@ -237,9 +237,9 @@ def _remember(law: Whole, one: int, given: Array, began: Array, memories: Array,
 @_compiled
 def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> None:
     """Keep what laws by all that moves feel at the beginning of step k."""
-    law, _, began, memories, _, _, _, places, time_s = asked
+    law, _, began, memories, _, _, _, places, clock = asked
     for one in range(len(law)):
-        _feel(began[one], motion, m, w, law[one, WHEEL], road, places[k, law[one, WHEEL]], time_s[k])
+        _feel(began[one], motion, m, w, law[one, WHEEL], road, places[k, law[one, WHEEL]], clock[k])
         for c in range(law[one, STATES]):
             began[one, MEMORY_AT + c] = memories[one, c]
 
@@ -247,10 +247,10 @@ def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> 
 @_compiled
 def _answer(forces: Array, motion: Array, m: int, w: int, asked: Asked, road: Array, k: int, step_s: float) -> None:
     """Add the forces of laws by all that moves at the end of step k, and step their states."""
-    law, given, began, memories, felt, middle, answers, places, time_s = asked
+    law, given, began, memories, felt, middle, answers, places, clock = asked
     for one in range(len(law)):
         i, between = law[one, WHEEL], law[one, BETWEEN]
-        _feel(felt, motion, m, w, i, road, places[k + 1, i], time_s[k + 1])
+        _feel(felt, motion, m, w, i, road, places[k + 1, i], clock[k + 1])
         if law[one, STATES]:
             _remember(law, one, given, began, memories, felt, middle, answers, step_s)
             for c in range(law[one, STATES]):

@@ -11,6 +11,7 @@ import pytest
 from logger.lab.diagnosis import HAS_IT, Candidate, Diagnosis, Step
 from logger.lab.likelihood.noise_floor import Noise
 from logger.lab.residuals.breakdown import breakdown
+from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.residual_tests import run_residual_tests
 from logger.lab.residuals.unexplained import Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
@@ -28,11 +29,12 @@ def candidate(name: str, p_value: float, gain: float, **values: float) -> Candid
 
 
 OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
+AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.151)
 NOTHING = Diagnosis(
     runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=Noise(0.05, 0.001),
     noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, conflicts={},
     steps=(Step("the vehicle as its file says", 0.31), Step("its numbers refitted", 0.152)), effects=(),
-    undetectable=(), shape=None, distance_error_m=0.0)
+    undetectable=(), shape=None, removed=AS_USUAL)
 FRICTION = candidate("dry_friction", 1e-12, 500.0, friction_force_n=84.7)
 FOUND = replace(
     NOTHING, candidates=(FRICTION, *OTHERS), verdict=("dry_friction",),
@@ -97,7 +99,8 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
 
 
 def test_distances_that_are_off_are_told_of() -> None:
-    assert any("up to 0.34 m" in one for one in summary(replace(NOTHING, distance_error_m=0.34)))
+    off = replace(NOTHING, removed=replace(AS_USUAL, distance_error_m=0.34, distance_share=0.4))
+    assert any("up to 0.34 m. That makes 40% of" in one for one in summary(off))
 
 
 def test_what_explains_as_well_is_named_with_the_drives_that_would_tell() -> None:

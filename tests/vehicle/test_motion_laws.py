@@ -151,12 +151,12 @@ def loop_area_n_m(amplitude_m: float, values: SimpleNamespace) -> float:
     """Of a settled loop of the law, by SciPy along the way."""
     def slope(t: float, z: np.ndarray) -> list[float]:
         v = 2 * pi * amplitude_m * np.cos(2 * pi * t)
-        return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
+        return [float(rates(values, Seen(0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z[0],)))[0])]
 
     settled = 12
     t = np.linspace(settled, settled + 1, 4001)
     z = solve_ivp(slope, (0, settled + 1), [0.0], "LSODA", t, rtol=1e-9, atol=1e-12, max_step=5e-3).y[0]
-    f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
+    f = force(values, Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (z,)))
     return float(np.trapezoid(f, amplitude_m * np.sin(2 * pi * t)))
 
 
@@ -188,7 +188,7 @@ def test_no_friction_gives_energy() -> None:
             parts = max(1, int(abs(step) / 0.01))
             for _ in range(parts):
                 way = step / parts
-                dz = float(rates(values, Seen(0, way, 0, 0, 0, 0, 0, 0, (z,)))[0])
+                dz = float(rates(values, Seen(0, way, 0, 0, 0, 0, 0, 0, 0, (z,)))[0])
                 lost.append(lost[-1] + (z + dz / 2) * (way - dz))
                 z += dz
         assert abs(z) <= 1.01
@@ -232,11 +232,11 @@ def test_a_law_sees_all_that_moves_and_where_and_when(tmp_path: Path, plain: np.
     """All that it sees at once, between each pair of ends."""
     text = ("def pull(p, seen):\n    return (p.size * (2000 * seen.travel_m + 30 * seen.rate_mps * abs(seen.rate_mps)\n"
             "        + 1e3 * seen.deflection_m + 20 * seen.deflection_mps + 40 * seen.wheel_mps + 50 * seen.body_mps)\n"
-            "        + 30 * np.sin(9 * seen.time_s) + 20 * np.sin(seen.distance_m))\n")
+            "        + 30 * np.sin(9 * seen.time_s) + 20 * np.sin(seen.distance_m) + seen.speed_mps)\n")
 
     def pull(t, x, v, d, d_mps, u_mps, z):
         return (2 * (2000 * x + 30 * v * abs(v) + 1e3 * d + 20 * d_mps + 40 * u_mps + 50 * (u_mps + v))
-                + 30 * np.sin(9 * t) + 20 * np.sin(15.0 * t))
+                + 30 * np.sin(9 * t) + 20 * np.sin(15.0 * t) + 15.0)
 
     for ends, on_body, on_wheel in (("BODY_AND_WHEEL", 1, -1), ("WHEEL_AND_GROUND", 0, 1), ("BODY_AND_GROUND", 1, 0)):
         def added(*seen, on_body=on_body, on_wheel=on_wheel):
@@ -395,7 +395,7 @@ def test_a_law_that_will_not_do_is_refused_with_its_file(tmp_path: Path, functio
 def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
     """Friction of a wheel on rails; and rubber that creeps, which at last lets everything go."""
     page = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text("utf-8")
-    rails, creep = (text.split("```")[0] for text in page.split("```python\n")[2:4])
+    rails, creep = (text.split("```")[0] for text in page.split("```python\n")[3:5])
     functions = rails.split("\n\nclass")[0] + creep.split("\n\n\n    def")[0] + "\n"
     functions = functions.replace("p.friction_force_n", "p.size").replace("p.stiffness_n_per_m", "p.size")
     functions = functions.replace("p.creep_s", "0.1")

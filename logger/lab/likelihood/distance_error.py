@@ -179,6 +179,10 @@ class RecordError:
         found[roughness:] = k[roughness:]
         return found
 
+    def in_place(self, k: Array) -> Array:
+        """The same recorder (k,) where the distance is as it was recorded."""
+        return np.concatenate([np.zeros(len(self.basis)), k[len(self.basis):]])
+
     def through(self, moved_m: Array) -> Array:
         """The numbers (k,) of the curve that comes nearest to a distance farther by this (n,) [m], its recorder as it
         is."""

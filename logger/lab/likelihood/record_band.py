@@ -111,7 +111,7 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
     ValueError where nothing is left.
     """
     found = []
-    for run, seen in zip(runs, seen_low_passes(runs, predictions), strict=True):
+    for run, seen, prediction in zip(runs, seen_low_passes(runs, predictions), predictions, strict=True):
         low_hz, high_hz = run.pass_band_hz
         if low_pass_hz is not None:
             high_hz = min(high_hz, low_pass_hz)
@@ -123,7 +123,9 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
         cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
         there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
                         usable=run.usable if cut is None else _without_its_end(run))
-        found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2)))
+        left = run.left_by(prediction)
+        outside = float(np.sqrt(np.mean((left - there.in_band(left))[run.first:] ** 2)))
+        found.append(replace(there, measured_mps2=there.in_band(run.measured_mps2), outside_mps2=outside))
     return found
 
 

@@ -30,12 +30,14 @@ _BLOCK_S = 3.0
 """Of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 HIGHEST_OF_RATE = 0.37
 """Above it recorders' filters take away what no two of them take away alike."""
+LOWEST_HZ = 0.4
+"""Below it nothing is judged: a car hardly accelerates there, and sensors drift."""
 # Least deviations: of the sensor's acceleration, and of another signal as a share of its own.
 _LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
 _ROUNDED = 1e-3  # samples: a rate is read off times that were rounded
 # Ends of the bands at 100 samples a second [Hz].
-_EDGES_HZ = (0.4, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.5,
-             30.0, 33.5, 37.0)
+_EDGES_HZ = (LOWEST_HZ, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0,
+             27.5, 30.0, 33.5, 37.0)
 # Of a rig, whose wheels may hop above all that cars do, they go on as wide for their frequency.
 _MORE_EDGES_HZ = tuple(37.0 * (37.0 / 33.5) ** number for number in range(1, 60))
 # Of the highest frequencies, where a car leaves nothing and the recorder's filter even less.

@@ -189,11 +189,11 @@ def _gain(residuals: ModelResiduals) -> ResidualTest:
 
 def _shift(alignment: Lags, drifting: ResidualTest, least_s: float = 0.003) -> ResidualTest:
     """The same shift all the way; none where it grows on the way. ``least_s`` is a third of a sample at 100 samples a
-    second, which no clock is asked to be better than."""
+    second, which no clock is asked to be better than. A shift by a length is a wrong place, no part of the car."""
     time, length, is_time = constant(alignment)
     trend, unit = (length, "m") if is_time is False else (time, "s")
     return ResidualTest("shift", trend.value, unit, trend.error, trend.p_value,
-                        abs(time.value) > least_s and not drifting.found, True,
+                        abs(time.value) > least_s and not drifting.found, is_time is not False,
                         {"time_s": time.value, "length_m": length.value, "is_time": is_time})
 
 

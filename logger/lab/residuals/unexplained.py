@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
+from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.residual_tests import DOUBT, ResidualTests, run_residual_tests
 from logger.lab.residuals.spectral_lines import NEIGHBOURS, loudest, periodogram
 from logger.runs import short_names
@@ -54,13 +55,13 @@ class Shape:
     line: SpatialLine | None
 
 
-def shape_of(posterior: Posterior, state: State) -> Shape:
-    """The shape of the residuals of a fitted model."""
+def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
+    """The shape of the residuals of a fitted model, without what its sensors drift."""
     runs, car = posterior.runs, posterior.car(state.effects, state.logs)
     responses = runs.respond(car, posterior.moved_m(state.record))
     residuals, as_recorded = (
         ModelResiduals(runs.runs, car, [run.main(one) for run, one in zip(runs.runs, some, strict=True)], responses)
-        for some in (state.predictions, runs.predict(car)))
+        for some in map(removed.cleared, (state.predictions, runs.predict(car))))
     where = breakdown(residuals)
     return Shape(residuals, where, run_residual_tests(residuals, where, as_recorded), spatial_line_of(residuals))
 

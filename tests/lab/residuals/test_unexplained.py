@@ -7,6 +7,7 @@ import pytest
 
 from logger.lab.diagnosis import refitted
 from logger.lab.residuals.breakdown import ModelResiduals
+from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import shape_of, spatial_line_of
 from logger.report.residual_text import line_sentence, looks_like
 from logger.runs import Run
@@ -75,7 +76,9 @@ def test_a_speed_that_swings_tells_them_too() -> None:
 def test_the_shape_of_a_fitted_model_is_that_of_its_residuals() -> None:
     posterior = posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.4)]))
     state = refitted(posterior, posterior.start()).state
-    found = shape_of(posterior, state)
+    removed = removed_from(posterior, posterior.start().predictions, state)
+    found = shape_of(posterior, state, removed)
+    assert not removed.drifting
     residuals = found.residuals.residual
     for run, residual, whole in zip(posterior.runs.runs, residuals, posterior.residuals(state), strict=True):
         assert residual == pytest.approx(whole[run.first:])

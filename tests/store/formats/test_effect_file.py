@@ -41,7 +41,7 @@ EFFECT = Mine()
 """
 ASKED = {"DriveEffect": "driven(self, p, distance_m)", "VehicleEffect": "vehicle(self, p, vehicle)",
          "BodyEffect": "structure(self, p, structure)", "ForceEffect": "laws(self, p, laws)",
-         "SensorEffect": "factor(self, p, s)"}
+         "SensorEffect": "factor(self, p, s)", "RecordEffect": "record(self, p, recording)"}
 BAD = "(np.nan if p.size == 3 else 1.0)"
 # What each kind does; at size 3 it fails or gives no answer, in these words.
 CASES = [
@@ -66,6 +66,8 @@ CASES = [
     ("ForceEffect", "return replace(laws, springs=(3.0,))", "a tuple of functions as springs"),
     ("SensorEffect", "return np.full_like(s, 1 / (p.size - 3) if p.size != 3 else np.inf)", "expected factor to answ"),
     ("SensorEffect", "return np.ones(3) if p.size == 3 else np.ones(s.shape)", "expected factor to answer with"),
+    ("RecordEffect", "return recording.accel_z_mps2 / (p.size - 3)", "expected record to answer with finite numbers"),
+    ("RecordEffect", "return 1.0 if p.size == 3 else recording.time_s", "expected record to answer with an array of"),
 ]
 
 

@@ -1,0 +1,42 @@
+"""A sensor whose gain changes as a run goes on: it warms up, or its supply sinks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_METHOD = """def record(self, p, recording):
+    return recording.accel_z_mps2 * (p.gain_at_first_ratio + p.change_ratio * recording.time_s / {lasts_s!r})
+"""
+
+
+class ChangingGain(Family):
+    name = "changing_gain"
+    title = "a gain that changes as a run goes on"
+    akin = ("sensor_gain",)
+    shown_by = "drive one road at the beginning and at the end of a long run"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+        change = Parameter("change_ratio", 0.1, -0.95, 5.0, 0.0, Scale.LINEAR, (0.1, -0.1),
+                           f"what is added to the gain over {lasts_s:g} s", step=0.01)
+        first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "the gain as a run begins",
+                          default=1.0)
+        common: dict[str, Any] = {
+            "family": self.name, "kind": "RecordEffect", "title": self.title, "shown_by": self.shown_by,
+            "source": "data sheets of accelerometers give a change of sensitivity with temperature",
+            "signature": "the residual is in proportion to the model, more so the longer a run lasts",
+        }
+        from_one = _METHOD.format(lasts_s=lasts_s).replace("p.gain_at_first_ratio", "1.0")
+        return [Draft(parameters=(change,), method=from_one, variant="from_one", **common),
+                Draft(parameters=(change, first), method=_METHOD.format(lasts_s=lasts_s), variant="from_any", **common)]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        begins = f", from {say('gain_at_first_ratio')} on" if draft.variant == "from_any" else ""
+        return f"a gain that changes by {say('change_ratio')} in the course of the longest run{begins}"
+
+
+FAMILY = ChangingGain()

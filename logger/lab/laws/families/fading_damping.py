@@ -1,0 +1,45 @@
+"""Dampers that change as a run goes on: oil that warms up grows thin.
+
+The force of a damper by its rate is c v (1 - s (1 - exp(-t / T))): a share s is lost in the end, most of it in the time
+T (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7, on fade).
+"""
+
+from __future__ import annotations
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_FUNCTIONS = """
+def fading(p, seen):
+    return -p.lost_n_s_per_m * (1.0 - np.exp(-np.maximum(seen.time_s, 0.0) / p.time_s)) * seen.rate_mps
+"""
+_METHOD = """def laws(self, p, laws):
+    own = SimpleNamespace(lost_n_s_per_m=p.lost_ratio * laws.damping_n_s_per_m, time_s=p.time_s)
+    return laws.with_law(Between.BODY_AND_WHEEL, fading, own)
+"""
+
+
+class FadingDamping(Family):
+    name = "fading_damping"
+    title = "a damping that changes as a run goes on"
+    shown_by = "drive one rough road cold and once more after half an hour"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        lasts_s = max(run.count / run.rate_hz for run in look.runs)
+        trials = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
+        lost = Parameter("lost_ratio", 0.2, -2.0, 0.95, 0.0, Scale.LINEAR, (0.2, -0.2), "share of the damping that is "
+                         "lost in the end", step=0.02)
+        time = Parameter("time_s", trials[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, trials,
+                         "after which most of it is lost")
+        return [Draft(family=self.name, kind="ForceEffect", title=self.title, parameters=(lost, time),
+                      source="J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7",
+                      signature="the body and the wheels ring longer, or less long, as a run goes on",
+                      shown_by=self.shown_by, method=_METHOD, functions=_FUNCTIONS, variant="settling",
+                      imports=("from types import SimpleNamespace", "from logger.vehicle.laws import Between"))]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"
+
+
+FAMILY = FadingDamping()

@@ -1,0 +1,59 @@
+"""A correction between body and record: a stable rational transfer function of low order.
+
+1 + (a + b s / w) / (1 + 2 z s / w + s2 / w2) adds one pair of poles beside the direct way: a bracket, a panel that
+rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from logger.lab.laws.draft import Draft
+from logger.lab.laws.families.family import Family, Look, Say
+from logger.vehicle.effect import Chosen, Parameter, Scale
+
+_POLE = """def factor(self, p, s):
+    return 1.0 + p.added_ratio / (1.0 + s / (2 * np.pi * p.frequency_hz))
+"""
+_PAIR = """def factor(self, p, s):
+    at = s / (2 * np.pi * p.frequency_hz)
+    return 1.0 + (p.added_ratio + p.rate_ratio * at) / (1.0 + 2 * p.damping_ratio * at + at**2)
+"""
+_HZ = (2.0, 5.0, 10.0, 18.0, 28.0)
+
+
+class RecordFactor(Family):
+    name = "record_factor"
+    title = "a correction between body and record"
+    akin = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
+    shown_by = "shake the sensor, in its place, beside another one"
+
+    def drafts(self, look: Look) -> list[Draft]:
+        added = Parameter("added_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1, -0.1), "what is added at rest",
+                          step=0.01)
+        rate = Parameter("rate_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1,), "what is added by the rate",
+                         step=0.01)
+        frequency = Parameter("frequency_hz", 10.0, 0.5, 60.0, None, Scale.LOG, _HZ, "of the pole")
+        damping = Parameter("damping_ratio", 0.2, 0.02, 2.0, None, Scale.LOG, (0.2,), "of the pair of poles")
+        common: dict[str, Any] = {
+            "family": self.name, "kind": "SensorEffect", "title": self.title, "shown_by": self.shown_by,
+            "source": "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)",
+            "signature": "the measurement is the model times one function of frequency, whatever the road",
+        }
+        return [Draft(parameters=(added, frequency), method=_POLE, variant="pole", **common),
+                *(Draft(parameters=(added, rate, _begun(frequency, one), damping), method=_PAIR,
+                        variant=f"pair_{one:g}", **common) for one in _HZ)]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        if draft.variant == "pole":
+            return f"a record to which {say('added_ratio')} of it is added below {say('frequency_hz')}"
+        return (f"a record that something rings into at {say('frequency_hz')} with a damping of "
+                f"{say('damping_ratio')}, by {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
+
+
+def _begun(frequency: Parameter, at_hz: float) -> Parameter:
+    return replace(frequency, start=at_hz, trials=(at_hz,))
+
+
+FAMILY = RecordFactor()

@@ -1,0 +1,204 @@
+"""What repeats in a residual, along the way or in time: where its fit may begin.
+
+A tone whose frequency is not known to a fraction of a cycle over all of a run is no start for a fit by slopes. The
+residual of each run, white in its bands, is laid on the way in even steps and the periodograms of all runs are
+added; the loudest wave number is refined where the sum of squares of all coherent sums is largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.laws.families.family import Look
+
+Array = npt.NDArray[np.float64]
+
+_SLOWEST_MPS = 1.0
+_FINER = 8
+"""Times the resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
+_LOUD = 12.0
+"""A peak with so many times the mean power of its neighbours: noise alone has one in some thousand in a hundred
+runs."""
+
+
+def white_residuals(look: Look) -> list[Array]:
+    """Residuals (n - first,) per run, white in their bands, in units of the noise."""
+    posterior = look.posterior
+    found = []
+    for run, bands, residual in zip(look.runs, posterior.bands, posterior.residuals(look.state), strict=True):
+        white = bands.whitener(residual).in_time(residual)
+        found.append(np.asarray(white[: run.count - run.first]))
+    return found
+
+
+def along_the_way(look: Look, per_m: tuple[float, float], speed_power: float = 0.0) -> float | None:
+    """The wave number at which something repeats along the way, whatever the speed [1/m]; None where nothing does.
+
+    per_m          between these
+    speed_power    it grows with the speed to this power
+    """
+    signals, ways = [], []
+    for run, residual, moved in zip(look.runs, white_residuals(look), look.posterior.moved_m(look.state.record),
+                                    strict=True):
+        speed = np.maximum(run.speed_mps[run.first:], _SLOWEST_MPS)
+        signals.append(residual * (speed / speed.mean()) ** speed_power)
+        ways.append((run.distance_m + moved)[run.first:])
+    longest_m = max(float(np.ptp(one)) for one in ways)
+    if not longest_m > 0:
+        return None
+    grid = np.arange(*per_m, 1 / (_FINER * longest_m))
+    power = sum(_power(signal, way, grid) for signal, way in zip(signals, ways, strict=True))
+    return _peak(grid, np.asarray(power))
+
+
+def _peak(grid: Array, power: Array) -> float | None:
+    best = int(power.argmax())
+    if power[best] < _LOUD * float(np.median(power)):
+        return None
+    if 0 < best < len(grid) - 1:  # of a parabola through the three highest
+        before, top, after = power[best - 1 : best + 2]
+        bend = before - 2 * top + after
+        offset = 0.5 * float(before - after) / float(bend) if bend else 0.0
+        return float(grid[best] + offset * (grid[1] - grid[0]))
+    return float(grid[best])
+
+
+def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
+    """Of coherent sums over a way (n,) at wave numbers (g,)."""
+    found = np.empty(len(grid))
+    # Over equal steps of a wave number the phase factor of each sample is multiplied by another one.
+    step = np.exp(-2j * np.pi * (grid[1] - grid[0]) * way)
+    for first in range(0, len(grid), at_once):
+        turned = signal * np.exp(-2j * np.pi * grid[first] * way)
+        for index in range(first, min(first + at_once, len(grid))):
+            found[index] = abs(turned.sum()) ** 2
+            turned = turned * step
+    return found / len(signal)
+
+
+# --- a tone whose frequency wanders ---
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A tone whose phase is 2 pi f (t + c cos(2 pi t / T) + s sin(2 pi t / T)): its mean frequency f [Hz], by how much
+    it is early and late (c, s) [s], and the period T of that [s]; power, in units of the noise's."""
+
+    frequency_hz: float
+    wander_cos_s: float
+    wander_sin_s: float
+    period_s: float
+    power: float
+
+    @property
+    def wanders(self) -> bool:
+        """Whether its frequency changes."""
+        return self.wander_cos_s != 0 or self.wander_sin_s != 0
+
+
+_WINDOW_S, _HOP = 1.0, 0.5
+_DEPTHS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
+"""Of the frequency, as shares: an engine in one gear seldom changes by more."""
+_PERIODS_S = np.array([7.0, 8.5, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0, 34.0, 40.0])
+_PHASES = np.arange(12) * 2 * np.pi / 12
+_STEPS_HZ = 0.25
+_COHERENT_S = (2.0, 5.0, 12.0, 30.0, 1e9)
+
+
+def tone_in_time(look: Look, hz: tuple[float, float], wanders: bool) -> Tone | None:
+    """The tone that is loudest, at the same time since each run began; None where none stands out.
+
+    hz         its mean frequency is between these
+    wanders    its frequency may wander by a sinusoid
+    """
+    signals = white_residuals(look)
+    rate = look.runs[0].rate_hz
+    began_s = look.runs[0].first / rate
+    begin = _steady(signals, rate, hz) if not wanders else _ridge(signals, rate, began_s, hz)
+    at = np.array([begin.frequency_hz, begin.frequency_hz * begin.wander_cos_s,
+                   begin.frequency_hz * begin.wander_sin_s, 1 / begin.period_s])
+    for coherent_s in _COHERENT_S:
+        at = _refined(signals, rate, began_s, at, coherent_s, wanders)
+    power = _coherent(signals, rate, began_s, at, _COHERENT_S[-1])
+    if power < _LOUD * len(signals) or not hz[0] < at[0] < hz[1]:
+        return None
+    return Tone(float(at[0]), float(at[1] / at[0]), float(at[2] / at[0]), float(1 / at[3]), power)
+
+
+def _steady(signals: list[Array], rate_hz: float, hz: tuple[float, float]) -> Tone:
+    size = _FINER * max(map(len, signals))
+    power = sum(np.abs(np.fft.rfft(one, size)) ** 2 / len(one) for one in signals)
+    f_hz = np.fft.rfftfreq(size, 1 / rate_hz)
+    inside = (f_hz > hz[0]) & (f_hz < hz[1])
+    best = int(np.argmax(np.where(inside, power, 0.0)))
+    return Tone(float(f_hz[best]), 0.0, 0.0, _PERIODS_S[-1], 0.0)
+
+
+def _ridge(signals: list[Array], rate_hz: float, began_s: float, hz: tuple[float, float]) -> Tone:
+    """Where the powers of short windows add up to most along a frequency that goes up and down."""
+    size, hop = round(_WINDOW_S * rate_hz), round(_WINDOW_S * _HOP * rate_hz)
+    taper = np.hanning(size + 1)[:-1]
+    padded = round(rate_hz / _STEPS_HZ)
+    count = 1 + (max(map(len, signals)) - size) // hop
+    power = np.zeros((count, padded // 2 + 1))
+    for one in signals:
+        windows = np.lib.stride_tricks.sliding_window_view(one, size)[::hop]
+        power[: len(windows)] += np.abs(np.fft.rfft(windows * taper, padded, axis=1)) ** 2
+    power -= np.median(power, axis=0)  # what is as loud all along is no tone that wanders
+    middle_s = began_s + (np.arange(count) * hop + 0.5 * size) / rate_hz
+    best = (-np.inf, 0.0, 0.0, 0.0, 1.0)
+    f_hz = np.arange(*hz, _STEPS_HZ)
+    rows = np.arange(count)
+    for period_s in _PERIODS_S:
+        for phase in _PHASES:
+            swing = np.cos(2 * np.pi * middle_s / period_s + phase)
+            for depth in _DEPTHS:
+                place = np.rint(f_hz[:, None] * (1 + depth * swing) / _STEPS_HZ).astype(int)
+                inside = place < power.shape[1]
+                sums = (power[rows, np.where(inside, place, 0)] * inside).sum(axis=1)
+                top = int(sums.argmax())
+                if sums[top] > best[0]:
+                    best = (float(sums[top]), float(f_hz[top]), float(depth), float(phase), float(period_s))
+    _, frequency_hz, depth, phase, period_s = best
+    late_s = depth * period_s / (2 * np.pi)  # the integral of the swing
+    return Tone(frequency_hz, late_s * np.sin(phase), late_s * np.cos(phase), period_s, 0.0)
+
+
+def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float) -> float:
+    """Power along a phase, coherent within so long."""
+    found = 0.0
+    for one in signals:
+        time_s = began_s + np.arange(len(one)) / rate_hz
+        turn = 2 * np.pi * time_s * at[3]
+        turned = one * np.exp(-2j * np.pi * (at[0] * time_s + at[1] * np.cos(turn) + at[2] * np.sin(turn)))
+        pieces = max(1, int(len(one) / (coherent_s * rate_hz)))
+        size = len(one) // pieces
+        sums = turned[: pieces * size].reshape(pieces, size).sum(axis=1)
+        found += float((np.abs(sums) ** 2).sum()) / size / pieces
+    return found
+
+
+def _refined(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
+             wanders: bool) -> Array:
+    from scipy.optimize import minimize
+
+    lasts_s = min(coherent_s, max(map(len, signals)) / rate_hz)
+    # A quarter of a cycle within what is coherent, by each number.
+    late = max(0.1, 0.25 / (2 * np.pi * lasts_s * at[3]))
+    sizes = np.array([0.25 / lasts_s, late, late, 0.05 / (2 * np.pi * lasts_s * max(np.hypot(at[1], at[2]), 0.1))])
+    free = [0, 1, 2, 3] if wanders else [0]
+
+    def lack(x: Array) -> float:
+        there = at.copy()
+        there[free] += x * sizes[free]
+        return -_coherent(signals, rate_hz, began_s, there, coherent_s)
+
+    simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
+    found = minimize(lack, np.zeros(len(free)), method="Nelder-Mead",
+                     options={"initial_simplex": simplex, "maxfev": 80 * len(free), "xatol": 0.02, "fatol": 0.1})
+    there = at.copy()
+    there[free] += found.x * sizes[free]
+    return there

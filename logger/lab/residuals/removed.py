@@ -1,0 +1,92 @@
+"""What is taken out of an error before anything is judged, and how much of the error it made.
+
+Problem: three things leave an error and are no physics of the car: a sensor that drifts, a distance that is wrong, a
+record that somebody filtered. The lab removes all three before it asks what is missing; an error that counts them, and
+a verdict that does not name them, seem to contradict each other. Solution: each is reported with its share of the power
+of the residual of the model as it stands, and the error that is left without all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.distance_error import unusual_m
+from logger.lab.likelihood.noise_floor import noise_of
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.residuals.sensor_drift import Drift, drifts_of
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+_LEAST_SHARE = 0.02
+"""A drift that makes a smaller share of what the fitted model leaves does not matter (``residual_tests.LEAST_SHARE``).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Removed:
+    """What was taken out.
+
+    drifts                of the runs' sensors, one each
+    drift_share, distance_share, filter_share    of the power of the residual of the model as it stands, at all
+                          frequencies
+    distance_error_m      by how much a distance is off at most, if that is more than usual; else 0
+    error                 normalised r.m.s. error of the fitted model without the drifts
+    """
+
+    drifts: tuple[Drift, ...]
+    drift_share: float
+    distance_share: float
+    filter_share: float
+    distance_error_m: float
+    error: float
+
+    @cached_property
+    def drifting(self) -> tuple[Drift, ...]:
+        """The drifts that were found."""
+        return tuple(one for one in self.drifts if one.found)
+
+    def cleared(self, predictions: Sequence[Array]) -> list[Array]:
+        """Predictions (n,) per run with the sensors' drifts in them; other signals that are joined stay."""
+        return [_drifted(one, drift) for one, drift in zip(predictions, self.drifts, strict=True)]
+
+
+def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> Removed:
+    """What was taken out of the residuals of a fitted state.
+
+    plain    predictions (n,) per run of the model as it stands
+    """
+    runs = posterior.runs.runs
+    outside = sum(run.outside_mps2**2 * (run.count - run.first) for run in runs)
+    left, whole = _power(runs, state.predictions), _power(runs, plain) + outside
+    in_place = [error.in_place(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
+    unmoved = _power(runs, posterior.predict(state.effects, state.logs, in_place))
+    drifts = drifts_of(runs, posterior.as_read().residuals(state), noise_of(posterior, state).deviation_mps2)
+    cleared = _power(runs, [_drifted(one, drift) for one, drift in zip(state.predictions, drifts, strict=True)])
+    if not left - cleared > _LEAST_SHARE * left:
+        drifts, cleared = tuple(one.unseen() for one in drifts), left
+
+    def share(power: float) -> float:
+        return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0
+
+    measured = sum(float(run.kept_readings_mps2 @ run.kept_readings_mps2) for run in runs)
+    return Removed(drifts, share(left - cleared), share(unmoved - left), share(outside),
+                   unusual_m(posterior.record_errors, state.record),
+                   float(np.sqrt(cleared / measured)) if measured > 0 else float("nan"))
+
+
+def _drifted(prediction: Array, drift: Drift) -> Array:
+    found = prediction.copy()
+    found[: len(drift.curve_mps2)] += drift.curve_mps2
+    return found
+
+
+def _power(runs: Sequence[Run], predictions: Sequence[Array]) -> float:
+    """The sum of squares of what predictions (n,) per run leave [m2/s4]."""
+    return sum(float((run.left_by(run.main(one))[run.first:] ** 2).sum())
+               for run, one in zip(runs, predictions, strict=True))

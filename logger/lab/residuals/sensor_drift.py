@@ -1,0 +1,177 @@
+"""The slow part of a residual: the drift of the sensor, which is no part of the car.
+
+Problem: below 0.4 Hz nothing is judged (``likelihood.whittle``), because a body on springs hardly accelerates there: an
+acceleration is its travel times (2 pi f)2, so that even 5 cm at 0.1 Hz are 0.02 m/s2. A sensor that warms up, or whose
+zero jumps, is strongest there, and an error counts that. Solution: the residual of a run is laid on the cosines of less
+than that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on Computers C-23,
+1974). Of the forms that a drift has, each with its numbers, the likeliest by the criterion of G. Schwarz (Annals of
+Statistics 6, 1978) is taken; noise is white there, no less than between 0.4 and 0.6 Hz. A random walk has coefficients
+that fall with the square of their number, in power; it is estimated by N. Wiener's filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.lab.likelihood.whittle import LOWEST_HZ
+from logger.runs import Run
+
+Array = npt.NDArray[np.float64]
+
+NONE, OFFSET, RAMP, STEP, EXPONENTIAL, WANDER = "none", "offset", "ramp", "step", "exponential", "wander"
+_NOISE_HZ = 0.6
+# By how much the criterion has to fall: by chance, it does once in five hundred runs.
+_LEAST_GAIN = 2 * float(np.log(500))
+_SETTLING = 60  # time constants that are tried, from two coefficients' to twice the run's length
+_LEAST_COEFFICIENTS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """How the sensor of one run drifted.
+
+    run          its name
+    form         offset, ramp, step, exponential or wander; none where no more than noise is seen
+    size_mps2    of an offset or a step, over all of a ramp, of an exponential at the beginning of the run; r.m.s. of
+                 what wanders [m/s2]
+    time_s       of an exponential; where in the run a step is [s]; None: it has none
+    curve_mps2   (n,) of the whole run [m/s2]
+    rate_hz      samples a second
+    """
+
+    run: str
+    form: str
+    size_mps2: float
+    time_s: float | None
+    curve_mps2: Array
+    rate_hz: float
+
+    @property
+    def found(self) -> bool:
+        """Whether it is more than noise."""
+        return self.form != NONE
+
+    def unseen(self) -> Drift:
+        """The run as if nothing were seen."""
+        return replace(self, form=NONE, size_mps2=0.0, time_s=None, curve_mps2=np.zeros(len(self.curve_mps2)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    form: str
+    lack: float
+    size_mps2: float
+    time_s: float | None
+    curve: Callable[[Array], Array]
+
+
+def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
+    """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2]."""
+    kept, rate = run.count - run.first, run.rate_hz
+    time_s = run.time_s
+    nothing = Drift(run.name, NONE, 0.0, None, np.zeros(run.count), rate)
+    read = run.read[run.first:]
+    count = int(2 * LOWEST_HZ * kept / rate)  # of frequencies below the lowest that is judged
+    low_hz, _ = run.pass_band_hz
+    if count < _LEAST_COEFFICIENTS or low_hz > 0 or not read.any():
+        return nothing
+    basis = _Cosines(kept, count, int(2 * _NOISE_HZ * kept / rate))
+    seen = basis.of(np.where(read, residual[run.first:], 0.0))
+    level = max(noise_mps2**2, float(np.mean(seen[count:] ** 2)))
+    fits = [_white(form, basis, seen[:count], level, time_s[run.first:], shapes)
+            for form, shapes in _shapes(time_s[run.first:], rate).items()]
+    fits.append(_wander(basis, seen[:count], level, run.first))
+    nought = float(seen[:count] @ seen[:count]) / level
+    best = min(fits, key=lambda one: one.lack)
+    if best.lack > nought - _LEAST_GAIN:
+        return nothing
+    return Drift(run.name, best.form, best.size_mps2, best.time_s, best.curve(time_s), rate)
+
+
+def drifts_of(runs: Sequence[Run], residuals: Sequence[Array], noise_mps2: float) -> tuple[Drift, ...]:
+    """Those of several runs."""
+    return tuple(drift_of(run, run.main(one), noise_mps2) for run, one in zip(runs, residuals, strict=True))
+
+
+class _Cosines:
+    """The first orthonormal cosines (k, n) of n samples: those that count, and some more that tell of the noise."""
+
+    def __init__(self, samples: int, count: int, more: int) -> None:
+        from scipy.fft import dct, idct
+
+        self._dct, self._idct = dct, idct
+        self.samples, self.count, self.size = samples, count, max(more, count + 2)
+
+    def of(self, samples: Array) -> Array:
+        """Coefficients (..., k) of samples (..., n)."""
+        return np.asarray(self._dct(samples, norm="ortho", axis=-1)[..., : self.size])
+
+    def back(self, coefficients: Array) -> Array:
+        """Samples (n,) of coefficients (k,)."""
+        return np.asarray(self._idct(coefficients, n=self.samples, norm="ortho"))
+
+
+Curve = Callable[[Array], Array]
+Shape = tuple[float | None, Curve]
+
+
+def _step(begins_s: float) -> Curve:
+    return lambda at: np.where(at >= begins_s, 1.0, 0.0)
+
+
+def _settling(takes_s: float) -> Curve:
+    return lambda at: np.asarray(np.exp(-at / takes_s))
+
+
+def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[Shape]]:
+    """What each form adds to a constant: curves by time, each with the time that it is known by."""
+    lasts_s = time_s[-1] + 1 / rate_hz
+    steps = np.arange(time_s[0], time_s[-1], 0.1 / LOWEST_HZ)[1:]
+    settling = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, _SETTLING)
+    return {
+        OFFSET: [],
+        RAMP: [(None, lambda at: at / lasts_s)],
+        STEP: [(float(one), _step(float(one))) for one in steps],
+        EXPONENTIAL: [(float(one), _settling(float(one))) for one in settling],
+    }
+
+
+def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[Shape]) -> _Fit:
+    """A form beside white noise: the likeliest of its shapes, with a constant."""
+    if not shapes:
+        offset = float(seen[0]) / float(np.sqrt(basis.samples))
+        lack = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
+        return _Fit(form, lack, offset, None, lambda at: np.full(len(at), offset))
+    columns = basis.of(np.stack([shape(time_s) for _, shape in shapes]))[:, : basis.count]
+    # The constant is the first coefficient alone.
+    free = columns[:, 1:]
+    sizes = free @ seen[1:] / np.maximum((free**2).sum(axis=1), 1e-300)
+    lacks = ((seen[1:] - sizes[:, None] * free) ** 2).sum(axis=1) / level
+    best = int(lacks.argmin())
+    known_s, shape = shapes[best]
+    size = float(sizes[best])
+    offset = float(seen[0] - size * columns[best, 0]) / float(np.sqrt(basis.samples))
+    numbers = 2 if known_s is None else 3
+    return _Fit(form, float(lacks[best]) + numbers * float(np.log(basis.count)), size, known_s,
+                lambda at: offset + size * shape(at))
+
+
+def _wander(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
+    """A random walk beside white noise."""
+    numbers = np.arange(1, basis.count)
+    powers = seen[1:] ** 2
+    walks = np.geomspace(1e-2, 1e8, 81) * level
+    spectra = level + walks[:, None] / numbers**2
+    lacks = (np.log(spectra / level) + powers / spectra).sum(axis=1)
+    best = int(lacks.argmin())
+    kept = np.zeros(basis.count)
+    kept[0] = seen[0]
+    kept[1:] = seen[1:] * (1 - level / spectra[best])
+    curve = basis.back(kept)
+    whole = np.concatenate([np.full(first, curve[0]), curve])
+    return _Fit(WANDER, float(lacks[best]) + 2 * float(np.log(basis.count)), float(np.sqrt(np.mean(curve**2))), None,
+                lambda at: whole)
