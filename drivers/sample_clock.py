@@ -46,11 +46,11 @@ class SampleClock:
        arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
        tolerance of the rate found. One that was kept through all of them and is outside of it is the rate instead.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
-       ``LASTING_US``, or what came together at its end). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
-       where that is more and the arrivals do not show a smaller one, samples were lost: the line moves by as many
-       periods and leaves a hole. (A link that is late by 30 ms at random has such a second now and then: once in 1,000
-       samples.) Arrivals that stay more than
-       ``OFF_US`` late, or that come that much too early, make the clock settle anew.
+       ``LASTING_US``, or what came together at its end). Where none of them comes back to within ``STEP_SHARE`` of a
+       period of the line, or ``JITTER_US`` where that is more and the arrivals do not show a smaller one, samples were
+       lost: the line moves by as many periods and leaves a hole. (A link that is late by 30 ms at random has such a
+       second now and then: once in 1,000 samples.) Arrivals that stay more than ``OFF_US`` late, or that come that much
+       too early, make the clock settle anew.
     5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
        those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
        samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
@@ -67,6 +67,7 @@ class SampleClock:
     resyncs    times the line was lost and settled anew
     lost       samples that were noticed to be missing, each by itself or some in a row
     too_many_lost   more than can be located: samples are not dated now
+    rates_hz   least and most that the rate was since it was found [Hz]
     """
 
     FIND_US = 1_200_000
@@ -95,6 +96,7 @@ class SampleClock:
         self._nominal_tolerance = max(tolerance, self.SEEN_TOLERANCE)
         self._held: Times = np.empty(0, dtype=np.int64)
         self._last_us = -(2**62)
+        self.rates_hz = (rate_hz, rate_hz)
         self._points: list[_Point] = []
         self._pieces: list[_Point] = []
         self._number = 0
@@ -219,6 +221,7 @@ class SampleClock:
     def _expect(self, period_us: float, tolerance: float) -> None:
         """The period is about this."""
         self._found_us = self._period_us = period_us
+        self._is_new_rate = True
         self._shortest_us = period_us * (1 - tolerance)
         self._longest_us = period_us * (1 + tolerance)
         self._climb_us_max = period_us * tolerance
@@ -251,8 +254,8 @@ class SampleClock:
             self._steady_needed = steady_needed if is_steady and steady_needed > 0 else self.STEADY
 
     def _comb(self, points: list[_Point], slope_us: float) -> float | None:
-        """The period [us] of a sampler of which samples are lost, where the arrivals show it. (125 Hz with 1 in 25 lost,
-        and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
+        """The period [us] of a sampler of which samples are lost, where the arrivals show it. (125 Hz with 1 in 25
+        lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
         if not self._nominal_us / self.FASTEST <= slope_us <= self._nominal_us / self.SLOWEST**2:
             return None
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
@@ -377,6 +380,15 @@ class SampleClock:
                 self._expect(self._nominal_us, self._nominal_tolerance)
                 return
         self._take_period(slope_us)
+        if len(self._points) == self.BLOCKS and not any(self._steps_by_block):
+            self._note_rate()
+
+    def _note_rate(self) -> None:
+        """Widen what is known of the rate by the one of now, or begin anew with it."""
+        rate_hz = 1e6 / self._period_us
+        known = (rate_hz,) if self._is_new_rate else (*self.rates_hz, rate_hz)
+        self.rates_hz = min(known), max(known)
+        self._is_new_rate = False
 
     def _dated(self, times_us: npt.NDArray[np.float64]) -> Times:
         """Whole microseconds, each at least one later than the one before; none while too many samples are lost."""

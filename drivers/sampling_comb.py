@@ -74,9 +74,9 @@ def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
 
 
 def _coarsest(instants_us: Floats, period_us: float) -> float:
-    """How far instants (m,) [us] have one phase in the longer period, up to ``TIMER_US``, where they have it most: of an
-    adapter's timer, every few ticks of which nearly a sample more or less comes. By the Fourier transform of their
-    histogram; 0 where no longer period is asked of."""
+    """How far instants (m,) [us] have one phase in the longer period, up to ``TIMER_US``, where they have it most: of
+    an adapter's timer, which samples of another period fill unevenly. By the Fourier transform of their histogram; 0
+    where there is no longer period."""
     bins = np.rint((instants_us - instants_us[0]) / BIN_US).astype(np.int64)
     length = 1 << int(STEPS_PER_CYCLE // 2 * (bins[-1] + 1)).bit_length()
     first, end = (int(length * BIN_US / us) for us in (TIMER_US, NEXT * period_us))
