@@ -260,6 +260,9 @@ class SampleClock:
             return None
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
         count = points[-1].number - points[0].number
+        above_us = instants_us - slope_us * np.array([point.number for point in points], dtype=np.float64)
+        if np.ptp(above_us) < 0.5 * slope_us:
+            return None  # they lie on a line; where one is lost, they leave it by a period
         period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
         if period_us is None or period_us > self._nominal_us / self.SLOWEST:
             return None
