@@ -184,12 +184,14 @@ class SampleClock:
 
     def _heard_us(self, arrivals_us: Times) -> Times:
         """For how long something was heard up to each arrival (n,) [us]. A pause counts for ``LASTING_US``, or for as
-        long as the samples that came at its end together were taken in: a device that buffers was not silent."""
+        long as the samples that came at its end together were taken in: a device that buffers was not silent. One
+        jam counts for half a look ahead at most: its end alone does not show what was late."""
         paused_us = np.diff(arrivals_us)
         first = np.flatnonzero(np.concatenate(([True], paused_us > 0)))
         together = np.diff(np.append(first, len(arrivals_us)))
         counts_us = np.zeros(len(arrivals_us), dtype=np.int64)
-        counts_us[first] = np.maximum(self.LASTING_US, (together * self._period_us).astype(np.int64))
+        taken_us = np.minimum((together * self._period_us).astype(np.int64), self.LOOK_AHEAD_US // 2)
+        counts_us[first] = np.maximum(self.LASTING_US, taken_us)
         counts_us[0] = 0
         return np.cumsum(np.minimum(np.append(0, paused_us), counts_us))
 
