@@ -17,6 +17,18 @@ from drivers.sample_clock import NO_TIME, SampleClock
 WORTH_TELLING = 0.005
 """Share of lost samples from which on a person is asked to look for the cause."""
 
+DRIFT = 0.005
+"""Share of its rate through which a clock has to drift to be told of: a quartz clock keeps to a hundredth of that."""
+
+BURSTS_S = 0.2
+"""Samples that come so much at a time are kept by something on the way: our own reading makes 0.1 s at most."""
+
+LONGEST_BURSTS_S = 0.45
+"""More at a time are late for rows: a sample is dated a second after its arrival and given up 2 s after it was taken
+(measured: the oldest of 0.4 s are dated after 1.6 s, of 0.5 s after 2.0 s, of 1 s after 3.0 s)."""
+
+JUDGED_SAMPLES = 500
+
 
 class Samples(NamedTuple):
     """Samples without times: arrivals (n,) [us], acceleration (n, 3) [m/s2], clipped (n,), good (n,).
@@ -37,17 +49,22 @@ class DatedSamples:
 
     good, bad    samples so far
     undated      left out because they came at a rate that cannot be used, or too many were lost among them
+    burst_s      for so long samples are kept on the way and then come together [s], by the last
+                 ``JUDGED_SAMPLES``: twice the middle one's delay, as delays are even from none to that long
     """
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:
         self.clock = SampleClock(rate_hz, tolerance)
         self._rate_hz = rate_hz
+        self._tolerance = tolerance
         self._waiting: list[Samples] = []
         self._times: list[npt.NDArray[np.int64]] = []
         self._ended = False
         self.good = 0
         self.bad = 0
         self.undated = 0
+        self.burst_s = 0.0
+        self._late_us = np.empty(0, dtype=np.int64)
 
     def add(self, samples: Samples) -> None:
         """More samples, in order."""
@@ -77,6 +94,10 @@ class DatedSamples:
         self._waiting = [Samples(False, arrivals_us[n:], accel_mps2[n:], clipped[n:], good[n:])]
         dated = t_us != NO_TIME
         self.undated += int(np.count_nonzero(~dated))
+        self._late_us = np.concatenate([self._late_us, (arrivals_us[:n] - t_us)[dated]])
+        if len(self._late_us) >= JUDGED_SAMPLES:
+            self.burst_s = 2e-6 * float(np.median(self._late_us))
+            self._late_us = self._late_us[:0]
         keep = good[:n] & dated
         return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self.clock.rate_hz)
 
@@ -89,4 +110,28 @@ class DatedSamples:
             return f"more samples are lost than can be located: no rows are made of those that come. {check}"
         if self.clock.lost_share >= WORTH_TELLING:
             return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
+        return self.burst_doubt
+
+    @property
+    def burst_doubt(self) -> str:
+        """That samples come too late to make rows, and what to do; empty: they do not."""
+        if self.burst_s < LONGEST_BURSTS_S:
+            return ""
+        return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them: too late "
+                "for rows, which stay empty. Have the sensor, or what brings its samples, send each as it is taken, "
+                "or three times a second")
+
+    @property
+    def note(self) -> str:
+        """How the samples come, where that is worth knowing and does no harm; empty: as they should."""
+        slow_hz, fast_hz = self.clock.rates_hz
+        if fast_hz - slow_hz > DRIFT * fast_hz:
+            return (f"its clock drifts: {slow_hz:.1f} to {fast_hz:.1f} samples a second so far. Its samples are dated "
+                    "by when they come: nothing has to be done")
+        if abs(slow_hz / self._rate_hz - 1) > self._tolerance:
+            return (f"it gives {slow_hz:.1f} samples a second where {self._rate_hz:g} are expected, and is taken at "
+                    "that rate: right if that is its own; if it has another one, samples are lost on the way")
+        if BURSTS_S <= self.burst_s < LONGEST_BURSTS_S:
+            return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them. They "
+                    "are dated by their even rate: nothing has to be done")
         return ""

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.sampling_comb import is_ticked, sampling_period
+from drivers.sampling_comb import TIMER_US, is_ticked, sampling_period
 
 Times = npt.NDArray[np.int64]
 
@@ -46,11 +46,11 @@ class SampleClock:
        arrivals of the last ``BLOCKS`` blocks (Theil and Sen: a stalled block or two cannot tilt it), within the
        tolerance of the rate found. One that was kept through all of them and is outside of it is the rate instead.
     4. Losses. A sample is given once the arrivals of ``LOOK_AHEAD_US`` after it are known (a pause in them counts
-       ``LASTING_US``). Where none of them comes back to within ``STEP_SHARE`` of a period of the line, or ``JITTER_US``
-       where that is more and the arrivals do not show a smaller one, samples were lost: the line moves by as many
-       periods and leaves a hole. (A link that is late by 30 ms at random has such a second now and then: once in 1,000
-       samples.) Arrivals that stay more than
-       ``OFF_US`` late, or that come that much too early, make the clock settle anew.
+       ``LASTING_US``, or what came together at its end). Where none of them comes back to within ``STEP_SHARE`` of a
+       period of the line, or ``JITTER_US`` where that is more and the arrivals do not show a smaller one, samples were
+       lost: the line moves by as many periods and leaves a hole. (A link that is late by 30 ms at random has such a
+       second now and then: once in 1,000 samples.) Arrivals that stay more than ``OFF_US`` late, or that come that much
+       too early, make the clock settle anew.
     5. Steadiness. Losses from the start on look like a slower clock. But arrivals of a slow clock lie on a line, and
        those of one that loses samples on the comb of its own period (``drivers.sampling_comb``): where they do, in the
        samples of the finding or of the last blocks, that period is taken, by which losses show. Where they lie on
@@ -67,6 +67,7 @@ class SampleClock:
     resyncs    times the line was lost and settled anew
     lost       samples that were noticed to be missing, each by itself or some in a row
     too_many_lost   more than can be located: samples are not dated now
+    rates_hz   least and most that the rate was since it was found [Hz]
     """
 
     FIND_US = 1_200_000
@@ -81,7 +82,6 @@ class SampleClock:
     BLOCKS = 8
     PIECES = 16  # of a block: of 80 ms, so that between two losses, which are 0.2 s apart or more, lie some of them
     BLOCKS_SEEN, JITTERS, WITHOUT_LOSS = 3, 4.0, 0.75
-    TIMER_US = 20_000  # of adapters: 16 ms, if they are left as they come
     SEEN_TOLERANCE = JITTER_US / (BLOCKS * BLOCK_US)  # 490 ppm: a tighter tolerance the arrivals cannot tell
     GAIN = 0.25
     SLOWEST = 0.95
@@ -96,6 +96,7 @@ class SampleClock:
         self._nominal_tolerance = max(tolerance, self.SEEN_TOLERANCE)
         self._held: Times = np.empty(0, dtype=np.int64)
         self._last_us = -(2**62)
+        self.rates_hz = (rate_hz, rate_hz)
         self._points: list[_Point] = []
         self._pieces: list[_Point] = []
         self._number = 0
@@ -160,7 +161,7 @@ class SampleClock:
     def _on_line(self, waiting: Times) -> int | None:
         """How many of the first samples belong to the line; 0: that is open; None: the line was moved or lost."""
         waiting = waiting[: self._block + self.HELD_MAX]
-        heard_us = np.concatenate(([0], np.cumsum(np.minimum(np.diff(waiting), self.LASTING_US))))
+        heard_us = self._heard_us(waiting)
         known = int(np.searchsorted(heard_us, heard_us[-1] - self.LOOK_AHEAD_US, "right"))
         known = max(known, len(waiting) - self.HELD_MAX)
         count = min(len(waiting) if self._ended else known, self._block - self._index)
@@ -180,6 +181,19 @@ class SampleClock:
             return int(np.argmax(ends)) if ends.any() else count
         soon, late = (int(np.searchsorted(heard_us, us, "right")) for us in (self.LASTING_US, self.LOOK_AHEAD_US))
         return self._step(above_us, soon, late, count)
+
+    def _heard_us(self, arrivals_us: Times) -> Times:
+        """For how long something was heard up to each arrival (n,) [us]. A pause counts for ``LASTING_US``, or for as
+        long as the samples that came at its end together were taken in: a device that buffers was not silent. One
+        jam counts for half a look ahead at most: its end alone does not show what was late."""
+        paused_us = np.diff(arrivals_us)
+        first = np.flatnonzero(np.concatenate(([True], paused_us > 0)))
+        together = np.diff(np.append(first, len(arrivals_us)))
+        counts_us = np.zeros(len(arrivals_us), dtype=np.int64)
+        taken_us = np.minimum((together * self._period_us).astype(np.int64), self.LOOK_AHEAD_US // 2)
+        counts_us[first] = np.maximum(self.LASTING_US, taken_us)
+        counts_us[0] = 0
+        return np.cumsum(np.minimum(np.append(0, paused_us), counts_us))
 
     def _step(self, above_us: npt.NDArray[np.float64], soon: int, late: int, count: int) -> int | None:
         """The first sample and those after it stay above the line. A step that another follows at once did not come
@@ -209,6 +223,7 @@ class SampleClock:
     def _expect(self, period_us: float, tolerance: float) -> None:
         """The period is about this."""
         self._found_us = self._period_us = period_us
+        self._is_new_rate = True
         self._shortest_us = period_us * (1 - tolerance)
         self._longest_us = period_us * (1 + tolerance)
         self._climb_us_max = period_us * tolerance
@@ -241,14 +256,17 @@ class SampleClock:
             self._steady_needed = steady_needed if is_steady and steady_needed > 0 else self.STEADY
 
     def _comb(self, points: list[_Point], slope_us: float) -> float | None:
-        """The period [us] of a sampler of which samples are lost, where the arrivals show it. It has to be near the
-        profile's: 125 Hz with 1 in 25 lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike."""
-        if slope_us < self.SLOWEST * self._nominal_us:
+        """The period [us] of a sampler of which samples are lost, where the arrivals show it. (125 Hz with 1 in 25
+        lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
+        if not self._nominal_us / self.FASTEST <= slope_us <= self._nominal_us / self.SLOWEST**2:
             return None
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
         count = points[-1].number - points[0].number
+        above_us = instants_us - slope_us * np.array([point.number for point in points], dtype=np.float64)
+        if np.ptp(above_us) < 0.5 * slope_us:
+            return None  # they lie on a line; where one is lost, they leave it by a period
         period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
-        if period_us is None or not self.SLOWEST <= period_us / self._nominal_us <= 1 / self.SLOWEST:
+        if period_us is None or period_us > self._nominal_us / self.SLOWEST:
             return None
         return period_us
 
@@ -336,7 +354,7 @@ class SampleClock:
         late_us = [one.arrival_us - self._period_us * (one.number + one.lost) for one in self._pieces]
         seen_us = self.JITTERS * float(np.quantile(np.abs(np.diff(late_us)), self.WITHOUT_LOSS))
         instants_us = np.array([one.arrival_us for one in self._pieces], dtype=np.float64)
-        if seen_us >= self.JITTER_US or is_ticked(instants_us, self._period_us, self.TIMER_US):
+        if seen_us >= self.JITTER_US or is_ticked(instants_us, self._period_us, TIMER_US):
             return self.JITTER_US
         return seen_us
 
@@ -367,6 +385,15 @@ class SampleClock:
                 self._expect(self._nominal_us, self._nominal_tolerance)
                 return
         self._take_period(slope_us)
+        if len(self._points) == self.BLOCKS and not any(self._steps_by_block):
+            self._note_rate()
+
+    def _note_rate(self) -> None:
+        """Widen what is known of the rate by the one of now, or begin anew with it."""
+        rate_hz = 1e6 / self._period_us
+        known = (rate_hz,) if self._is_new_rate else (*self.rates_hz, rate_hz)
+        self.rates_hz = min(known), max(known)
+        self._is_new_rate = False
 
     def _dated(self, times_us: npt.NDArray[np.float64]) -> Times:
         """Whole microseconds, each at least one later than the one before; none while too many samples are lost."""

@@ -33,6 +33,7 @@ class Decoder(Protocol):
 
     name      of the events that it reads
     doubt     what is wrong with the samples that come, and what to do; empty: nothing
+    note      how they come, where a person should know of it though nothing is wrong; empty: as they should
     counts    what came in so far, by name
 
     ``feed`` raises BadReply for bytes that are none of this device's, and has then taken nothing.
@@ -42,6 +43,8 @@ class Decoder(Protocol):
 
     @property
     def doubt(self) -> str: ...
+    @property
+    def note(self) -> str: ...
     @property
     def counts(self) -> dict[str, int]: ...
     def feed(self, t_us: int, data: bytes) -> None: ...

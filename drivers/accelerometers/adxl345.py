@@ -205,6 +205,11 @@ class Adxl345Decoder:
                                    "and what else keeps the computer busy")
 
     @property
+    def note(self) -> str:
+        """How the samples come; empty: as they should."""
+        return self._samples.note
+
+    @property
     def counts(self) -> dict[str, int]:
         """What came in so far, and what is missing in it."""
         clock = self._samples.clock

@@ -241,7 +241,7 @@ class Bma220Decoder:
     """
 
     name = "bma220"
-    doubt = ""
+    doubt = note = ""
 
     def __init__(self, range_g: int) -> None:
         self.mps2_per_count = mps2_per_count(range_g)

@@ -199,6 +199,11 @@ class IioDecoder:
                                  "busy")
 
     @property
+    def note(self) -> str:
+        """How the samples come; empty: as they should."""
+        return self._dated.note if self._dated is not None else ""
+
+    @property
     def counts(self) -> dict[str, int]:
         """What came in so far."""
         found = dict(self._before)

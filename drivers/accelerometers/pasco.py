@@ -165,7 +165,12 @@ class PascoDecoder:
         if self._clock.lost_share >= WORTH_TELLING:
             return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
                     "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
-        return ""
+        return self._samples.burst_doubt
+
+    @property
+    def note(self) -> str:
+        """How the samples come; empty: as they should."""
+        return self._samples.note
 
     @property
     def counters(self) -> PascoCounters:

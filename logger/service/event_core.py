@@ -152,6 +152,11 @@ class EventCore:
         return self._accelerometer.doubt or self._pipeline.repetition.doubt
 
     @property
+    def accelerometer_note(self) -> str:
+        """How its samples come, where a person should know of it; empty: as they should."""
+        return self._accelerometer.note
+
+    @property
     def gps_doubt(self) -> str:
         """What is wrong with the fixes that come; empty: nothing."""
         fix = self.last_fix

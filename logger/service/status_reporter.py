@@ -194,7 +194,7 @@ class StatusReporter:
             since_s=(now_us - self._state_since[name][1]) / US_PER_S,
             last_error=doubt or part.error or None,
             readings=readings,
-            note=part.note,
+            note=part.note or (self._core.accelerometer_note if name == "accelerometer" else ""),
             counters={"faults": part.faults, "restarts": part.restarts, "settings_lost": part.settings_lost,
                       "dropped_readings": part.dropped, **self._counters[name]()},
         )

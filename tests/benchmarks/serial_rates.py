@@ -68,14 +68,14 @@ def _lines() -> dict:
 
 
 def _read(there_us: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """By the service: it waits for a byte, reads, sleeps 50 ms, reads what is there, and waits again."""
+    """By the service: it waits for a byte, reads, sleeps 50 to 60 ms, reads what is there, and waits again."""
     out = np.empty(len(there_us), dtype=np.int64)
     k = 0
     while k < len(there_us):
         woken_us = there_us[k] + rng.exponential(80)
         end = int(np.searchsorted(there_us, woken_us, "right"))
         out[k:end] = woken_us
-        slept_us = woken_us + 50_100 + rng.exponential(80)
+        slept_us = woken_us + 50_100 + rng.uniform(0, 10_000) + rng.exponential(80)
         k = int(np.searchsorted(there_us, slept_us, "right"))
         out[end:k] = slept_us
     return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.sample_clock import SampleClock
+from drivers.sample_clock import NO_TIME, SampleClock
 from drivers.sampling_comb import is_ticked
 
 
@@ -38,3 +38,46 @@ def test_a_timer_makes_no_losses_and_a_single_one_is_seen_without(timer_us: floa
     clock.feed(arrivals_us)
     clock.restart()
     assert (clock.lost, clock.resyncs) == (0 if timer_us else 1, 0)
+
+
+def as_read(taken_us: np.ndarray, timer_us: float = 0.0) -> np.ndarray:
+    """Arrivals [us] of samples that leave an adapter at the ticks of its timer, if it has one, and are read by who
+    waits for one, sleeps for 50 to 60 ms, and takes what is there."""
+    rng = np.random.default_rng(3)
+    there_us = np.maximum.accumulate(taken_us + 600 + rng.normal(0, 60, len(taken_us)))
+    if timer_us:
+        there_us = np.ceil(there_us / timer_us) * timer_us
+    arrivals_us, k = np.empty(len(taken_us), dtype=np.int64), 0
+    while k < len(taken_us):
+        for woken_us in (there_us[k], there_us[k] + 50_100 + rng.uniform(0, 10_000)):
+            end = int(np.searchsorted(there_us, woken_us, "right"))
+            arrivals_us[k:end] = woken_us + rng.exponential(80)
+            k = max(k, end)
+            if k == len(taken_us):
+                break
+    return np.maximum.accumulate(arrivals_us)
+
+
+@pytest.mark.parametrize(("rate_hz", "every", "count"), [
+    (120, 100, 2), (120, 25, 1), (150, 100, 1), (150, 50, 1), (150, 25, 1), (200, 100, 2), (200, 25, 1), (400, 50, 1)])
+def test_samples_lost_at_even_intervals_are_seen_at_any_rate(rate_hz: int, every: int, count: int) -> None:
+    """The profile says 100: what arrives looks like a slower sensor. Each loss is noticed or nothing is dated."""
+    number = np.arange(rate_hz * 60)
+    taken_us = (number * (1e6 / rate_hz))[number % every >= count]
+    clock = SampleClock(100, 0.02)
+    found = np.concatenate([clock.feed(some) for some in np.array_split(as_read(taken_us), 600)])
+    beyond_s = 20  # until the clock has seen some of its blocks
+    late = found[beyond_s * rate_hz :]
+    losses = count * (60 - beyond_s) * rate_hz / every
+    assert clock.lost > 0.9 * losses or np.mean(late == NO_TIME) > 0.9
+
+
+@pytest.mark.parametrize("rate_hz", [100, 110, 120, 150, 175, 200, 250, 400])
+@pytest.mark.parametrize("timer_us", [0.0, 16_003.0])
+def test_no_loss_is_seen_where_there_is_none(rate_hz: int, timer_us: float) -> None:
+    taken_us = np.arange(rate_hz * 40) * (1e6 / rate_hz)
+    clock = SampleClock(100, 0.02)
+    for some in np.array_split(as_read(taken_us, timer_us), 400):
+        clock.feed(some)
+    assert clock.lost + clock.resyncs <= 1
+    assert not clock.too_many_lost

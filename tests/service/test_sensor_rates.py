@@ -141,3 +141,30 @@ def test_status_says_which_rate_was_seen_and_what_to_do(
     status = car.drive(25)
     assert status.accelerometer.state == "ok"
     assert advice(status) == ["Nothing: all is well."]
+
+
+@pytest.mark.parametrize(("burst", "says", "state"), [(30, "nothing has to be done", "ok"),
+                                                      (100, "send each as it is taken", "doubtful")])
+def test_status_says_that_samples_come_in_bursts(tmp_path: Path, burst: int, says: str, state: str) -> None:
+    """A bridge that keeps a burst of lines and sends them together."""
+    car = Car(tmp_path, serial=True)
+    car.speed_mps = SPEED_MPS
+    sent = 0
+
+    def sample(second: float) -> bytes:
+        nonlocal sent
+        lines = b""
+        while sent + burst < second * 100:
+            lines += b"".join(b"0.01,0.02,%.3f\r\n" % (1 + 0.1 * car.rng.random()) for _ in range(burst))
+            sent += burst
+        return lines
+
+    car.sample = sample
+    status = car.drive(40)
+    told = " ".join(advice(status))
+    assert f"{burst / 100:.1g} s at a time" in told
+    assert says in told
+    assert status.accelerometer.state == state
+    row = status.last_window
+    assert row is not None
+    assert row.iri_m_per_km is None if state == "doubtful" else "gap" not in row.flags
