@@ -9,27 +9,37 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+CLASS_COLOURS = ("#2f6db5", "#58a9d4", "#f2c744", "#ef8d32", "#d0402b", "#9e1b5e", "#651a70", "#35104a")
+"""Of classes from best to worst: from blue over yellow and red to purple, told apart with any common colour vision."""
+NO_CLASS_COLOUR = "#9aa4ad"
+SERIES = (0, 4, 1, 5, 3, 6, 2, 7)
+"""Numbers of these colours for the lines of a chart: neighbours differ most, yellow comes late on white."""
+
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Points (n,) of a chart, joined unless they are ``dots``; ``errors`` (n,): standard errors, drawn as a band."""
+    """Points (n,) of a chart, joined unless they are ``dots``; ``errors`` (n,): standard errors, drawn as a band;
+    ``faint``: a limit or a scale behind the others, with its name at its end."""
 
     name: str
     x: Array
     y: Array
     errors: Array | None = None
     dots: bool = False
+    faint: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """A chart of lines; ``level``: a value that has a name, drawn across."""
+    """A chart of lines; ``level``: a value that has a name, drawn across; on logarithmic axes values are above 0."""
 
     title: str
     x_name: str
     y_name: str
     lines: tuple[Line, ...]
     level: tuple[float, str] | None = None
+    log_x: bool = False
+    log_y: bool = False
 
 
 @dataclass(frozen=True, eq=False)

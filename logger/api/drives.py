@@ -322,8 +322,6 @@ def estimate(
     True
     """
     from logger.estimation.sensor_noise import Sensor
-    from logger.report.estimate_text import as_json, lines
-    from logger.report.record_checks_text import checks_json, checks_lines
 
     model = model_of(vehicle)
     learns = noise_mps2 == "auto"
@@ -334,7 +332,15 @@ def estimate(
     WINDOW.check("window_m", window_m)
     drive, checked = checked_run(run, Asked(unit, resample_hz))
     found = assessed(drive, model, Sensor(given_mps2, step_of(drive, step_mps2)), window_m, learns)
-    summary = as_json(str(drive.path), found) | checks_json(checked)
+    return estimate_by(found, checked, str(drive.path))
+
+
+def estimate_by(found: Assessment, checked: EvenRecord, name: str, files: Sequence[str] = ()) -> Estimate:
+    """What was found of a drive of this name, to be shown; ``files``: of its profile, where they were written."""
+    from logger.report.estimate_text import as_json, lines
+    from logger.report.record_checks_text import checks_json, checks_lines
+
+    summary = as_json(name, found, list(files)) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
     text = "\n".join([*checks_lines(checked), *lines(found, summary)])

@@ -173,17 +173,22 @@ def modes(
     >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
     ([1.5], [0.02])
     """
+    question = Question(method, columns, input_column, order, response, from_s, to_s, segments)
+    return modes_by(question, found_modes(record, question),
+                    "record" if isinstance(record, Channels) else Path(record).name)
+
+
+def modes_by(question: Question, found: Found, name: str) -> Modes:
+    """What was found of a record of this name, to be shown."""
     from logger.modal.mode import pole_rows
     from logger.report.modal_text import as_json, lines
 
-    found = found_modes(record, Question(method, columns, input_column, order, response, from_s, to_s, segments))
     result, kept, many = found.result, found.record, found.result.modes
-    name = "record" if isinstance(record, Channels) else Path(record).name
     frequency_hz, frequency_std_hz, damping_ratio, damping_std = (
         np.array([getattr(one, column) for one in many], dtype=np.float64)
         for column in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"))
     return Modes(
-        "\n".join(lines(result, kept, name)), as_json(result, kept, method), kept.names, frequency_hz,
+        "\n".join(lines(result, kept, name)), as_json(result, kept, question.method), kept.names, frequency_hz,
         frequency_std_hz, damping_ratio, damping_std,
         np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+_SPECTRUM_S = 5.12
+"""A resolution of 0.2 Hz: a body's bounce, at 1 to 2 Hz and damped by a fifth and more, is wider."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Record(record_file.AccelerationRecord, Shown):
@@ -70,6 +73,7 @@ class Comfort(CommandResult):
     crest_factor    largest value over a_w
     comfort         in a word; None for motion sickness
     doubts          what may be wrong with the record, a line each
+    weighted_mps2   (n,) the weighted vertical acceleration, ``rate_hz`` samples a second
     """
 
     weighting: str
@@ -78,7 +82,28 @@ class Comfort(CommandResult):
     vdv_mps175: float
     crest_factor: float
     comfort: str | None
+    weighted_mps2: Array
+    rate_hz: float
     doubts: tuple[str, ...] = ()
+
+    def charts(self) -> Sequence[Chart]:
+        """The running r.m.s. over 1 s, beside a_w, and the spectrum of the weighted acceleration."""
+        from scipy.signal import welch
+
+        from logger.chart_data import Curves, Line
+        from logger.comfort.iso2631 import RunningRms
+
+        time_s = np.arange(len(self.weighted_mps2)) / self.rate_hz
+        running = RunningRms(self.rate_hz).process(self.weighted_mps2)
+        frequency_hz, psd = welch(self.weighted_mps2, self.rate_hz,
+                                  nperseg=min(len(self.weighted_mps2), round(_SPECTRUM_S * self.rate_hz)))
+        shown = slice(1, None)  # a mean is no vibration
+        return [
+            Curves("Running r.m.s. over 1 s", "time [s]", "weighted acceleration [m/s2]",
+                   (line("running r.m.s.", time_s, running),), (self.a_w_mps2, "a_w")),
+            Curves("Spectrum of the weighted acceleration", "frequency [Hz]", "PSD [(m/s2)2/Hz]",
+                   (Line("weighted", frequency_hz[shown], np.maximum(psd[shown], np.finfo(float).tiny)),),
+                   log_x=True)]
 
 
 def comfort(
@@ -124,7 +149,8 @@ def comfort(
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
     return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, weighting,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
-                   summary["comfort"], tuple(doubt.words for doubt in ride.doubts))
+                   summary["comfort"], used.weigh(ride.accel_mps2[record_file.VERTICAL], ride.rate_hz), ride.rate_hz,
+                   tuple(doubt.words for doubt in ride.doubts))
 
 
 def _even(record: Record | Run | Path | str, name: str, asked: Asked) -> EvenRecord:

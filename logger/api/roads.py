@@ -17,6 +17,7 @@ from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
+    from logger.roads.elevation_spectrum import Bands
 
 Array = npt.NDArray[np.float64]
 
@@ -144,6 +145,7 @@ class Iri(CommandResult):
                           None where there is one track
     edges_m               (w + 1,) ends of the windows [m]; the last one may be shorter
     windows_m_per_km      (w,) IRI of each, of two tracks their mean
+    profile               the road
     """
 
     iri_m_per_km: float
@@ -152,20 +154,29 @@ class Iri(CommandResult):
     hri_m_per_km: float | None
     edges_m: Array
     windows_m_per_km: Array
+    profile: Profile
 
     def charts(self) -> Sequence[Chart]:
-        """The IRI along the way."""
+        """The IRI of the windows along the way, the continuous one over 25 ft (AASHTO R 54), and the profile."""
         from logger.chart_data import Curves, Line
+        from logger.roads.profile_iri import continuous_iri
+        from logger.units import WINDOW_M
 
-        return [Curves("Roughness", "distance [m]", "IRI [m/km]", (
-            Line("IRI", np.repeat(self.edges_m, 2)[1:-1], np.repeat(self.windows_m_per_km, 2)),))]
+        road = self.profile
+        distance_m, continuous = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
+        return [
+            Curves("Roughness", "distance [m]", "IRI [m/km]", (
+                line("25 ft, continuous", road.start_m + distance_m, continuous),
+                Line("windows", np.repeat(self.edges_m, 2)[1:-1], np.repeat(self.windows_m_per_km, 2)))),
+            *road.charts()]
 
 
-def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
+def iri(profile: Profile | Path | str, window_m: float = 100.0, resample_m: float | None = None) -> Iri:
     """The International Roughness Index of a profile, exactly as defined (ASTM E1926; Sayers, TRR 1501, 1995).
 
-    profile     11 m or longer, samples 0.3 m apart or less; or its file
-    window_m    length of a window [m]
+    profile       11 m or longer, samples 0.3 m apart or less; or its file
+    window_m      length of a window [m]
+    resample_m    of a file, as ``read_profile`` [m]
 
     Raises BadInput for a profile or a window of which there is no IRI, and as ``read_profile``.
 
@@ -176,7 +187,7 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
     from logger.report.iri_text import as_json, lines
     from logger.roads.profile_iri import profile_iri
 
-    name, road = _named(profile)
+    name, road = _named(profile, resample_m)
     try:
         found = profile_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, window_m)
     except ValueError as error:
@@ -186,7 +197,7 @@ def iri(profile: Profile | Path | str, window_m: float = 100.0) -> Iri:
     whole = found.row(0)
     return Iri("\n".join(lines(found, road, Path(name).name)), as_json(found, road), whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
-               road.start_m + np.array(ends_m), shown[1:])
+               road.start_m + np.array(ends_m), shown[1:], road)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -197,6 +208,7 @@ class RoadClass(CommandResult):
     gd_n0_cm3        degree of roughness Gd(n0) [cm3], and ``gd_n0_std_cm3`` its standard error
     waviness         w, and ``waviness_std`` its standard error
     iri_m_per_km     exact
+    spectrum         smoothed in bands (ISO 8608, annex C)
     """
 
     road_class: str
@@ -205,10 +217,29 @@ class RoadClass(CommandResult):
     waviness: float
     waviness_std: float
     iri_m_per_km: float
+    spectrum: Bands
+
+    def charts(self) -> Sequence[Chart]:
+        """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""
+        from logger.chart_data import Curves, Line
+        from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd
+
+        found = self.spectrum
+        lines = [Line("measured", found.centre_cpm, found.psd_m3),
+                 Line("line through it", found.centre_cpm,
+                      displacement_psd(found.centre_cpm, self.gd_n0_cm3, self.waviness))]
+        ends = found.centre_cpm[[0, -1]]
+        lines += [Line(f"{smoother} | {rougher}", ends, displacement_psd(ends, mean_cm3 / 2), faint=True)
+                  for smoother, (rougher, mean_cm3) in zip(CLASS_GD_N0_CM3, list(CLASS_GD_N0_CM3.items())[1:],
+                                                           strict=False)]
+        return [Curves("Spectrum of the road", "wave number [cycles/m]", "displacement PSD [m3]", tuple(lines),
+                       log_x=True, log_y=True)]
 
 
-def classify(profile: Profile | Path | str) -> RoadClass:
+def classify(profile: Profile | Path | str, resample_m: float | None = None) -> RoadClass:
     """The class, degree of roughness and waviness of a profile of 100 m or more (ISO 8608).
+
+    resample_m    of a file, as ``read_profile`` [m]
 
     Raises BadInput for one that is too short or too odd, and as ``read_profile``.
 
@@ -217,9 +248,10 @@ def classify(profile: Profile | Path | str) -> RoadClass:
     ('C', True)
     """
     from logger.report.road_text import as_json, lines
+    from logger.roads.elevation_spectrum import band_edges, smooth, spectrum
     from logger.roads.track_class import track_class
 
-    name, road = _named(profile)
+    name, road = _named(profile, resample_m)
     tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
     try:
         found = [track_class(one, road.spacing_m, road.widest_step_m) for one in tracks]
@@ -227,9 +259,11 @@ def classify(profile: Profile | Path | str) -> RoadClass:
         raise BadInput(f"{name}: {error}") from None
     left = found[0].roughness
     return RoadClass("\n".join(lines(found, road, Path(name).name)), as_json(found), left.road_class, left.gd_n0_cm3,
-                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km)
+                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km,
+                     smooth(
+                         spectrum(road.elevation_m, road.spacing_m), band_edges(left.lowest_cpm, left.highest_cpm)))
 
 
-def _named(profile: Profile | Path | str) -> tuple[str, Profile]:
+def _named(profile: Profile | Path | str, resample_m: float | None) -> tuple[str, Profile]:
     """A profile and what to call it."""
-    return ("profile", profile) if isinstance(profile, Profile) else (str(profile), read_profile(profile))
+    return ("profile", profile) if isinstance(profile, Profile) else (str(profile), read_profile(profile, resample_m))

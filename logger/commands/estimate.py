@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, WINDOW
 from logger.commands.numbers import add_number
+from logger.commands.pictures import HELP, check_picture, parted, write_picture
 from logger.commands.record_options import add_record_options, tell_doubts
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
@@ -49,7 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--step", *ADDED, metavar="MPS2",
                help="step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)")
     add_number(parser, "--window", *WINDOW, metavar="M", help="length of a window [m] (default: 7.62, 25 ft)")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the windows as CSV")
+    parser.add_argument("--out", type=Path, action="append", metavar="FILE",
+                        help=f"write the windows as CSV; FILE.html: {HELP}; may be given for each")
     parser.add_argument("--profile-out", type=Path, metavar="FILE", help="write the estimated profile as CSV")
     add_record_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
@@ -69,10 +71,9 @@ _noise.__name__ = "auto or float"  # argparse names it when a text is neither
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog estimate``."""
-    from logger.api.drives import assessed, checked_run, step_of
+    from logger.api.drives import assessed, checked_run, estimate_by, step_of
     from logger.estimation.sensor_noise import Sensor
-    from logger.report.estimate_text import as_json, lines, window_lines
-    from logger.report.record_checks_text import checks_json, checks_lines
+    from logger.report.estimate_text import window_lines
     from logger.shipped import vehicle_path
     from logger.store.formats.record_checks import Asked
     from logger.store.formats.vehicle_file import read_model
@@ -81,7 +82,8 @@ def run(args: argparse.Namespace) -> int:
     window_m = WINDOW_M if args.window is None else args.window
     vehicle_yaml = vehicle_path(args.vehicle)
     model = read_model(vehicle_yaml)
-    _check_files(args, vehicle_yaml)
+    picture, args.out = parted(args.out)
+    _check_files(args, vehicle_yaml, picture)
     drive, checked = checked_run(args.run, Asked(args.unit, args.resample))
     learns = args.noise is None
     sensor = Sensor(NOISE_MPS2 if learns else args.noise, step_of(drive, args.step))
@@ -89,9 +91,9 @@ def run(args: argparse.Namespace) -> int:
     files = [] if args.profile_out is None else _write_road(args.profile_out, found)
     if args.out is not None:
         write_text(args.out, "".join(window_lines(found)), "ascii")
-    summary = as_json(str(args.run), found, list(map(str, files))) | checks_json(checked)
-    print(json.dumps(summary, allow_nan=False) if args.json else
-          "\n".join([*checks_lines(checked), *lines(found, summary)]))
+    shown = estimate_by(found, checked, str(args.run), list(map(str, files)))
+    write_picture(picture, "Roughness from acceleration", str(args.run), shown.text, shown.charts)
+    print(json.dumps(shown.as_json(), allow_nan=False) if args.json else shown.text)
     tell_doubts(args.run, (doubt.words for doubt in checked.doubts))
     if args.profile_out is not None and not files:
         print(f"No profile in {args.profile_out}: the readings tell no wavelengths over a stretch longer than the "
@@ -99,12 +101,14 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _check_files(args: argparse.Namespace, vehicle_yaml: Path) -> None:
+def _check_files(args: argparse.Namespace, vehicle_yaml: Path, picture: Path | None) -> None:
     """Raise BadInput where a file to write is one that is read, or another one to write."""
     from logger.store.formats.drive_file import DRIVE, PROFILE
 
-    taken = {path.resolve() for path in (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)}
-    for option, path in (("--out", args.out), ("--profile-out", args.profile_out)):
+    read = (vehicle_yaml, args.run, args.run / DRIVE, args.run / PROFILE)
+    check_picture(picture, read)
+    taken = {path.resolve() for path in read}
+    for option, path in (("--out", picture), ("--out", args.out), ("--profile-out", args.profile_out)):
         if path is not None:
             if path.resolve() in taken:
                 raise BadInput(f"{option} {path}: expected every file to be another one")

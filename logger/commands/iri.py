@@ -10,6 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
+from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
 
 WINDOW_M = 100.0
@@ -25,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resample", type=float, metavar="M",
                         help="for an unevenly spaced profile: lay straight lines between its samples and take a "
                              "sample every M metres; this changes the IRI, and the result says that it was done")
+    add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
@@ -36,21 +38,14 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DONE
     if args.profile is None:
         raise BadInput("expected a PROFILE, or --response")
-    from logger.report.iri_text import as_json, lines
-    from logger.roads.profile_iri import profile_iri
-    from logger.store.formats.profile_file import read_profile
+    from logger.api.roads import iri
 
     if not args.window > 0:
         raise BadInput(f"--window {args.window:g}: expected a length above 0 m")
-    profile = read_profile(args.profile, args.resample)
-    try:
-        result = profile_iri(profile.elevation_m, profile.elevation_right_m, profile.spacing_m, args.window)
-    except ValueError as error:
-        raise BadInput(f"{args.profile}: {error}") from None
-    if args.json:
-        print(json.dumps(as_json(result, profile), allow_nan=False))
-    else:
-        print("\n".join(lines(result, profile, args.profile.name)))
+    check_picture(args.out, [args.profile])
+    found = iri(args.profile, args.window, args.resample)
+    write_picture(args.out, "International Roughness Index", args.profile.name, found.text, found.charts)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE
 
 

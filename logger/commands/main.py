@@ -26,6 +26,7 @@ VERBS = {
     "install": "set up the service on this machine; --dry-run shows every step",
     "uninstall": "undo install; logs and changed settings stay",
     "report": "make one web page of logs: map, plots, table",
+    "convert": "logs as GeoJSON, GeoPackage, GPX, KML, Parquet or CSV, for other programs",
     "iri": "exact IRI of a measured profile",
     "comfort": "ISO 2631 comfort and health values of an acceleration record",
     "extract": "runs for the lab out of recorded dumps, or of a phone's CSV, laid on a measured line",

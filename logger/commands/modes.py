@@ -29,11 +29,12 @@ from logger.api.ranges import (
     SPEED,
 )
 from logger.commands.numbers import add_number
+from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.modal.mode import ModalResult
+    from logger.api.modal import Array
 
 EXAMPLES = ("five-storey",)
 
@@ -64,13 +65,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="write the poles of all orders, for a stabilisation diagram")
     parser.add_argument("--example", choices=EXAMPLES, metavar="NAME",
                         help="five-storey: the model building of the reference dissertation, instead of FILE")
+    add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog modes``."""
-    from logger.api.modal import USUAL_METHOD, Question, found_modes
-    from logger.report.modal_text import as_json, lines
+    from logger.api.modal import USUAL_METHOD, Question, found_modes, modes_by
 
     if args.vehicle is not None:
         return _of_vehicle(args)
@@ -87,14 +88,14 @@ def run(args: argparse.Namespace) -> int:
     if args.diagram is not None and method in (SPECTRUM, DECREMENT):
         raise BadInput(f"--diagram: expected a method with poles, not --method {method}")
     columns = None if args.columns is None else [name.strip() for name in args.columns.split(",")]
-    found = found_modes(args.file, Question(method, columns, args.input, args.order, args.response, args.from_s,
-                                            args.to_s, args.segments, _option))
+    question = Question(method, columns, args.input, args.order, args.response, args.from_s, args.to_s, args.segments,
+                        _option)
+    check_picture(args.out, [args.file] + ([] if args.diagram is None else [args.diagram]))
+    found = modes_by(question, found_modes(args.file, question), args.file.name)
     if args.diagram is not None:
-        write_text(args.diagram, _diagram_csv(found.result), "ascii")
-    if args.json:
-        print(json.dumps(as_json(found.result, found.record, method), allow_nan=False))
-    else:
-        print("\n".join(lines(found.result, found.record, args.file.name)))
+        write_text(args.diagram, _diagram_csv(found.poles), "ascii")
+    write_picture(args.out, "Modes", args.file.name, found.text, found.charts)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
     return EXIT_DONE
 
 
@@ -127,16 +128,14 @@ def _check_alone(args: argparse.Namespace, said: str) -> None:
         raise BadInput(f"{said}: expected no FILE beside it, found {args.file}")
     given = {"--method": args.method, "--columns": args.columns, "--input": args.input, "--order": args.order,
              "--response": args.response, "--from": args.from_s, "--to": args.to_s, "--segments": args.segments,
-             "--diagram": args.diagram}
+             "--diagram": args.diagram, "--out": args.out}
     if options := [option for option, value in given.items() if value is not None]:
         raise BadInput(f"{options[0]}: expected a FILE with it, not {said}")
 
 
-def _diagram_csv(result: ModalResult) -> str:
-    from logger.modal.mode import pole_rows
-
+def _diagram_csv(poles: Array) -> str:
     rows = [f"{order:.0f},{frequency_hz:.7g},{damping_ratio:.5g}\n"
-            for order, frequency_hz, damping_ratio in pole_rows(result).tolist()]
+            for order, frequency_hz, damping_ratio in poles.tolist()]
     return "order,frequency_hz,damping_ratio\n" + "".join(rows)
 
 

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
 from logger.commands.numbers import add_number
+from logger.commands.pictures import add_out, check_picture, write_picture
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
 if TYPE_CHECKING:
-    from logger.roads.elevation_spectrum import Array, Roughness
-    from logger.store.formats.profile_file import Profile
+    from logger.roads.elevation_spectrum import Array, Bands
 
 _LINES_AT_ONCE = 100_000
 
@@ -53,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                       help="for an unevenly spaced profile: lay straight lines between its samples and take a sample "
                            "every M metres; what was between wide samples stays unknown")
     tell.add_argument("--psd", type=Path, metavar="FILE", help="write the smoothed spectrum of the (left) track as CSV")
+    add_out(tell)
     tell.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -115,33 +116,24 @@ def _made_in_words(made: dict[str, Any], out: Path | None) -> str:
 
 
 def _classify(args: argparse.Namespace) -> int:
-    from logger.report.road_text import as_json, lines
-    from logger.roads.track_class import track_class
-    from logger.store.formats.profile_file import read_profile
+    from logger.api.roads import classify
 
     if args.psd is not None and args.psd.exists() and args.psd.samefile(args.profile):
         raise BadInput(f"--psd {args.psd}: expected another file than the profile")
-    profile = read_profile(args.profile, args.resample)
-    tracks = [profile.elevation_m] + ([profile.elevation_right_m] if profile.elevation_right_m is not None else [])
-    try:
-        told = [track_class(track, profile.spacing_m, profile.widest_step_m) for track in tracks]
-    except ValueError as error:
-        raise BadInput(f"{args.profile}: {error}") from None
+    check_picture(args.out, [args.profile] + ([] if args.psd is None else [args.psd]))
+    found = classify(args.profile, args.resample)
     if args.psd is not None:
-        write_text(args.psd, _psd_csv(profile, told[0].roughness), "ascii")
-    if args.json:
-        print(json.dumps(as_json(told)))
-    else:
-        print("\n".join(lines(told, profile, args.profile.name)))
+        write_text(args.psd, _psd_csv(found.spectrum), "ascii")
+    write_picture(args.out, "Class of the road", args.profile.name, found.text, found.charts)
+    print(json.dumps(found.as_json()) if args.json else found.text)
     return EXIT_DONE
 
 
-def _psd_csv(profile: Profile, found: Roughness) -> str:
-    from logger.roads.elevation_spectrum import acceleration_psd, band_edges, smooth, spectrum
+def _psd_csv(found: Bands) -> str:
+    from logger.roads.elevation_spectrum import acceleration_psd
 
-    bands = smooth(spectrum(profile.elevation_m, profile.spacing_m), band_edges(found.lowest_cpm, found.highest_cpm))
-    columns = (bands.edges_cpm[:-1], bands.edges_cpm[1:], bands.psd_m3,
-               acceleration_psd(bands.centre_cpm, bands.psd_m3), bands.freedom)
+    columns = (found.edges_cpm[:-1], found.edges_cpm[1:], found.psd_m3,
+               acceleration_psd(found.centre_cpm, found.psd_m3), found.freedom)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     header = "lowest_cpm,highest_cpm,displacement_psd_m3,acceleration_psd_per_m,degrees_of_freedom\n"
     return header + "".join(",".join(f"{value:.7g}" for value in row) + "\n" for row in rows)

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 from logger.api.outputs import check_out
 from logger.api.ranges import ADDED, RATE, SPEED
 from logger.commands.numbers import add_number, named_numbers
+from logger.commands.pictures import HELP, check_picture, parted, write_picture
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -67,8 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "name")
     parser.add_argument("--list-effects", action="store_true",
                         help="print the effects there are, with their parameters, and do nothing else")
-    parser.add_argument("--out", type=Path, metavar="FILE",
-                        help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run")
+    parser.add_argument("--out", type=Path, action="append", metavar="FILE",
+                        help="drive to write; DIR/drive.csv beside DIR/profile.csv makes a run. FILE.html: "
+                             f"{HELP}; may be given for each")
     parser.add_argument("--profile-out", type=Path, metavar="FILE",
                         help="write the road that was driven as well, with its obstacles")
     add_number(parser, "--rate", *RATE, default=100.0, metavar="HZ",
@@ -98,14 +100,17 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(args: argparse.Namespace) -> None:
     import numpy as np
 
+    from logger.api.drives import Run
     from logger.api.vehicles import car_on
     from logger.profiles.track import Track
     from logger.simulation.virtual_drive import SensorErrors, recorded_drive
-    from logger.store.formats.drive_file import COLUMNS, write_drive, write_profile
+    from logger.store.formats.drive_file import COLUMNS, TIME, write_drive, write_profile
 
+    picture, args.out = parted(args.out)
     _check_given(args)
-    _check_files(args)
+    _check_files(args, picture)
     check_out(args.out, ())
+    check_picture(picture, ())
     if args.profile_out is not None:
         check_out(args.profile_out, (), option="--profile-out")
     vehicle, effects, said = _model(args.vehicle, args.effect)
@@ -136,7 +141,10 @@ def _simulate(args: argparse.Namespace) -> None:
         "more_columns": list(columns)[len(COLUMNS):],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
-    print(json.dumps(made) if args.json else _in_words(made))
+    words = _in_words(made)
+    drive = Run(args.out, args.rate, columns[TIME], accel, speed_mps, distance_m, None, None)
+    write_picture(picture, "Simulated drive", str(args.out), words, drive.charts)
+    print(json.dumps(made) if args.json else words)
 
 
 def _in_words(made: dict[str, Any]) -> str:
@@ -170,11 +178,11 @@ def _check_given(args: argparse.Namespace) -> None:
         raise BadInput(f"simulate: expected {', '.join(missing)} as well (try 'ridelog simulate --help')")
 
 
-def _check_files(args: argparse.Namespace) -> None:
+def _check_files(args: argparse.Namespace, picture: Path | None) -> None:
     from logger.shipped import vehicle_path
 
     read = (vehicle_path(args.vehicle), args.profile, args.excitation, args.speed_file)
-    files = [path.resolve() for path in (args.out, args.profile_out, *read) if path is not None]
+    files = [path.resolve() for path in (args.out, picture, args.profile_out, *read) if path is not None]
     if len(set(files)) < len(files):
         raise BadInput(f"--out {args.out}: expected every file to be another one")
 

@@ -12,6 +12,7 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 """
 
 from logger.api.calibration import Calibration, Slopes, calibrate
+from logger.api.conversion import Conversion, convert
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
 from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
@@ -33,6 +34,7 @@ __all__ = [
     "Channels",
     "Comfort",
     "Comparison",
+    "Conversion",
     "Diagnosis",
     "Dump",
     "EffectInfo",
@@ -58,6 +60,7 @@ __all__ = [
     "classify",
     "comfort",
     "compare",
+    "convert",
     "diagnose",
     "diagnose_same_road",
     "effects",

@@ -14,11 +14,10 @@ from textwrap import wrap
 
 import numpy as np
 
-from logger.chart_data import Array, Chart, Curves, Field, Line
+from logger.chart_data import SERIES, Array, Chart, Curves, Field, Line
 from logger.report.html import EMPTY, Html, concatenated, html
 
 WIDTH = 1000
-_COLOURS = 8
 _ABOUT = 6
 _KEY_PX = 20
 _LINE_PX, _LETTER_PX, _MOST_LINES = 15, 7.0, 3
@@ -83,15 +82,30 @@ class _Frame:
         """A name at the right of a value."""
         return _words(self.box.right_px + 6, self.y(value) + 4, name)
 
-    def rows(self, about: int) -> Html:
-        """Faint lines across, with their values at the left."""
-        return concatenated(self.across("grid", tick) + _words(self.box.left - 8, self.y(tick) + 4, f"{tick:g}", "end")
-                      for tick in nice_ticks(self.y_low, self.y_high, about))
+    def rows(self, about: int, powers: bool = False) -> Html:
+        """Faint lines across, with their values at the left; ``powers``: values are those of ten."""
+        ticks = _powers(self.y_low, self.y_high, about) if powers else nice_ticks(self.y_low, self.y_high, about)
+        return concatenated(self.across("grid", tick)
+                            + _words(self.box.left - 8, self.y(tick) + 4, _number(tick, powers), "end")
+                            for tick in ticks)
 
-    def columns(self, about: int, unit: float = 1.0) -> Html:
+    def columns(self, about: int, unit: float = 1.0, powers: bool = False) -> Html:
         """Values below, so many ``unit`` being 1."""
-        return concatenated(_words(self.x(tick * unit), self.box.bottom_px + 18, f"{tick:g}", "middle")
-                      for tick in nice_ticks(self.x_low / unit, self.x_high / unit, about))
+        low, high = self.x_low / unit, self.x_high / unit
+        return concatenated(_words(self.x(tick * unit), self.box.bottom_px + 18, _number(tick, powers), "middle")
+                            for tick in (_powers if powers else nice_ticks)(low, high, about))
+
+
+def _number(tick: float, is_power: bool) -> str:
+    return f"{10.0**tick:g}" if is_power else f"{tick:g}"
+
+
+def _powers(low: float, high: float, about: int) -> list[float]:
+    """Logarithms from ``low`` to ``high`` of powers of ten: all, every second ...; of few also 2 and 5 times it."""
+    step = ceil((high - low) / (2 * about))
+    parts = (0.0, log10(2), log10(5)) if high - low < about / 2 else (0.0,)
+    return [power + part for power in range(floor(low), floor(high) + 1) for part in parts
+            if power % step == 0 and low <= power + part <= high]
 
 
 def _words(x: float, y: float, text: str, anchor: str = "start") -> Html:
@@ -127,25 +141,57 @@ def chart(one: Chart) -> Html:
 
 
 def _curves(one: Curves) -> list[Html]:
-    ys = [line.y for line in one.lines]
-    ys += [line.y + sign * line.errors for line in one.lines if line.errors is not None for sign in (-1, 1)]
-    ys += [np.array([one.level[0]])] if one.level else []
-    frame = _Frame(_CHART, *_ends(np.concatenate([line.x for line in one.lines])), *_ends(np.concatenate(ys)))
-    parts = _axes(frame, one.x_name, one.y_name)
-    if one.level:
-        parts += [frame.across("level", one.level[0]), frame.beside(*one.level)]
-    for number, line in enumerate(one.lines):
-        parts += _line(frame, line, number % _COLOURS)
-    return parts + _key([line.name for line in one.lines], below_px=frame.y(one.level[0]) if one.level else None)
+    shapes = [_Shape.of(line, one.log_x, one.log_y) for line in one.lines]
+    level = None if one.level is None else (log10(one.level[0]) if one.log_y else one.level[0])
+    ys = [edge for shape in shapes for edge in (shape.y, shape.low, shape.high)]
+    ys += [] if level is None else [np.array([level])]
+    frame = _Frame(_CHART, *_ends(np.concatenate([shape.x for shape in shapes])), *_ends(np.concatenate(ys)))
+    parts = _axes(frame, one.x_name, one.y_name, one.log_x, one.log_y)
+    if one.level is not None and level is not None:
+        parts += [frame.across("level", level), frame.beside(level, one.level[1])]
+    pairs = list(zip(one.lines, shapes, strict=True))
+    parts += [drawn for line, shape in pairs if line.faint for drawn in _faint(frame, line, shape)]
+    series = [pair for pair in pairs if not pair[0].faint]
+    for number, (line, shape) in enumerate(series):
+        parts += _line(frame, line, shape, SERIES[number % len(SERIES)])
+    below_px = None if level is None else frame.y(level)
+    if any(line.faint for line, _ in pairs):
+        return parts + _key_inside([line.name for line, _ in series])
+    return parts + _key([line.name for line, _ in series], below_px)
 
 
-def _line(frame: _Frame, line: Line, colour: int) -> list[Html]:
+def _faint(frame: _Frame, line: Line, shape: _Shape) -> list[Html]:
+    points = frame.points(zip(shape.x, shape.y, strict=True))
+    return [html('<path class="level" d="M{}"/>', " ".join(points)),
+            _words(frame.x(float(shape.x[-1])) + 6, frame.y(float(shape.y[-1])) + 4, line.name)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """A line as it lies on its axes (n,): values or their powers of ten, and the edges of its band."""
+
+    x: Array
+    y: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, line: Line, log_x: bool, log_y: bool) -> _Shape:
+        """On these axes. A band that reaches below 0 ends, on a logarithmic axis, a thousandth above it."""
+        errors = np.zeros(1) if line.errors is None else line.errors
+        low, high = line.y - errors, line.y + errors
+        if log_y:
+            low = np.maximum(low, 1e-3 * line.y)
+        scaled = (np.log10 if log else np.asarray for log in (log_x, log_y, log_y, log_y))
+        return cls(*(scale(one) for scale, one in zip(scaled, (line.x, line.y, low, high), strict=True)))
+
+
+def _line(frame: _Frame, line: Line, shape: _Shape, colour: int) -> list[Html]:
     parts = []
     if line.errors is not None:
-        edges = [*zip(line.x, line.y + line.errors, strict=True),
-                 *reversed(list(zip(line.x, line.y - line.errors, strict=True)))]
+        edges = [*zip(shape.x, shape.high, strict=True), *reversed(list(zip(shape.x, shape.low, strict=True)))]
         parts.append(html('<path class="spread" d="M{}z"/>', " ".join(frame.points(edges))))
-    points = list(zip(line.x, line.y, strict=True))
+    points = list(zip(shape.x, shape.y, strict=True))
     if line.dots:
         return parts + [_dot(frame.x(x), frame.y(y), 4, colour) for x, y in points]
     return [*parts, html('<path class="thick s{}" d="M{}"/>', colour, " ".join(frame.points(points)))]
@@ -159,8 +205,16 @@ def _key(names: list[str], below_px: float | None) -> list[Html]:
     """What the lines are, at the right; out of the way of a level's name."""
     at_the_top = below_px is None or below_px >= _CHART.height / 2
     top = _CHART.top + 10 if at_the_top else _CHART.bottom_px - _KEY_PX * len(names)
-    x = _CHART.right_px + 6
-    return [html('<path class="thick s{}" d="M{} {}h14"/>', number % _COLOURS, x, top + _KEY_PX * number)
+    return _keys(names, _CHART.right_px + 6, top)
+
+
+def _key_inside(names: list[str]) -> list[Html]:
+    """The same in the lower left corner, where faint lines have their names at the right."""
+    return _keys(names, _CHART.left + 14, _CHART.bottom_px - _KEY_PX * len(names))
+
+
+def _keys(names: list[str], x: int, top: int) -> list[Html]:
+    return [html('<path class="thick s{}" d="M{} {}h14"/>', SERIES[number % len(SERIES)], x, top + _KEY_PX * number)
             + _words(x + 20, top + _KEY_PX * number + 4, name) for number, name in enumerate(names)]
 
 
@@ -200,10 +254,10 @@ def _ends(values: Array) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _axes(frame: _Frame, x_name: str, y_name: str) -> list[Html]:
+def _axes(frame: _Frame, x_name: str, y_name: str, log_x: bool = False, log_y: bool = False) -> list[Html]:
     box = frame.box
-    return [frame.rows(_ABOUT), frame.columns(_ABOUT), _words(box.right_px, box.height - 6, x_name, "end"),
-            _words(box.left, box.top - 6, y_name)]
+    return [frame.rows(_ABOUT, log_y), frame.columns(_ABOUT, powers=log_x),
+            _words(box.right_px, box.height - 6, x_name, "end"), _words(box.left, box.top - 6, y_name)]
 
 
 # --- falling steps ---

@@ -39,6 +39,18 @@ def profile_iri(elevation_m: Array, elevation_right_m: Array | None, spacing_m: 
     return ProfileIri(tuple(windows), columns)
 
 
+def continuous_iri(elevation_m: Array, elevation_right_m: Array | None, spacing_m: float, base_m: float
+                   ) -> tuple[Array, Array]:
+    """The moving IRI over a base length, of two tracks their mean (AASHTO R 54: 25 ft): middles of the bases (k,) from
+    the first sample on [m], and values (k,) [m/km]. A profile that is shorter has one base, all of it."""
+    slopes = [rectified_slope(track, spacing_m) for track in (elevation_m, elevation_right_m) if track is not None]
+    slope: Array = np.asarray(np.mean(slopes, axis=0))
+    length = min(max(round(base_m / spacing_m), 1), len(slope))
+    sums = np.concatenate([[0.0], np.cumsum(slope)])
+    values: Array = PER_KM * (sums[length:] - sums[:-length]) / length
+    return np.asarray(spacing_m * (np.arange(len(values)) + length / 2)), values
+
+
 def _track(elevation_m: Array, spacing_m: float, window_m: float) -> tuple[Array, list[IriWindow]]:
     cutter = IriWindows(spacing_m, window_m)
     slope = rectified_slope(elevation_m, spacing_m)

@@ -1,0 +1,34 @@
+"""Write logs as a file for other programs, by its ending: .geojson, .gpkg and .kml are maps, .gpx is tracks, .csv and
+.parquet are tables.
+
+Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
+neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
+known is empty.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from logger.errors import EXIT_DONE
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog convert``."""
+    parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
+                        help="folder of segment logs, exported stick, or log file")
+    parser.add_argument("--to", metavar="FILE", type=Path, required=True,
+                        help="file to write; its ending says what: .csv .geojson .gpkg .gpx .kml .parquet")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog convert``."""
+    from logger.api.conversion import convert
+
+    done = convert(args.logs, args.to)
+    print(json.dumps({"file": str(done.path), "format": done.format, "rows": done.rows, "placed": done.placed,
+                      "damaged_lines": done.damaged_lines}) if args.json else done)
+    return EXIT_DONE

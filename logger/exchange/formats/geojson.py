@@ -1,0 +1,45 @@
+"""GeoJSON (RFC 7946): a feature a row, WGS 84, six decimals of a degree (0.1 m), lines cut at the 180th meridian."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from logger.exchange.fields import NAMES, values_of
+from logger.exchange.format import Format
+from logger.exchange.windows import Geometry, Line, Windows
+from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
+
+_DECIMALS = 6
+
+
+class GeoJson(Format):
+    """A map."""
+
+    name = "geojson"
+    title = "a map of all rows, for GIS programs and web maps"
+
+    def write(self, windows: Windows, path: Path) -> None:
+        with path.open("w", encoding="utf-8") as file:
+            file.write('{"type":"FeatureCollection","features":[')
+            for number, window in enumerate(windows.rows):
+                feature = {"type": "Feature", "geometry": _geometry(window.geometry),
+                           "properties": dict(zip(NAMES, values_of(window), strict=True))}
+                file.write((",\n" if number else "\n") + json.dumps(feature, separators=(",", ":"), allow_nan=False))
+            file.write("\n]}\n")
+
+
+def _geometry(geometry: Geometry) -> dict[str, Any] | None:
+    if not geometry:
+        return None
+    kind, lines = type_of(geometry), [_places(line) for line in geometry]
+    return {"type": TYPE_NAMES[kind],
+            "coordinates": lines if kind == LINES else lines[0][0] if kind == POINT else lines[0]}
+
+
+def _places(line: Line) -> list[list[float]]:
+    return [[round(degrees, _DECIMALS) for degrees in place] for place in line]
+
+
+FORMAT = GeoJson()

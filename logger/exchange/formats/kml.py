@@ -1,0 +1,75 @@
+"""KML 2.2 (OGC 07-147r2), for Google Earth: a folder a drive, a line a row in the colour of its class, its values in a
+balloon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
+from logger.exchange.fields import NAMES, values_of
+from logger.exchange.format import Format
+from logger.exchange.windows import Geometry, Line, Window, Windows
+from logger.exchange.wkb import LINES, POINT, TYPE_NAMES, type_of
+from logger.roads.iso8608 import CLASS_GD_N0_CM3
+
+_UNKNOWN = "unknown"
+_WIDTH_PIXELS = 4
+
+
+class Kml(Format):
+    """A map in colours."""
+
+    name = "kml"
+    title = "lines in the colours of their classes, for Google Earth"
+
+    def write(self, windows: Windows, path: Path) -> None:
+        with path.open("w", encoding="utf-8") as file:
+            file.write('<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
+                       "<name>ridelog</name>\n")
+            file.writelines(_styles())
+            for (log, drive), rows in groupby(windows.rows, lambda row: (row.log, row.drive)):
+                file.write(f"<Folder><name>{escape(log)}, drive {drive}</name>\n")
+                file.writelines(_placemark(row) for row in rows if row.geometry)
+                file.write("</Folder>\n")
+            file.write("</Document></kml>\n")
+
+
+def _styles() -> Iterator[str]:
+    colours = dict(zip(CLASS_GD_N0_CM3, CLASS_COLOURS, strict=True)) | {_UNKNOWN: NO_CLASS_COLOUR}
+    for name, colour in colours.items():
+        # KML writes opacity first, then blue, green, red.
+        turned = f"ff{colour[5:7]}{colour[3:5]}{colour[1:3]}"
+        yield (f'<Style id="class-{name}"><LineStyle><color>{turned}</color><width>{_WIDTH_PIXELS}</width></LineStyle>'
+               f"<IconStyle><color>{turned}</color></IconStyle></Style>\n")
+
+
+def _placemark(row: Window) -> str:
+    record = row.record
+    name = "IRI not known" if record.iri_m_per_km is None else f"IRI {record.iri_m_per_km:.2f} m/km"
+    time = "".join(f"<TimeStamp><when>{value}</when></TimeStamp>"
+                   for key, value in zip(NAMES, values_of(row), strict=True) if key == "t_utc" and value)
+    values = "".join(f'<Data name="{key}"><value>{escape(str(value))}</value></Data>'
+                     for key, value in zip(NAMES, values_of(row), strict=True) if value not in (None, ""))
+    return (f"<Placemark><name>{name}</name>{time}<styleUrl>#class-{record.iri_class or _UNKNOWN}</styleUrl>"
+            f"<ExtendedData>{values}</ExtendedData>{_geometry(row.geometry)}</Placemark>\n")
+
+
+def _geometry(geometry: Geometry) -> str:
+    kind = type_of(geometry)
+    if kind == LINES:
+        return f"<MultiGeometry>{''.join(map(_line, geometry))}</MultiGeometry>"
+    return f"<{TYPE_NAMES[kind]}>{_places(geometry[0])}</{TYPE_NAMES[kind]}>" if kind == POINT else _line(geometry[0])
+
+
+def _line(line: Line) -> str:
+    return f"<LineString><tessellate>1</tessellate>{_places(line)}</LineString>"
+
+
+def _places(line: Line) -> str:
+    return f"<coordinates>{' '.join(f'{lon:.7f},{lat:.7f}' for lon, lat in line)}</coordinates>"
+
+
+FORMAT = Kml()
