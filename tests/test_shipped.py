@@ -1,12 +1,15 @@
-"""Words that people give for a vehicle."""
+"""What comes along: words that people give for a vehicle, and the files of the report's page."""
 
 from __future__ import annotations
 
+import tomllib
+from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from logger.errors import BadInput
+from logger.report.page import SCRIPTS
 from logger.shipped import vehicle_file, vehicle_path
 
 
@@ -16,6 +19,17 @@ def test_a_name_is_a_vehicle_that_comes_along_whatever_lies_around(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rav4-2009").write_text("not this")
     assert vehicle_path("rav4-2009") == vehicle_path("rav4-2009", tmp_path) == vehicle_file("rav4-2009")
+
+
+def test_the_page_s_script_and_style_are_in_the_package() -> None:
+    """What an editable install finds by its folder, a wheel has to name: the two lists are the same."""
+    settings = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
+    folder = resources.files("logger.report")
+    with resources.as_file(folder) as place:
+        shipped = {path.name for pattern in settings["tool"]["setuptools"]["package-data"]["logger.report"]
+                   for path in place.glob(pattern)}
+        assert shipped == {path.name for path in (place / "assets").iterdir()}
+    assert {*SCRIPTS, "page.css"} == shipped
 
 
 @pytest.mark.parametrize("word", ["mine.yaml", "./mine", "cars/mine.yaml", "/cars/mine"])

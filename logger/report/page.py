@@ -39,7 +39,7 @@ from logger.report.track_data import track_data
 from logger.report.track_views import rank, track_views, windows_table
 from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
-_SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
+SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
 
@@ -88,7 +88,7 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
             "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
-    ], style=_asset("page.css"), script='"use strict";\n' + "".join(map(_asset, _SCRIPTS)), images_from=host)
+    ], style=_asset("page.css"), script='"use strict";\n' + "".join(map(_asset, SCRIPTS)), images_from=host)
 
 
 @cache
@@ -150,7 +150,8 @@ def _places_section(records: Sequence[WindowRecord], places: Sequence[Place]) ->
         return EMPTY
     heads = ("#", "Drive", "When (UTC)", "Coordinates", "Along the way", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
              "Flags")
-    return section("Roughest places", grid(heads, rows, words=(0, 1, 2, 3, 8, 9)) + hint(
+    return section("Roughest places", html(
+        '<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + hint(
         "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
         "visit a place before judging it. Its number shows it on the map and in the curves."))
 
@@ -166,7 +167,7 @@ def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
     return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg,
-                place_words(place).replace(" ", "\u00a0"))
+                place_words(place))
 
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
@@ -230,7 +231,7 @@ def _number(value: float | None, decimals: int, factor: float = 1.0) -> str:
 
 
 def _instant(utc_us: int | None) -> str:
-    return "not known" if utc_us is None else f"{utc(utc_us):%Y-%m-%d\u00a0%H:%M:%S}"
+    return "not known" if utc_us is None else f"{utc(utc_us):%Y-%m-%d %H:%M:%S}"
 
 
 def _inside(content: Any, *keys: str) -> Any:

@@ -61,7 +61,9 @@ def track_data(drives: Sequence[Sequence[WindowRecord]], base: Sequence[Way] = (
     columns = [(name, steps, order, _floats(map(value_of, records))) for name, steps, order, value_of in _PLAIN]
     columns += [
         ("lon_deg", _DEG, 2, _unwrapped(_floats(record.lon_deg for record in records), origin_deg)),
-        ("since_s", 1e3, 2, np.concatenate([_since_s(drive) for drive in drives] or [np.zeros(0)])),
+        # Most windows begin when the one before ends: beside their durations their instants cost nothing.
+        ("beyond_s", 1e3, 1, np.concatenate([_since_s(drive) for drive in drives] or [np.zeros(0)])
+         - _elapsed_s(records)),
         # Most windows are expected to be what they are: as a difference the column is all but empty.
         ("expected_above_mps2", 1e3, 0, _floats(map(_expected_above, records))),
         ("flags", 1, 0, _floats(numbers[record.flags] for record in records)),
@@ -121,6 +123,12 @@ def _start_s(drive: Sequence[WindowRecord]) -> float | None:
 def _since_s(drive: Sequence[WindowRecord]) -> Array:
     """Time of each row since the drive's first date."""
     return _floats(record.utc_us and record.utc_us / 1e6 for record in drive) - (_start_s(drive) or 0.0)
+
+
+def _elapsed_s(records: Sequence[WindowRecord]) -> Array:
+    """Time in all windows before each, in the milliseconds that the script sums up."""
+    lasted_s = np.round(_floats(record.duration_s for record in records), 3)
+    return np.cumsum(lasted_s) - lasted_s
 
 
 def _expected_above(record: WindowRecord) -> float | None:

@@ -252,7 +252,7 @@ def test_roads_that_are_none_are_refused(drive, tmp_path: Path, text: str, words
     write_log(tmp_path / "00001-001.csv", drive(2))
     (tmp_path / "roads.geojson").write_text(text)
     with pytest.raises(BadInput, match=rf"roads\.geojson: .*{words}"):
-        main.main(["report", str(tmp_path), "--base", str(tmp_path / "roads.geojson"), "--out", str(tmp_path / "p.html")])
+        main.main(["report", str(tmp_path), "--base", str(tmp_path / "roads.geojson"), "--out", str(tmp_path / "p")])
 
 
 def test_roads_of_every_kind_are_read(tmp_path: Path) -> None:
@@ -260,8 +260,8 @@ def test_roads_of_every_kind_are_read(tmp_path: Path) -> None:
     several = {"type": "MultiLineString", "coordinates": [[[1, 2], [3, 4]], [[5, 6], [7, 8]]]}
     path = tmp_path / "roads.geojson"
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [
-        {"type": "Feature", "geometry": line}, {"type": "Feature", "geometry": {"type": "Point", "coordinates": [1, 2]}},
-        {"type": "Feature", "geometry": None},
+        {"type": "Feature", "geometry": line}, {"type": "Feature", "geometry": None},
+        {"type": "Feature", "geometry": {"type": "Point", "coordinates": [1, 2]}},
         {"type": "Feature", "geometry": {"type": "GeometryCollection", "geometries": [several]}}]}))
     assert [(list(lat), list(lon)) for lat, lon in read_road_lines(path)] == [
         ([46.5, 46.5], [6.5, 6.6]), ([2, 4], [1, 3]), ([6, 8], [5, 7])]

@@ -1,4 +1,4 @@
-"""The page in a browser: silent, asking for nothing, right under the pointer, whole on a phone, in the dark, in print."""
+"""The page in a browser: silent, asks for nothing, right under the pointer, whole on a phone, in the dark, printed."""
 
 from __future__ import annotations
 

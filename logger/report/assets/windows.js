@@ -85,9 +85,12 @@ class Windows {
     this.trust = new Uint8Array(n);   // 0: no flag; 1: a flag beside a value; 2: no value, or none that counts
     this.drive = new Int32Array(n);
     this.placed = 0;
-    let end = 0, placedLength = 0, drive = -1;
+    this.since_s = new Float64Array(n);
+    let end = 0, elapsed = 0, placedLength = 0, drive = -1;
     for (let i = 0; i < n; i++) {
       this.end_m[i] = end += this.length_m[i];
+      this.since_s[i] = this.beyond_s[i] + elapsed;
+      elapsed += this.duration_s[i];
       this.drive[i] = this.begins[i] === 2 ? ++drive : drive;
       this.trust[i] = !this.counts[i] || !(this.iri_m_per_km[i] >= 0) ? 2 : this.flagsOf(i).length > 0 ? 1 : 0;
       if (this.hasPlace(i)) { this.placed++; placedLength += this.length_m[i]; }

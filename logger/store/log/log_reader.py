@@ -67,18 +67,17 @@ def find_logs(place: Path) -> list[Path]:
 def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
     """The logs of files and folders, place by place, each with the folder that its name is shown from.
 
-    A log that is found twice, in two places or as a copy (on a stick, say), is taken once, where it is found first.
-    Raises BadInput for a place without any.
+    A log that an earlier place has too, itself or as a copy (on a stick, say), is left out. Raises BadInput for a place
+    without any.
     """
     found: list[tuple[Path, Path | None]] = []
     seen: set[object] = set()
     for place in places:
-        for log in find_logs(place):
-            marks = {log.resolve(), _copied(log)} - {None}
-            if not seen & marks:
-                # With one place its own name says nothing; among several it tells them apart.
-                found.append((log, place if len(places) == 1 else place.parent))
-            seen |= marks
+        # With one place its own name says nothing; among several it tells them apart.
+        shown_from = place if len(places) == 1 else place.parent
+        marks = {log: {log.resolve(), _copied(log) if len(places) > 1 else None} - {None} for log in find_logs(place)}
+        found += [(log, shown_from) for log, its in marks.items() if not seen & its]
+        seen.update(*marks.values())
     return found
 
 
