@@ -60,10 +60,11 @@ class LearnedLaw(CommandResult):
         return self.curves
 
     def figures(self) -> list[Html]:
-        """How the error fell."""
+        """How the error fell, and the law."""
         from logger.report.diagnosis_page import falling
 
-        return [falling("How the error fell", self.steps, self.noise_floor_error)]
+        return [falling("How the error fell", self.steps, self.noise_floor_error),
+                *super().figures()]
 
     def write(self, path: Path | str) -> None:
         """Write the law's file. ValueError where no law was learned."""
@@ -85,6 +86,9 @@ def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Pat
     progress        told what is under way, such as ``print``
 
     Raises BadInput as ``diagnose``.
+
+    >>> learn(car, runs).family is None    # a known effect explains it: the sensor's gain
+    True
     """
     from logger.report.law_text import as_json, law_lines, source_of
 

@@ -83,8 +83,6 @@ class Noise(Protocol):
 class White:
     """Every sample by itself."""
 
-    name = "white"
-
     def fitted(self, residuals: Sequence[Array], values: Array, low_pass: LowPass, floor: float) -> Whitening:
         """As ``Noise``."""
         shape = Whitener(np.zeros((0, 0)), np.ones(1))
@@ -93,7 +91,7 @@ class White:
             shape = levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
         deviation = max(_rms([shape(one) for one in residuals]), floor)
         whitener = Whitener(shape.start / deviation, shape.taps / deviation)
-        return _whitening(self.name, [whitener] * len(residuals), residuals, 1,
+        return _whitening("white", [whitener] * len(residuals), residuals, 1,
                           f"white noise of {deviation:.3g} m/s2", {"deviation_mps2": deviation})
 
 

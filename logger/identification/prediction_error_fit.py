@@ -17,7 +17,7 @@ It knows models by ``Predictor`` only.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -169,13 +169,6 @@ def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None 
     best = descents[int(np.argmin([one.at.cost for one in descents]))]
     iterations = sum(one.rounds for one in descents)
     noise, point, rounds, settled = _innovations(problem, best.at)
-    if noise.name != White.name and problem.at_bound(point.x) and not problem.at_bound(best.at.x):
-        # Coloured noise takes what a model misses for noise, most of all where there is one frequency at a time.
-        white = [one for one in problem.options.noise if isinstance(one, White)]
-        if white:
-            problem.options = replace(problem.options, noise=white)
-            noise, point, more, settled = _innovations(problem, best.at)
-            rounds += more
     return _result(problem, point, noise, findings, iterations + rounds, settled,
                    np.array([problem.coordinates.values(one.x) for one in descents]))
 
@@ -260,11 +253,6 @@ class _FitProblem:
             if not ((start >= self.low - _AT_BOUND) & (start <= self.high + _AT_BOUND)).all():
                 raise ValueError("expected every start between its bounds")
         return starts
-
-    def at_bound(self, x: Array) -> list[str]:
-        """Names of the numbers that are at a bound there."""
-        return [one.name for one, here, low, high in zip(self.free, x, self.low, self.high, strict=True)
-                if here - low < _AT_BOUND or high - here < _AT_BOUND]
 
     def at(self, x: Array, noise: Whitening, deviation: float | None) -> _Point:
         """The residuals at a place, weighed by a noise model; by Huber's loss if they have a deviation."""
@@ -386,7 +374,8 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: lis
     names = [one.name for one in problem.free]
     slopes = noise(problem.linearised(point.x).slopes)
     relative = _covariance(problem, point, slopes)
-    at_bound = problem.at_bound(point.x)
+    at_bound = [name for name, x, low, high in zip(names, point.x, problem.low, problem.high, strict=True)
+                if x - low < _AT_BOUND or high - x < _AT_BOUND]
     values = problem.coordinates.values(point.x)
     if not findings:
         weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]

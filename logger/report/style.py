@@ -4,10 +4,12 @@ The eight class colours run from blue over yellow and red to purple, fall in lig
 apart with any common colour vision; a casing around them carries the light ones on white and the dark ones on black.
 """
 
-_LIGHT = """
+from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
+
+_COLOURS = "".join(f"--c{number}:{colour};" for number, colour in enumerate(CLASS_COLOURS)) + f"--none:{NO_CLASS_COLOUR};"
+_LIGHT = _COLOURS + """
 --ink:#1d242b;--soft:#5c6873;--line:#d9dee3;--faint:#eef1f4;--ground:#fff;--panel:#f7f9fa;--casing:#3c464f;
---c0:#2f6db5;--c1:#58a9d4;--c2:#f2c744;--c3:#ef8d32;--c4:#d0402b;--c5:#9e1b5e;--c6:#651a70;--c7:#35104a;
---none:#9aa4ad;--band:#58a9d48c;
+--band:#58a9d48c;
 """
 _DARK = """
 --ink:#e7ebee;--soft:#9ba7b1;--line:#343d45;--faint:#252d34;--ground:#14191e;

@@ -20,7 +20,7 @@ import logger.api
 import ridelog
 
 MODULES = [importlib.import_module(f"logger.api.{one.name}") for one in pkgutil.iter_modules(logger.api.__path__)]
-SLOW = ("logger.api.lab_loop", "logger.api.same_road")
+SLOW = ("logger.api.lab_loop", "logger.api.same_road", "logger.api.learning")
 
 
 @pytest.fixture(scope="module")

@@ -66,6 +66,7 @@ def test_an_estimate_beside_another_road_goes_on_only_where_it_is_asked_to(
     assert main(["estimate", "--vehicle", "rav4-2009", runs[0]]) == 0
 
 
+@pytest.mark.slow
 def test_another_cars_file_is_refused_but_by_identify(
     runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:

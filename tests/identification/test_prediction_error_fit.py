@@ -154,27 +154,6 @@ def test_innovations_bring_the_errors_right_that_output_error_has_wrong() -> Non
     assert np.std(outcome["ar"]) < 1.6
 
 
-def test_coloured_noise_that_drives_a_number_to_its_bound_is_not_taken() -> None:
-    """A slow wave of the residual on a short ramp: what takes it for noise differentiates it, and asks for more."""
-    time, generator, tried = np.linspace(0, 2, 400), np.random.default_rng(6), 0
-    for _ in range(20):
-        measured = 2 * time + np.cumsum(generator.normal(0, 0.02, 400)) + generator.normal(0, 0.002, 400)
-        alone = {name: fit(Line(time), [measured], FitOptions(noise=[kind], refuse=False))
-                 for name, kind in (("white", White()), ("ar", Autoregressive()))}
-        apart = alone["white"].parameters["b"], alone["ar"].parameters["b"]
-        if abs(apart[0] - apart[1]) < 0.02:
-            continue
-        line, tried = Line(time), tried + 1
-        end = sum(apart) / 2
-        low, high = (0.01, end) if apart[0] < apart[1] else (end, 100.0)
-        line.parameters[1] = Free("b", apart[0], low, high)
-        assert fit(line, [measured], FitOptions(noise=[Autoregressive()], refuse=False)).at_bound == ["b"]
-        found = fit(line, [measured], FitOptions(noise=[White(), Autoregressive()], refuse=False))
-        assert (found.noise.name, found.at_bound) == ("white", [])
-        assert found.parameters["b"] == pytest.approx(apart[0], rel=1e-6)
-    assert tried
-
-
 def test_a_rough_road_outside_the_model() -> None:
     scores, levels = [], []
     for seed in range(6):
