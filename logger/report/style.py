@@ -6,7 +6,9 @@ apart with any common colour vision; a casing around them carries the light ones
 
 from logger.chart_data import CLASS_COLOURS, NO_CLASS_COLOUR
 
-_COLOURS = "".join(f"--c{number}:{colour};" for number, colour in enumerate(CLASS_COLOURS)) + f"--none:{NO_CLASS_COLOUR};"
+_COLOURS = "".join(
+    f"--{name}:{colour};" for name, colour in [*((f"c{number}", one) for number, one in enumerate(CLASS_COLOURS)),
+                                               ("none", NO_CLASS_COLOUR)])
 _LIGHT = _COLOURS + """
 --ink:#1d242b;--soft:#5c6873;--line:#d9dee3;--faint:#eef1f4;--ground:#fff;--panel:#f7f9fa;--casing:#3c464f;
 --band:#58a9d48c;
