@@ -258,8 +258,8 @@ class SampleClock:
     def _comb(self, points: list[_Point], slope_us: float) -> float | None:
         """The period [us] of a sampler of which samples are lost, where the arrivals show it. (125 Hz with 1 in 25
         lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
-        if not self._nominal_us / self.FASTEST <= slope_us <= self._nominal_us / self.SLOWEST**2:
-            return None
+        if not self.SLOWEST * self._nominal_us <= slope_us <= self._nominal_us / self.SLOWEST**2:
+            return None  # of a faster sensor with its lines lost at random, all would be found, too many to date any
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
         count = points[-1].number - points[0].number
         above_us = instants_us - slope_us * np.array([point.number for point in points], dtype=np.float64)
