@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.sample_clock import NO_TIME, SampleClock
+from drivers.sample_clock import SampleClock
 from drivers.sampling_comb import is_ticked
 
 
