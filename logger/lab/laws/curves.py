@@ -1,89 +1,142 @@
-"""Drafts of laws that are curves: a power of what moves, or a smooth curve through points.
+"""Families of laws that are curves of one motion: a power of what moves, or a smooth curve through points.
 
-A power has two numbers, and holds what physics books have: the square of a damper's rate, the cube of a spring's
-travel. The curve is free. Its smoothness is its prior: it goes through few points, at rest and where the runs' motions
-lie, monotone between them (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984), and each of them counts.
-Beyond the motions of the runs curves stay what they are there: nothing is known of them.
+A power has two numbers, F = f sign(x) |x / x0|^n, and holds what physics books have: the square of a damper's rate, the
+cube of a spring's travel. The curve is free. Its smoothness is its prior: it goes through few points, at rest and where
+the runs' motions lie, monotone between them (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984), and
+each of them counts. Beyond the motions of the runs curves stay what they are there: nothing is known of them.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.families.family import rounded
-from logger.vehicle.effect import Parameter, Scale
+from logger.lab.laws.families.family import Family, Look, Say, rounded
+from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_HANDED_ON = {"rate": "with_force(lambda travel_m, rate_mps: force_n(p, rate_mps))",
-              "travel": "with_spring(lambda travel_m: force_n(p, travel_m))",
-              "deflection": "with_tire(lambda deflection_m: force_n(p, deflection_m))"}
 _STRONGEST = 100.0
 _SLOPE_STEP = 0.02
+_POINTS = (0.5, 0.9, 0.995)  # shares of the time within which a motion stays: where a free curve's points are
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a force may go with.
+
+    at         its short name, as drafts have it
+    name       in words
+    measure    what ``Look.reach`` calls it
+    unit       in which it is measured
+    shown      the same in words: factor and unit
+    method     of ``Laws`` that takes such a force, with what is handed on to it
+    """
+
+    at: str
+    name: str
+    measure: str
+    unit: str
+    shown: tuple[float, str]
+    method: str
+
+    def words(self, size: float) -> str:
+        """A size of it: "12 mm"."""
+        factor, unit = self.shown
+        return f"{factor * size:g} {unit}"
+
+
+RATE = Motion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"),
+              "with_force(lambda travel_m, rate_mps: force_n(p, rate_mps))")
+TRAVEL = Motion("travel", "travel", "travel_m", "m", (1000.0, "mm"),
+                "with_spring(lambda travel_m: force_n(p, travel_m))")
+DEFLECTION = Motion("deflection", "tire's deflection", "deflection_m", "m", (1000.0, "mm"),
+                    "with_tire(lambda deflection_m: force_n(p, deflection_m))")
+
+
+class CurveFamily(Family):
+    """A force that is a curve of one motion.
+
+    motion        that it goes with
+    force         what it is in words: "damper force"
+    source, signature    of its drafts
+    usual_share   of the time that the motion stays within where the force is what its number says
+    reach_share   of the time; beyond twice what this gives, the force stays as it is there
+    powers        to be tried; ``power_ends``: what they may be
+    ends          points of a free curve that a sentence names, by their place among them, and where they are in words
+    """
+
+    motion: Motion
+    force: str
+    source: str
+    signature: str
+    usual_share: float
+    reach_share: float
+    powers: tuple[float, ...]
+    power_ends: tuple[float, float]
+    ends: tuple[tuple[int, str], ...]
+
+    @abstractmethod
+    def usual_force_n(self, look: Look, usual: float) -> float:
+        """What such a force usually is where the motion is ``usual`` [N]."""
+
+    def drafts(self, look: Look) -> list[Draft]:
+        def reach(share: float) -> float:
+            return look.reach(self.motion.measure, share)
+
+        usual = reach(self.usual_share)
+        size_n = self.usual_force_n(look, usual)
+        return [self._power(usual, 2 * reach(self.reach_share), size_n),
+                self._free([reach(share) for share in _POINTS], size_n)]
+
+    def words(self, draft: Draft, found: Chosen, say: Say) -> str:
+        motion = self.motion.at
+        if draft.variant == "power":
+            return (f"a {self.force} that grows with the {motion} to the power {say('power_ratio')}, {say('force_n')} "
+                    f"at {self.motion.words(draft.reference)}")
+        ends = " and ".join(f"{say(draft.parameters[place].name)} {where}" for place, where in self.ends)
+        return f"a {self.force} that follows a free curve of the {motion}, {ends}"
+
+    def _power(self, reference: float, reach: float, size_n: float) -> Draft:
+        """A force that grows with a power of what moves, alike both ways, as far as ``reach``."""
+        functions = f"""
+def force_n(p, at):
+    size = np.minimum(np.abs(at), {rounded(reach)!r}) / {reference!r}
+    return p.force_n * np.sign(at) * size**p.power_ratio
+"""
+        parameters = (_strength("force_n", size_n, f"at {reference:g} {self.motion.unit}"),
+                      Parameter("power_ratio", self.powers[0], *self.power_ends, None, Scale.LOG, self.powers,
+                                "exponent"))
+        return self._draft("power", "grows with a power of", parameters, functions, reference)
+
+    def _free(self, knots: Sequence[float], size_n: float) -> Draft:
+        """A force that follows a smooth curve through points on either side of rest."""
+        places = sorted({sign * rounded(one) for one in knots for sign in (-1, 1)})
+        names = {one: f"force_{number}_n" for number, one in enumerate(places, 1)}
+        at = sorted([*places, 0.0])
+        functions = f"""
+AT = np.array([{', '.join(repr(one) for one in at)}])
+
+
+def force_n(p, at):
+    through = np.array([{', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
+    return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
+"""
+        parameters = tuple(_strength(name, size_n, f"at {one:g} {self.motion.unit}", (0.1,))
+                           for one, name in names.items())
+        return self._draft("curve", "follows a curve of", parameters, functions, places[-1],
+                           ("from scipy.interpolate import PchipInterpolator",))
+
+    def _draft(self, variant: str, does: str, parameters: tuple[Parameter, ...], functions: str, reference: float,
+               imports: tuple[str, ...] = ()) -> Draft:
+        return Draft(
+            family=self.name, kind="ForceEffect", title=f"a force that {does} the {self.motion.name}",
+            parameters=parameters, source=self.source, signature=self.signature, shown_by=self.shown_by,
+            method=f"def laws(self, p, laws):\n    return laws.{self.motion.method}", functions=functions,
+            imports=imports, variant=variant, at=self.motion.at, reference=reference)
 
 
 def _strength(name: str, size_n: float, meaning: str, trials: Sequence[float] = (0.1, -0.1)) -> Parameter:
     size_n = rounded(size_n)
     return Parameter(name, trials[0] * size_n, -_STRONGEST * size_n, _STRONGEST * size_n, 0.0, Scale.LINEAR,
                      tuple(one * size_n for one in trials), meaning, step=_SLOPE_STEP * size_n)
-
-
-def _draft(at: str, parameters: Sequence[Parameter], functions: str, title: str, variant: str, reference: float,
-           imports: tuple[str, ...] = (), **common: Any) -> Draft:
-    return Draft(kind="ForceEffect", title=title, parameters=tuple(parameters), at=at, functions=functions,
-                 method=f"def laws(self, p, laws):\n    return laws.{_HANDED_ON[at]}", imports=imports,
-                 variant=variant, reference=reference, **common)
-
-
-def power_curve(unit: str, reference: float, reach: float, size_n: float, powers: Sequence[float],
-                ends: tuple[float, float], *, at: str, **common: Any) -> Draft:
-    """A force that grows with a power of what moves, alike both ways.
-
-    reference    where the force is what its number says; ``reach``: beyond it stays as it is there
-    size_n       of the usual force there
-    powers       to be tried; ``ends``: what they may be
-    """
-    functions = f"""
-def force_n(p, at):
-    size = np.minimum(np.abs(at), {rounded(reach)!r}) / {reference!r}
-    return p.force_n * np.sign(at) * size**p.power_ratio
-"""
-    parameters = [_strength("force_n", size_n, f"at {reference:g} {_UNITS[unit]}"),
-                  Parameter("power_ratio", powers[0], *ends, None, Scale.LOG, tuple(powers), "exponent")]
-    return _draft(at, parameters, functions, f"a force that grows with a power of the {_NAMES[at]}", "power", reference,
-                  **common)
-
-
-def free_curve(unit: str, knots: Sequence[float], size_n: float, *, at: str, **common: Any) -> Draft:
-    """A force that follows a smooth curve through points on either side of rest.
-
-    knots     where these points are, on either side
-    size_n    of the usual force
-    """
-    places = sorted({sign * rounded(one) for one in knots for sign in (-1, 1)})
-    names = [f"force_{number}_n" for number in range(1, len(places) + 1)]
-    functions = f"""
-AT = np.array([{', '.join(repr(one) for one in _with_rest(places))}])
-
-
-def force_n(p, at):
-    through = np.array([{', '.join(f'p.{name}' if name else '0.0' for name in _with_rest_named(places, names))}])
-    return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
-"""
-    parameters = [_strength(name, size_n, f"at {one:g} {_UNITS[unit]}", (0.1,))
-                  for one, name in zip(places, names, strict=True)]
-    return _draft(at, parameters, functions, f"a force that follows a curve of the {_NAMES[at]}", "curve", places[-1],
-                  ("from scipy.interpolate import PchipInterpolator",), **common)
-
-
-def _with_rest(places: Sequence[float]) -> list[float]:
-    return sorted([*places, 0.0])
-
-
-def _with_rest_named(places: Sequence[float], names: Sequence[str]) -> list[str]:
-    named = dict(zip(places, names, strict=True))
-    return [named.get(one, "") for one in _with_rest(places)]
-
-
-_UNITS = {"mps": "m/s", "m": "m"}
-_NAMES = {"rate": "rate", "travel": "travel", "deflection": "tire's deflection"}
