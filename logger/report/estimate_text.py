@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
-from logger.estimation.road_profile import TOLD_OVER
+from logger.estimation.road_profile import RESOLVED_SHARE
 
 _FAR_ABOVE = 1.5
 _MOVING_MPS = 1.0
@@ -141,10 +141,10 @@ def _unanswered(summary: dict[str, Any]) -> str:
 def _range_words(found: Assessment) -> str:
     road = found.road
     if road is None:
-        return f"none over {TOLD_OVER:.0%} of the way."
+        return f"none over {RESOLVED_SHARE:.0%} of the way."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {TOLD_OVER:.0%} of the way); that is what "
-            f"a profile holds{left_out}.")
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); that is "
+            f"what a profile holds{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[str]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from logger.lab.planning.next_drives import Option
-from logger.lab.planning.outlook import TOLD_SIGMA
+from logger.lab.planning.outlook import ISOLABLE_SIGMA
 from logger.lab.planning.plan import NextDrive, Plan
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.text_layout import columns, paragraphs
@@ -33,7 +33,7 @@ def summary(found: Plan) -> list[str]:
              f"ridelog diagnose would name {named}."]
     if found.groups:
         lines.append("Seen, but not told from each other: " + "; ".join(", ".join(one) for one in found.groups) + ".")
-    hidden = [name for name, each in zip(found.names, found.now.alone, strict=True) if each < DETECTABLE_SIGMA]
+    hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
         lines.append(f"Too faint to be seen in these drives: {', '.join(hidden)}.")
     lines += [f"{name} is left out: {why}." for name, why in found.obstacles.items()]
@@ -44,18 +44,18 @@ def rows(found: Plan) -> list[tuple[str, str, str, str, str]]:
     """Each effect, those that stand out most first: by how much, by how much it is told from what, and what that
     means."""
     made = []
-    for index in sorted(range(len(found.names)), key=lambda one: -found.now.alone[one]):
-        alone, told = float(found.now.alone[index]), float(found.now.told[index])
+    for index in sorted(range(len(found.names)), key=lambda one: -found.now.detectability[one]):
+        alone, apart = float(found.now.detectability[index]), float(found.now.isolability[index])
         near = int(found.now.nearest[index])
         like = found.names[near] if near != index and alone >= DETECTABLE_SIGMA else ""
-        made.append((found.names[index], number(alone), number(told), like, _judged(alone, told)))
+        made.append((found.names[index], number(alone), number(apart), like, _judged(alone, apart)))
     return made
 
 
-def _judged(alone: float, told: float) -> str:
+def _judged(alone: float, apart: float) -> str:
     if alone < DETECTABLE_SIGMA:
         return "too faint"
-    return "can be named" if told >= TOLD_SIGMA else "cannot be told apart"
+    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be told apart"
 
 
 def number(deviations: float) -> str:
@@ -66,8 +66,8 @@ def number(deviations: float) -> str:
 def meaning() -> str:
     """What the numbers are."""
     return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {TOLD_SIGMA:.1f} remain when "
-            "that one is fitted in its place.")
+            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {ISOLABLE_SIGMA:.1f} remain "
+            "when that one is fitted in its place.")
 
 
 def plan_lines(found: Plan) -> list[str]:
@@ -118,8 +118,8 @@ def as_json(found: Plan) -> dict[str, Any]:
     return {
         "drives": [{"drive": name, "seconds": seconds} for name, seconds in found.drives],
         "noise_mps2": found.noise.variance**0.5, "noise_measured": found.measured,
-        "effects": {one.effect.name: dict(one.values) for one in found.spoken},
-        "detectability": dict(zip(names, map(float, now.alone), strict=True)),
+        "effects": {one.effect.name: dict(one.values) for one in found.effects},
+        "detectability": dict(zip(names, map(float, now.detectability), strict=True)),
         "isolability": {name: {other: float(now.beside[row, column]) for column, other in enumerate(names)
                                if column != row} for row, name in enumerate(names)},
         "groups": [list(one) for one in found.groups], "left_out": dict(found.obstacles),
