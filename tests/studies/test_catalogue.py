@@ -46,7 +46,7 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
 
 def test_names_with_either_dash() -> None:
     assert study_of("table_4_4", STUDIES) is study_of("Table-4-4", STUDIES) is STUDIES["table-4-4"]
-    with pytest.raises(BadInput, match="study 'table-9-9': expected one of fig-2-13"):
+    with pytest.raises(BadInput, match="study 'table-9-9': expected one of table-2-2"):
         study_of("table-9-9", STUDIES)
 
 

@@ -19,7 +19,8 @@ def run(effort: Effort) -> Result:
         Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),
         Column("n = 4, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"), Column("printed")), tuple(
         (hours, two.lower, two.upper, four.lower, four.upper,
-         "shaded" if PRINTED_SHADED_HOURS[0] <= hours <= PRINTED_SHADED_HOURS[1] else "") for hours, two, four in zones))
+         "shaded" if PRINTED_SHADED_HOURS[0] <= hours <= PRINTED_SHADED_HOURS[1] else "not shaded")
+        for hours, two, four in zones))
     eight = caution_zone(8.0, 4)
     upper, lower = (_DOSE_PER_RMS * bound * (8.0 * S_PER_HOUR) ** 0.25 for bound in (eight.upper, eight.lower))
     fine = np.geomspace(1 / 60, 24, 2000)
