@@ -34,7 +34,8 @@ def run(effort: Effort) -> Result:
                f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
                "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
                f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high. "
-               "The printed figure has the same four lines over a logarithmic axis of hours.")
+               "The text has dashed lines for n = 2 in the printed figure and dotted ones for "
+               "n = 4.")
     hours = np.geomspace(1 / 60, 24, 60)
     lines = tuple(Line(f"n = {exponent}, {bound}", hours, np.array([
         getattr(caution_zone(hour, exponent), bound) for hour in hours.tolist()]))

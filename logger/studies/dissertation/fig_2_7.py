@@ -39,10 +39,10 @@ def run(effort: Effort) -> Result:
         Column("printed class"), Column("our class"), Column("its mean Gd(n0) [cm3]", ".0f"),
         Column("Gd(n0) found [cm3]", ".1f"), Column("waviness found", ".3f"),
         Column("scatter of the raw spectrum [dB]", ".1f"), Column("of the smoothed [dB]", ".2f")), tuple(rows))
-    verdict = ("As in the printed pictures, the rough road's spectrum is that of the smooth one shifted upward at all "
-               "wave numbers, both fall towards short waves, the raw spectra are ragged, and smoothed over the bands "
-               f"of Eq 2.4 to 2.6 they scatter by {scatters[0][1]:.1f} dB in place of {scatters[0][0]:.1f}. The text "
-               "says that the bands are listed in ISO 2631-1; they are in ISO 8608. The printed phases are not known, "
+    verdict = ("As the text says of the printed pictures, the rough road's spectrum is that of the smooth one shifted "
+               "upward at all wave numbers, both fall towards short waves, the raw spectra are ragged, and smoothed "
+               f"over the bands of Eq 2.4 to 2.6 they scatter by {scatters[0][1]:.1f} dB in place of "
+               f"{scatters[0][0]:.1f}. The text says that the bands are listed in ISO 2631-1; they are in ISO 8608. The printed phases are not known, "
                "so the roads are alike in their statistics only.")
     pictures = (Curves("The first 100 m of a smooth and a rough road (Fig 2.6, 2.8)", "distance [m]", "elevation [mm]",
                        tuple(roads)),
@@ -54,4 +54,5 @@ def run(effort: Effort) -> Result:
 STUDY = Study("fig_2_7", "Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
               "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", run,
               covers=("Fig 2.6", "Fig 2.7", "Fig 2.8", "Fig 2.9"), word=Word.AGREES,
-              because="Roads of classes B and D are found to be of these classes, and the spectra look as drawn.")
+              because="Roads of classes B and D are found to be of these classes, and the spectra are as the text "
+                      "describes them.")

@@ -37,7 +37,7 @@ def run(effort: Effort) -> Result:
         Column("window [m]", ".0f"), Column("lasts [s]", ".1f"), Column("peak [m/s2]", ".2f"),
         Column("r.m.s. over the bump [m/s2]", ".2f"), Column("r.m.s. behind it [m/s2]", ".2f"),
         Column("share of the power that is the bump's [%]", ".0f")), tuple(rows))
-    verdict = (f"As printed: two half waves of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
+    verdict = (f"As the text describes it: bumps of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
                f"{wheelbase_m / BUMP_MPS:.2f} s behind the front's, and a response that stands far above the road's "
                f"shaking; in 100 m {rows[1][-1]:.0f} % of its power are still the bump's. The source's own bump and "
                "road of these figures are not told, so no value can be compared.")
@@ -48,4 +48,4 @@ STUDY = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m"
               "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the input leaves out; sensor noise 0.05 m/s2.", run,
               covers=("Fig 4.19", "Fig 4.20"), word=Word.NOT_REPRODUCIBLE,
-              because="Bump, speed and road of the figures are not printed; simulated, the response looks as drawn.")
+              because="Bump, speed and road of the figures are not printed; simulated, the response is as described.")

@@ -25,9 +25,9 @@ def run(effort: Effort) -> Result:
         Column("rear axle behind the front [s]", ".3f"), Column("peak from the front axle [m/s2]", ".2f"),
         Column("from the rear axle [m/s2]", ".2f"), Column("shaken for [s]", ".1f")),
         ((wheelbase_m / BRIDGE_MPS, *peaks, shaken_s),))
-    verdict = (f"As drawn: two steps, {wheelbase_m / BRIDGE_MPS:.2f} s apart, and two blows that the body swings out "
-               f"of within {shaken_s:.1f} s. Height and speed of the printed figure are not told; those of the "
-               "analysis that follows it are taken.")
+    verdict = (f"Two steps, {wheelbase_m / BRIDGE_MPS:.2f} s apart, and two blows that the body swings out "
+               f"of within {shaken_s:.1f} s. Height and speed of the printed figure are not told, nor "
+               "what it looks like; those of the analysis that follows it are taken.")
     pictures = (Curves("Input", "time [s]", "elevation under the tire [mm]", tuple(
         Line(name, time_s, 1000 * bridge(_STEP_AT_M, STEP_M)(record.distance_m - behind_m))
         for name, behind_m in (("front", 0.0), ("rear", wheelbase_m)))),
@@ -38,5 +38,4 @@ def run(effort: Effort) -> Result:
 STUDY = Study("fig_4_30", "Input and output of a bridge's step", "Fig 4.30, section 4.4.5",
               "Simulated: the car of Table 4.2 over a step of 38.1 mm at 48.3 km/h, no roughness, no noise.", run,
               covers=("Fig 4.30",), word=Word.NOT_REPRODUCIBLE,
-              because="Height and speed of the figure are not printed; simulated under those of Fig 4.31 it looks as "
-                      "drawn.")
+              because="Height and speed of the figure are not printed; it is simulated under those of Fig 4.31.")

@@ -31,7 +31,7 @@ def run(effort: Effort) -> Result:
     verdict = (f"As printed, the step stands out: {peaks[0]:.1f} m/s2 against {peaks[1]:.1f} on the rest of the road. "
                f"It alone takes the IRI of these 100 m from {table.rows[0][1]:.1f} to {table.rows[1][1]:.1f} m/km; by "
                "the 4 m/km of the text it would still be a good bridge's end, so an average over 100 m hides it. The "
-               "roughness of the printed road is another draw; the pictures look alike.")
+               "roughness of the printed road is another draw.")
     pictures = (Curves("A step on a road of IRI 2 m/km (Fig 4.32)", "distance [m]", "elevation [mm]",
                        (Line("road", place_m[::5], 1000 * stepped[::5]),)),
                 Curves("The car's answer (Fig 4.33)", "distance [m]", "acceleration [m/s2]",
@@ -42,4 +42,4 @@ def run(effort: Effort) -> Result:
 STUDY = Study("fig_4_32", "A bridge's step on a smooth road, and the car's answer", "Fig 4.32, section 4.4.6",
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km.", run,
               covers=("Fig 4.32", "Fig 4.33"), word=Word.NOT_REPRODUCIBLE,
-              because="The road of the figures is another draw of chance; simulated, the step stands out as drawn.")
+              because="The road of the figures is another draw of chance; simulated, the step stands out as told.")

@@ -34,7 +34,7 @@ def run(effort: Effort) -> Result:
                "a red one; here they are those of Table 2.5, a little uncomfortable from 0.315 and uncomfortable from "
                "0.8 m/s2, for the text does not say which ones were drawn.")
     lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height, row in zip(HEIGHTS_M, peaks, strict=True))
-    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit), faint=True)
+    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit))
                    for limit, word in _LIMITS)
     return Result((table,), verdict, (Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]",
                                              (*lines, *limits)),), values)
