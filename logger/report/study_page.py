@@ -39,8 +39,8 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
     names, without those that were not run."""
     words = {one.called: _word(one, carried.get(one.called)) for one in known}
     counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
-    rows = [(", ".join(one.covers).replace(" ", _FIRM).replace("," + _FIRM, ", "), _link(one, carried.get(one.called)), words[one.called],
-             _because(one, carried.get(one.called)),
+    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers), _link(one, carried.get(one.called)),
+             words[one.called], _because(one, carried.get(one.called)),
              f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in known]
     sources = sorted({one.source for one in known})
     return document("Studies", [

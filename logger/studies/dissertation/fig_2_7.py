@@ -42,8 +42,8 @@ def run(effort: Effort) -> Result:
     verdict = ("As the text says of the printed pictures, the rough road's spectrum is that of the smooth one shifted "
                "upward at all wave numbers, both fall towards short waves, the raw spectra are ragged, and smoothed "
                f"over the bands of Eq 2.4 to 2.6 they scatter by {scatters[0][1]:.1f} dB in place of "
-               f"{scatters[0][0]:.1f}. The text says that the bands are listed in ISO 2631-1; they are in ISO 8608. The printed phases are not known, "
-               "so the roads are alike in their statistics only.")
+               f"{scatters[0][0]:.1f}. The text says that the bands are listed in ISO 2631-1; they are in ISO 8608. "
+               "The printed phases are not known, so the roads are alike in their statistics only.")
     pictures = (Curves("The first 100 m of a smooth and a rough road (Fig 2.6, 2.8)", "distance [m]", "elevation [mm]",
                        tuple(roads)),
                 Curves("Their spectra (Fig 2.7, 2.9)", "wave number [cycle/m]", "displacement spectrum [m3]",
