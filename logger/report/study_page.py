@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from logger.report.charts import chart
 from logger.report.document import document, grid, heading, paragraphs, section, tiles
-from logger.report.html import Html, concatenated, html
+from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
 from logger.studies.study import Result, Study, Table, Word
 
@@ -24,14 +24,15 @@ _INDEX_STYLE = _STYLE + (
 """On a phone each study is a block, as a row of five columns does not fit."""
 
 
-def page(study: Study, result: Result) -> Html:
-    """The study as one HTML document."""
+def page(study: Study, result: Result, contents: str = "") -> Html:
+    """The study as one HTML document; ``contents``: the name of a page beside it that lists all."""
     word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of {study.source}"),
         paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
-        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))], style=_STYLE)
+        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"])),
+        html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
 
 
 def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
@@ -68,7 +69,5 @@ def _link(study: Study, found: Carried | None) -> Html:
 
 
 def _table(table: Table) -> Html:
-    """Columns of words stand left, of numbers right."""
-    words = [index for index in range(len(table.columns)) if all(isinstance(row[index], str) for row in table.rows)]
     rows = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
-    return section(table.title, grid([column.name for column in table.columns], rows, words))
+    return section(table.title, grid([column.name for column in table.columns], rows, table.words))

@@ -96,6 +96,12 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
+    @property
+    def words(self) -> tuple[int, ...]:
+        """Places of the columns of words, which stand left; numbers stand right."""
+        kinds = (set(map(type, cells)) - {type(None)} for cells in zip(*self.rows, strict=True))
+        return tuple(place for place, kind in enumerate(kinds) if kind == {str})
+
 
 @dataclass(frozen=True)
 class Value:
@@ -148,7 +154,7 @@ def _checked(values: Sequence[Value]) -> Table:
     rows = tuple((one.name, one.printed, one.ours, one.difference, one.tolerance,
                   str(one.word) if one.holds else f"expected: {one.word}") for one in values)
     return Table("Printed and ours", (Column("value"), Column("printed", ".6g"), Column("ours", ".6g"), Column(
-        "difference", "+.3g"), Column("tolerance", ".2g"), Column("word")), rows)
+        "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,10 @@ def run(effort: Effort) -> Result:
         Column("sum of Eq 4.2's amplitudes [mm]", ".2f"), Column("ours, mean [mm]", ".2f"),
         Column("from road to road [mm]", ".2f")), tuple(rows))
     verdict = ("Generated roads are as high as the sum of the amplitudes of Eq 4.2 makes them, in proportion to the "
-               "root of the degree of roughness; the printed Fig 4.5 shows such a rise with a large scatter and gives "
-               "no numbers. A road of 256 cm3 is of class C, which the text calls poor here and class D poor in 4.3.4. "
-               "Its ISO 8606 is ISO 8608. The argument of Eq 4.1 lacks 2 pi (Appendix A has it), its phases are "
+               "root of the degree of roughness. The text says of the printed Fig 4.5 that its means are those of "
+               "earlier work and that its scatter is large; roads of 1 km with all waves of Eq 4.2 in them scatter by "
+               "2 % here. A road of 256 cm3 is of class C, which the text calls poor here; in 4.3.4 it calls class D "
+               "poor. Its ISO 8606 is ISO 8608. The argument of Eq 4.1 lacks 2 pi (Appendix A has it), its phases are "
                "uniform, not normal, and N waves at equal steps repeat after one over the step. Ours chooses the step "
                "for the road's length, so that nothing repeats.")
     place = np.arange(0, 200.0, 0.5)
