@@ -84,3 +84,13 @@ def _rms(values: Array, distance_m: Array, edges_m: Array) -> Array:
     sums = np.concatenate([[0.0], np.cumsum(values**2)])
     at = np.searchsorted(distance_m, edges_m - 1e-9)
     return np.sqrt(np.diff(sums[at]) / np.diff(at))
+
+
+def whole_road_by_rms(record: Run, vehicle: Vehicle | None = None) -> float:
+    """IRI of a whole drive at one speed by the dissertation's relation [m/km]."""
+    return _factor(vehicle or rav4(), float(record.speed_mps[0])) * float(np.sqrt(np.mean(record.measured_mps2**2)))
+
+
+def rms_error(estimate: Array, exact: Array) -> float:
+    """R.m.s. difference of two rows of windows."""
+    return float(np.sqrt(np.mean((estimate - exact) ** 2)))
