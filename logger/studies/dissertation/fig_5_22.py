@@ -77,14 +77,15 @@ def run(effort: Effort) -> Result:
         (("largest response to the bumps [g], Table 5.5", PRINTED_LARGEST_G, peak_g,
           100 * (peak_g / PRINTED_LARGEST_G - 1)),))
     lifted_mm = 1000 * TUBE_M * TUBE_M / 2 / rav4().contact_patch_m
-    verdict = (f"The model's bump peaks at {peak_g:.2f} g, the measured row of bumps at 0.87 (Table 5.5): of one shape, "
-               "as the source sees in Fig 5.22, but not of one size; the sensor sat on a console that rings (6.5), and "
-               f"a bump that is shorter or driven faster hits harder (Fig 4.25). On the bridge the two spikes lie "
-               f"{delay_s:.2f} s apart, wheelbase over speed. The tube is too weak for a reason that can be computed: a "
-               "tire averages the road over its patch of 250 mm, and a cable of 6.35 mm lifts that average by "
-               f"{lifted_mm:.2f} mm. That is less than two r.m.s. of what a smooth road does by itself, where a road's "
-               "own peaks reach three; at twice the speed the road does more and the tube does not. Bump and bridge "
-               "tell the mass, the tube does not, and ridelog refuses to say one: the source's judgement agrees.")
+    verdict = (f"The model's bump peaks at {peak_g:.2f} g, the measured row of bumps at 0.87 (Table 5.5): of one "
+               "shape, as the source sees in Fig 5.22, but not of one size; the sensor sat on a console that rings "
+               "(6.5), and a bump that is shorter or driven faster hits harder (Fig 4.25). On the bridge the two "
+               f"spikes lie {delay_s:.2f} s apart, wheelbase over speed. The tube is too weak for a reason that can "
+               "be computed: a tire averages the road over its patch of 250 mm, and a cable of 6.35 mm lifts that "
+               f"average by {lifted_mm:.2f} mm. That is less than two r.m.s. of what a smooth road does by itself, "
+               "where a road's own peaks reach three; at twice the speed the road does more and the tube does not. "
+               "Bump and bridge tell the mass, the tube does not, and ridelog refuses to say one: the source's "
+               "judgement agrees.")
     return Result((table, numbers), verdict, tuple(_picture(case, *pair)
                                                    for case, pair in zip(CASES, drives, strict=True)))
 

@@ -35,11 +35,12 @@ def run(effort: Effort) -> Result:
         (float(mph[number]), one.a_w_per_iri.slope, 100 * one.a_w_per_iri.spread, checks.get(number),
          *(_word(one.a_w_per_iri.slope * level) for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
-    verdict = ("Agrees in all that the text says: comfort falls in proportion to roughness, and with speed. The printed "
-               "pictures have no numbers in the text. For this car a straight line through the origin holds for each "
-               f"speed, because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, "
-               "not seven times: a road of waviness 2 shakes a car with the root of its speed, 2.6 times, and most of the "
-               "rest is the tire, whose patch of 250 mm swallows the short waves that a slow car's wheels would answer.")
+    verdict = ("Agrees in all that the text says: comfort falls in proportion to roughness, and with speed. The "
+               "printed pictures have no numbers in the text. For this car a straight line through the origin holds "
+               f"for each speed, because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} "
+               "times as steep, not seven times: a road of waviness 2 shakes a car with the root of its speed, 2.6 "
+               "times, and most of the rest is the tire, whose patch of 250 mm swallows the short waves that a slow "
+               "car's wheels would answer.")
     limits = tuple(Line(word.replace("_", " "), levels[[0, -1]], np.full(2, limit), faint=True)
                    for limit, word in COMFORT_WORDS if 0 < limit < a_w.max())
     return Result((table,), verdict, (
@@ -56,4 +57,5 @@ def _word(a_w_mps2: float) -> str:
 
 STUDY = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
               "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, "
-              "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of time.", run)
+              "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of "
+              "time.", run)

@@ -37,14 +37,14 @@ def run(effort: Effort) -> Result:
         (word.replace("_", " "), "a majority" if word == "not_uncomfortable" else "some", share)
         for word, share in shares.items()))
     slow = [row for row in by_speed.rows if float(str(row[0])) <= 20]
-    verdict = ("Table D.1 agrees with itself: its two columns are one speed each. The records were never published, so "
-               "the maps cannot be made again; on simulated roads the same steps give maps of the same kind. The text "
-               f"finds the IRI overestimated below {PRINTED_SLOW_KMH:g} km/h: on roads of waviness {_WAVINESS:g} the "
-               f"relation reads {slow[0][6]:+.0f} % at 20 mph, for the reason that Fig 6.11 gives and less only because "
-               f"the 15 Hz low-pass takes a part away, and ridelog estimate {slow[0][7]:+.0f} %. That a majority of windows is comfortable agrees: "
-               f"{shares['not_uncomfortable']:.0f} % here, for roads of a median IRI of {_MEDIAN_IRI:g} m/km. Better: "
-               "each window's IRI has a standard error, and of drives with GPS ridelog report draws both maps on the "
-               "ground.")
+    verdict = ("Table D.1 agrees with itself: its two columns are one speed each. The records were never published, "
+               "so the maps cannot be made again; on simulated roads the same steps give maps of the same kind. The "
+               f"text finds the IRI overestimated below {PRINTED_SLOW_KMH:g} km/h: on roads of waviness {_WAVINESS:g} "
+               f"the relation reads {slow[0][6]:+.0f} % at 20 mph, for the reason that Fig 6.11 gives and less only "
+               f"because the 15 Hz low-pass takes a part away, and ridelog estimate {slow[0][7]:+.0f} %. That a "
+               f"majority of windows is comfortable agrees: {shares['not_uncomfortable']:.0f} % here, for roads of a "
+               f"median IRI of {_MEDIAN_IRI:g} m/km. Better: each window's IRI has a standard error, and of drives "
+               "with GPS ridelog report draws both maps on the ground.")
     example = found[min(segments, key=lambda number: abs(number - _SHOWN))]
     return Result((by_speed, comfort), verdict, (
         Curves(f"Fig 6.21: IRI along segment {_SHOWN}. Printed: bars per 25 ft in the colours of the scale",

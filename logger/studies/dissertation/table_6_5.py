@@ -37,11 +37,11 @@ def run(effort: Effort) -> Result:
         Column("speed [mph]", ".0f"), Column("size that is asked for"), Column("a_w per unit of it [m/s2]", ".4f"),
         Column("from", ".0f"), Column("to", ".0f"), Column("our word in the middle")), rows)
     verdict = ("Not reproducible, as the records were never published and no size of what lay there is told; computed "
-               "the other way round, the three words ask for a step of "
-               f"{rows[0][7]:.0f} to {rows[0][8]:.0f} mm between two pavements, a manhole {rows[1][7]:.0f} to "
-               f"{rows[1][8]:.0f} mm deep and a stretch of IRI {rows[2][7]:.0f} to {rows[2][8]:.0f} m/km. Such edges and "
-               "manholes are to be found on any campus; damage of that IRI is severe, as the word is. The model is "
-               "linear, so a_w goes with the size. The ranges of Table 2.5 overlap; the more severe word is taken.")
+               f"the other way round, the three words ask for a step of {rows[0][7]:.0f} to {rows[0][8]:.0f} mm "
+               f"between two pavements, a manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI "
+               f"{rows[2][7]:.0f} to {rows[2][8]:.0f} m/km. Such edges and manholes are to be found on any campus; "
+               "damage of that IRI is severe, as the word is. The model is linear, so a_w goes with the size. The "
+               "ranges of Table 2.5 overlap; the more severe word is taken.")
     depths = np.linspace(0.0, 60.0, 2)
     limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit), faint=True)
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)
@@ -76,6 +76,6 @@ def _row(printed: tuple[int, int, str, str], what: str, factor: float) -> tuple[
 
 
 STUDY = Study("table_6_5", "Three places that were revisited, and what must lie there", "Table 6.5, section 6.5.3",
-              "The source measured. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a dip on "
-              "a flat road, 15 Hz low-pass, weighted with Wk, the worst window of 25 ft, on the average of where in "
-              "a window it lies; random roads for the damage.", run)
+              "The source measured. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a dip "
+              "on a flat road, 15 Hz low-pass, weighted with Wk, the worst window of 25 ft, on the average of where "
+              "in a window it lies; random roads for the damage.", run)
