@@ -96,7 +96,7 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
         f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
         f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s.",
-        "Wavelengths told: " + _range_words(found),
+        "Wavelengths resolved: " + _range_words(found),
     ]
     if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
         shown.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "

@@ -23,7 +23,7 @@ def page(found: Plan, vehicle: str) -> Html:
         heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
         tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
                ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
-               ("Groups not told apart", f"{len(found.groups)}", ""),
+               ("Groups that cannot be separated", f"{len(found.groups)}", ""),
                ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2")]),
         paragraphs(summary(found)),
         section("What remains of one effect beside another", figure(found) + hint(meaning())),
@@ -48,7 +48,7 @@ def _next(found: Plan) -> Html:
     """Nothing where there is none."""
     if not found.next:
         return EMPTY
-    drawn = grid(("Drive", "Effects more", "Told apart better, in standard deviations"), [
+    drawn = grid(("Drive", "Effects more", "Better separated, in standard deviations"), [
         (do_words(one.option), f"{one.more_named:.1f}",
          ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
         words=(0, 2))

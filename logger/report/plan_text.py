@@ -12,7 +12,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.text_layout import columns, paragraphs
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
-HEADS = ("Effect", "Stands out by", "Told apart by", "Most like", "")
+HEADS = ("Effect", "Stands out by", "Separated by", "Most like", "")
 GAIN_HINT = "Effects more: how many more could be named, by what is expected."
 SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
                "gyroscope to 0.001 rad/s.")
@@ -32,7 +32,7 @@ def summary(found: Plan) -> list[str]:
              f"{from_where}. Of {len(found.names)} effects at their usual strength, each by itself, "
              f"ridelog diagnose would name {named}."]
     if found.groups:
-        lines.append("Seen, but not told from each other: " + "; ".join(", ".join(one) for one in found.groups) + ".")
+        lines.append("Detected, but not separable: " + "; ".join(", ".join(one) for one in found.groups) + ".")
     hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
         lines.append(f"Too faint to be seen in these drives: {', '.join(hidden)}.")
@@ -41,7 +41,7 @@ def summary(found: Plan) -> list[str]:
 
 
 def rows(found: Plan) -> list[tuple[str, str, str, str, str]]:
-    """Each effect, those that stand out most first: by how much, by how much it is told from what, and what that
+    """Each effect, those that stand out most first: by how much, by how much it is separated from what, and what that
     means."""
     made = []
     for index in sorted(range(len(found.names)), key=lambda one: -found.now.detectability[one]):
@@ -55,7 +55,7 @@ def rows(found: Plan) -> list[tuple[str, str, str, str, str]]:
 def _judged(alone: float, apart: float) -> str:
     if alone < DETECTABLE_SIGMA:
         return "too faint"
-    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be told apart"
+    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be separated"
 
 
 def number(deviations: float) -> str:
@@ -66,8 +66,8 @@ def number(deviations: float) -> str:
 def meaning() -> str:
     """What the numbers are."""
     return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {ISOLABLE_SIGMA:.1f} remain "
-            "when that one is fitted in its place.")
+            f"effect is seen from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
+            "remain when that one is fitted in its place.")
 
 
 def plan_lines(found: Plan) -> list[str]:
@@ -105,7 +105,7 @@ def next_words(one: NextDrive) -> str:
     more = len(one.gains) - len(shown)
     gains = ", ".join(f"{name} by {number(each)}" for name, each in shown.items())
     count = f"{one.more_named:.1f} effects more could be named" if one.more_named >= 0.05 else "no more can be named"
-    return f"{do_words(one.option)}: {count}. Told apart better: {gains}{f' and {more} more' if more else ''}."
+    return f"{do_words(one.option)}: {count}. Better separated: {gains}{f' and {more} more' if more else ''}."
 
 
 def _most(gains: Mapping[str, float]) -> dict[str, float]:
