@@ -6,7 +6,7 @@ from logger.chart_data import Curves, Field, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
 from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, Settings, calibrate
 from logger.studies.drives import PS_2119, drive_over, random_road, rav4
-from logger.studies.study import Column, Effort, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
 from logger.studies.windows import per_window
 from logger.units import MPH_MPS
 from logger.vehicle.linearise import known_vehicle
@@ -58,4 +58,7 @@ def _word(a_w_mps2: float) -> str:
 STUDY = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
               "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, "
               "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of "
-              "time.", run)
+              "time.", run,
+              covers=("Fig 6.16", "Fig 6.17"), word=Word.AGREES,
+              because="Comfort falls in proportion to roughness, and with speed; the pictures have no numbers in the "
+                      "text.")

@@ -43,14 +43,15 @@ def run(effort: Effort) -> Result:
     verdict = (f"A metre ahead of the centre of gravity the sensor reads {change[-1].min():.0f} to "
                f"{change[-1].max():.0f} % more than there, by speed, because pitch is added; behind it similarly. An "
                "estimate that does not know the place explains pitch by waves which the middle of the car hardly "
-               f"feels, and is off by up to {worst:.0f} %; one that has the place in the vehicle's file (sensor: ahead_m) by "
-               f"{max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, ridelog diagnose finds "
-               "sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
+               f"feels, and is off by up to {worst:.0f} %; one that has the place in the vehicle's file (sensor: "
+               f"ahead_m) by {max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, ridelog "
+               "diagnose finds sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
     return Result((table, biases), verdict, (
         Curves("What a sensor reads by its place. Printed: nothing, future work", "speed [mph]",
                "change of the r.m.s. acceleration [%]",
                tuple(Line(f"{place:+g} m ahead", np.array(SPEEDS_MPH, dtype=float), row)
-                     for place, row in zip(PLACES_M, change, strict=True) if place > 0), level=(0.0, "at the centre")),))
+                     for place, row in zip(PLACES_M, change, strict=True) if place > 0),
+               level=(0.0, "at the centre")),))
 
 
 def _at(ahead_m: float) -> Vehicle:

@@ -36,12 +36,13 @@ def run(effort: Effort) -> Result:
         Column("exact within two standard errors [%]", ".0f")), tuple(rows))
     relation, ours = (max(float(row[place]) for row in rows) for place in (1, 2))
     by_rms, own = (np.array([row[place] for row in rows]) for place in (3, 4))
-    verdict = ("The source asks for a relation that does not drift with the speed. Three roads of one IRI, but of waves "
-               f"mixed otherwise, are up to {relation:.0f} % apart by the r.m.s. relation and {ours:.0f} % by ridelog "
-               f"estimate, whose windows are off by {own.min():.2f} to {own.max():.2f} m/km at 10 to 70 mph beside "
-               f"{by_rms.min():.2f} to {by_rms.max():.2f}. The least possible error, for one who knew spectrum, noise and "
-               "car exactly, stands beside it; what is missing to it is what had to be learnt from the drive. The car's "
-               "parameters were known here: of a car that is not, ridelog identify comes first.")
+    verdict = ("The source asks for a relation that does not drift with the speed. Three roads of one IRI, but of "
+               f"waves mixed otherwise, are up to {relation:.0f} % apart by the r.m.s. relation and {ours:.0f} % by "
+               f"ridelog estimate, whose windows are off by {own.min():.2f} to {own.max():.2f} m/km at 10 to 70 mph "
+               f"beside {by_rms.min():.2f} to {by_rms.max():.2f}. The least possible error, for one who knew "
+               "spectrum, noise and car exactly, stands beside it; what is missing to it is what had to be learnt "
+               "from the drive. The car's parameters were known here: of a car that is not, ridelog identify comes "
+               "first.")
     mph = np.array([row[0] for row in rows])
     return Result((table,), verdict, (
         Curves("R.m.s. error of a window of 25 ft by speed. Printed: nothing, future work", "speed [mph]",

@@ -8,7 +8,7 @@ from logger.estimation.rms_calibration import Settings, calibrate
 from logger.roads.obstacles import pothole, step
 from logger.studies.dissertation.fig_6_23 import LOW_PASS_HZ, PRINTED_MPH
 from logger.studies.drives import Array, Conditions, Shape, rav4, record_of
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table
+from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
 from logger.studies.windows import per_window
 from logger.units import MPH_MPS
 from logger.vehicle.linearise import known_vehicle
@@ -78,4 +78,7 @@ def _row(printed: tuple[int, int, str, str], what: str, factor: float) -> tuple[
 STUDY = Study("table_6_5", "Three places that were revisited, and what must lie there", "Table 6.5, section 6.5.3",
               "The source measured. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a dip "
               "on a flat road, 15 Hz low-pass, weighted with Wk, the worst window of 25 ft, on the average of where "
-              "in a window it lies; random roads for the damage.", run)
+              "in a window it lies; random roads for the damage.", run,
+              covers=("Table 6.5",), word=Word.NOT_REPRODUCIBLE,
+              because="Neither the records nor the sizes of what lay there were published; the printed words ask for a "
+                      "step, a manhole and damage of sizes that are to be found.")
