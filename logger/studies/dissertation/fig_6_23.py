@@ -88,7 +88,8 @@ def _row(mph: int, found: list[Figures]) -> tuple[Cell, ...]:
                            for name in ("exact_m_per_km", "by_rms_m_per_km", "iri_m_per_km"))
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
     return (float(mph), float(len(found)), float(exact.mean()), "too high" if slow else "reasonable",
-            100 * float(by_rms.mean() / exact.mean() - 1), 100 * float(ours.mean() / exact.mean() - 1), rms_error(by_rms, exact), rms_error(ours, exact))
+            *(100 * float(one.mean() / exact.mean() - 1) for one in (by_rms, ours)),
+            *(rms_error(one, exact) for one in (by_rms, ours)))
 
 
 def _map(title: str, values: dict[int, Array], name: str, top: float) -> Field:

@@ -1,4 +1,4 @@
-"""Table 5.2 and Fig 5.9: modal frequencies from the Fourier transforms of two sensors, and the damping of Eq 5.3 (5.3)."""
+"""Table 5.2 and Fig 5.9: modal frequencies from spectra of two sensors, and the damping of Eq 5.3 (5.3)."""
 
 import numpy as np
 
@@ -35,12 +35,12 @@ def run(effort: Effort) -> Result:
                f"{100 * DAMPING_RATIO:.2f} % that were put in, with an error beside it; Eq 5.3 takes two of them (its "
                "rounded peaks give 1.35). The table above Eq 5.3 has 0.8545 where it needs 0.0855 g.")
     values = (Value("mode 1 [Hz], which must be 0.7419", PRINTED_HZ[0], ps2119.peaks_hz[0], 0.05, Word.MISPRINT),
-              Value("mode 2 [Hz]", PRINTED_HZ[1], ps2119.peaks_hz[1], 0.1),
-              Value("mode 3 [Hz]", PRINTED_HZ[2], ps2119.peaks_hz[2], 0.4),
+              Value("mode 2 [Hz]", PRINTED_HZ[1], ps2119.peaks_hz[1], 0.1, Word.NOT_REPRODUCIBLE),
+              Value("mode 3 [Hz]", PRINTED_HZ[2], ps2119.peaks_hz[2], 0.4, Word.NOT_REPRODUCIBLE),
               Value("damping ratio, Eq 5.3 [%]", PRINTED_DAMPING_PERCENT, 100 * ps2119.decrement.damping_ratio, 0.05))
-    return Result((table, damping), verdict, (
-        Curves("Fig 5.9: spectra of both records. Printed: both transforms, with the same three peaks",
-               "frequency [Hz]", "mean power [(m/s2)2]", tuple(_line(number) for number in (1, 0)), log_y=True),), values)
+    spectra = Curves("Fig 5.9: spectra of both records. Printed: both transforms, with the same three peaks",
+                     "frequency [Hz]", "mean power [(m/s2)2]", tuple(_line(number) for number in (1, 0)), log_y=True)
+    return Result((table, damping), verdict, (spectra,), values)
 
 
 def _line(number: int) -> Line:
