@@ -109,6 +109,11 @@ def random_road(iri_m_per_km: float, length_m: float, seed: int, waviness: float
     return Track(ROAD_SPACING_M, generate(gd_n0_cm3, whole_m, ROAD_SPACING_M, seed, waviness), -_BEFORE_M)
 
 
+def places_m(road: Track) -> Array:
+    """Where the samples of a road lie (n,) [m]."""
+    return np.asarray(road.start_m + road.spacing_m * np.arange(len(road.elevation_m)), float)
+
+
 def without_profile(record: Run, speed_scale: float = 1.0) -> Run:
     """The same readings, nothing known of the road; recorded speed and distance are so many times the true ones."""
     return replace(record, track=Track(1.0, np.zeros(2)), distance_m=speed_scale * record.distance_m,

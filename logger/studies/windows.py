@@ -17,6 +17,7 @@ from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_relation import rms_relation
 from logger.estimation.sensor_noise import Sensor
+from logger.profiles.track import Track
 from logger.runs import Run
 from logger.studies.drives import RATE_HZ, Array, Conditions, rav4
 from logger.units import WINDOW_M
@@ -59,6 +60,7 @@ def per_window(record: Run, conditions: Conditions, window_m: float = WINDOW_M, 
     sensor = Sensor(conditions.noise_mps2, conditions.step_mps2)
     found, _ = estimated(known_vehicle(vehicle), sensor, window_m, record.measured_mps2, record.distance_m)
     track = record.track
+    assert isinstance(track, Track)
     count = int((record.distance_m[-1] - record.distance_m[0]) / window_m)
     edges_m = found.edges_m[: count + 1]
     sensed = record.measured_mps2

@@ -13,7 +13,6 @@ from logger.studies.drives import (
     BUMP_MPS,
     PS_2119,
     RATE_HZ,
-    Array,
     Conditions,
     Shape,
     bridge,
@@ -112,11 +111,8 @@ def _picture(case: _Case, alone: Run, sensed: Run) -> Curves:
     lines = [(f"on a road of IRI {_IRI:g}", sensed), ("obstacle alone", alone)]
     return Curves(f"{case.figure}: {case.what} at {3.6 * case.speed_mps:.0f} km/h. Printed: recorded beside simulated, "
                   f"{case.printed}", "time [s]", "acceleration [m/s2]",
-                  tuple(Line(name, _time(seen), one.measured_mps2[seen]) for name, one in lines))
-
-
-def _time(seen: Array) -> Array:
-    return np.asarray(np.flatnonzero(seen) / RATE_HZ)
+                  tuple(Line(name, np.asarray(np.flatnonzero(seen) / RATE_HZ, float), one.measured_mps2[seen])
+                        for name, one in lines))
 
 
 STUDY = Study("fig_5_22", "Bump, bridge and road tube: what the car feels, and why a tube is too weak",

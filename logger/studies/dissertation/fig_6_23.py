@@ -95,7 +95,7 @@ def _row(mph: int, found: list[Figures]) -> tuple[Cell, ...]:
 def _map(title: str, values: dict[int, Array], name: str, top: float) -> Field:
     grid = np.array([one[:_WINDOWS] for one in values.values()])
     return Field(title, "distance along the segment [m]", "segment of Table D.1",
-                 WINDOW_M * (np.arange(grid.shape[1]) + 0.5), np.array(list(values), dtype=float), grid, name, top)
+                 WINDOW_M * np.arange(0.5, grid.shape[1]), np.array(list(values), dtype=float), grid, name, top)
 
 
 STUDY = Study("fig_6_23", "37 road segments at their speeds: a map of roughness and one of comfort",

@@ -4,7 +4,7 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.roads.iri import iri
-from logger.studies.drives import PS_2119, Array, Conditions, drive_over, random_road
+from logger.studies.drives import PS_2119, Array, Conditions, drive_over, places_m, random_road
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
 from logger.studies.windows import Figures, per_window, rms_error, whole_road_by_rms
 from logger.units import FOOT_M, MPH_MPS
@@ -47,7 +47,7 @@ def run(effort: Effort) -> Result:
                f"{np.abs(own).max():.0f} % at every speed; in windows of 25 ft its error is "
                f"{rms_error(cut[1].iri_m_per_km, cut[1].exact_m_per_km):.2f} m/km beside "
                f"{rms_error(cut[1].by_rms_m_per_km, cut[1].exact_m_per_km):.2f}.")
-    place_m = road.start_m + road.spacing_m * np.arange(len(road.elevation_m))
+    place_m = places_m(road)
     shown = (place_m >= 0) & (place_m <= _LENGTH_M)
     x_mph = np.array(speeds, dtype=float)
     return Result((table, windows), verdict, (

@@ -12,7 +12,7 @@ from logger.identification.unknown_road.road_fit import fit_roads
 from logger.identification.unknown_road.road_state import Options
 from logger.profiles.track import Track
 from logger.runs import Run
-from logger.studies.drives import PS_2119, RATE_HZ, Array, drive_over, random_road, rav4
+from logger.studies.drives import PS_2119, RATE_HZ, Array, drive_over, places_m, random_road, rav4
 from logger.studies.fit_methods import MASS, TRUTH
 from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
 from logger.units import WINDOW_M
@@ -50,7 +50,7 @@ def run(effort: Effort) -> Result:
                f"to {100 * last.standard_errors[MASS] / TRUTH[MASS]:.0f} %, because the road is the same and what the "
                "speed changes is the car. The source finds such results poor, having nothing to tell road from car.")
     drive, start_m, spacing_m, true, ours, _ = profiles[-1]
-    place_m = start_m + spacing_m * np.arange(len(true))
+    place_m = np.asarray(start_m + spacing_m * np.arange(len(true)), float)
     return Result((table, mass), verdict, (
         Curves(f"The road from the response at {drive.speed_mps[0]:g} m/s. Printed: nothing, future work",
                "distance [m]", "elevation in the band [mm]", (Line("true", place_m, 1000 * true),
@@ -75,7 +75,7 @@ def _profile(drive: Run, road: Track) -> tuple[float, float, Array, Array, RoadP
     assert found is not None
     part = max(found.parts, key=lambda one: one.length_m)
     place_m = part.start_m + part.spacing_m * np.arange(len(part.elevation_m))
-    height = np.interp(place_m, road.start_m + road.spacing_m * np.arange(len(road.elevation_m)), road.elevation_m)
+    height = np.interp(place_m, places_m(road), road.elevation_m)
     true = band_passed(height, part.spacing_m, found.shortest_m, found.longest_m)
     inside = (place_m >= place_m[0] + found.longest_m / 2) & (place_m <= place_m[-1] - found.longest_m / 2)
     return float(place_m[inside][0]), part.spacing_m, true[inside], part.elevation_m[inside], found

@@ -84,8 +84,8 @@ def run(effort: Effort) -> Result:
                "proportion; a bridge's step of 38 mm tells it to some 3 %, one of 13 mm to 8 to 9, as well at 60 mph "
                "as at 30. A tube tells nothing at any of these speeds, not even one of 19 mm: the road grows with "
                "speed and the tube does not. ridelog plan says such things of any car before anybody drives.")
-    speeds = np.arange(10, 71, 5) * MPH_MPS
-    lines = tuple(Line(car.name, speeds / MPH_MPS, rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms)
+    mph = np.arange(10.0, 71.0, 5.0)
+    lines = tuple(Line(car.name, mph, rms_relation(known_vehicle(car), None, mph * MPH_MPS).iri_per_accel_rms)
                   for car in cars)
     return Result((vehicles, sizes), verdict, (
         Curves("IRI per r.m.s. acceleration of each vehicle. Printed: one car", "speed [mph]",

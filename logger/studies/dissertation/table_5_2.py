@@ -48,7 +48,8 @@ def _line(number: int) -> Line:
     found = summed_spectrum(reading[:, None], RATE_HZ, _SEGMENTS)
     power = found.power.mean(axis=0)
     shown = slice(1, int(_HIGHEST_HZ / found.step_hz))
-    return Line(SENSORS[number].name, found.step_hz * np.arange(len(power))[shown], power[shown])
+    return Line(SENSORS[number].name, np.asarray(found.step_hz * np.arange(len(power)), float)[shown],
+                power[shown])
 
 
 STUDY = Study("table_5_2",

@@ -43,7 +43,7 @@ def run(effort: Effort) -> Result:
         *(Value(f"mode {mode} of the record [Hz]", printed, float(str(rows[mode - 1][5])), 0.1 * printed,
                   Word.NOT_REPRODUCIBLE)
           for mode, printed in enumerate(five_storey.PRINTED_MEASURED_HZ, start=1)))
-    floors = np.arange(6)
+    floors = np.arange(6.0)
     shapes = np.vstack([np.zeros(5), _shapes(building)])
     return Result((table,), verdict, (
         Curves("Fig 5.10: the chain of five masses, drawn as the shapes of its modes. Printed: a drawing of the chain",

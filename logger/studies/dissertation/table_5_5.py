@@ -67,7 +67,7 @@ def _spectrum(accel: Array) -> tuple[Array, Array]:
     """Frequencies [Hz] and power of the even segments of a record, summed; without the mean."""
     found = summed_spectrum(accel[:, None], RATE_HZ, int(len(accel) / RATE_HZ / _SEGMENT_S))
     power = found.power.mean(axis=0)
-    return found.step_hz * np.arange(1, len(power)), power[1:]
+    return np.asarray(found.step_hz * np.arange(1, len(power)), float), power[1:]
 
 
 def _row(printed: tuple[str, float, float, float, float], iri: float, accel: Array) -> tuple[Cell, ...]:

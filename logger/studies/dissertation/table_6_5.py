@@ -17,7 +17,7 @@ PRINTED = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavemen
            (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
 MANHOLE_M, EDGE_M = 0.60, 0.05
 _UNIT_M, _SECONDS, _ROADS = 0.01, 8.0, 40
-_STARTS_M = np.arange(50.0, 57.6, 1.0)
+_STARTS_M = tuple(np.arange(50.0, 57.6, 1.0).tolist())
 _NEXT_WORD = {word: limit for (_, word), (limit, _) in zip(COMFORT_WORDS[1:], COMFORT_WORDS, strict=False)}
 _LIMIT = {word: limit for limit, word in COMFORT_WORDS}
 
