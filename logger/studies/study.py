@@ -115,6 +115,12 @@ class Value:
     word: Word = Word.AGREES
 
     @property
+    def difference(self) -> float:
+        """Ours less the printed; what is below the last bits of the print is nothing."""
+        difference = self.ours - self.printed
+        return 0.0 if abs(difference) < 1e-12 * abs(self.printed) else difference
+
+    @property
     def holds(self) -> bool:
         """Whether ours stands beside the print as ``word`` says."""
         if self.word is Word.BETTER:
@@ -139,9 +145,9 @@ class Result:
 
 
 def _checked(values: Sequence[Value]) -> Table:
-    rows = tuple((one.name, one.printed, one.ours, one.ours - one.printed, one.tolerance,
+    rows = tuple((one.name, one.printed, one.ours, one.difference, one.tolerance,
                   str(one.word) if one.holds else f"expected: {one.word}") for one in values)
-    return Table("Printed and ours", (Column("value"), Column("printed", ".5g"), Column("ours", ".5g"), Column(
+    return Table("Printed and ours", (Column("value"), Column("printed", ".6g"), Column("ours", ".6g"), Column(
         "difference", "+.3g"), Column("tolerance", ".2g"), Column("word")), rows)
 
 

@@ -49,7 +49,7 @@ def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
-    [(["table-9-9"], "study 'table-9-9': expected one of fig-2-13"), ([], "expected the NAME of a study, or --list"),
+    [(["table-9-9"], "study 'table-9-9': expected one of fig-2-13"), ([], "expected the NAME of a study, all, or --list"),
      (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
      (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
      (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],
