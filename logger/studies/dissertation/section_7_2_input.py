@@ -21,12 +21,12 @@ from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.named_parameters import free
 
 SPEEDS_MPS = (10.0, 20.0)
-_IRI, _LENGTH_M, _START = 4.0, 300.0, 1.2
+_IRI, _LENGTH_M, _START = 4.0, 300, 1.2
 
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    road = random_road(_IRI, _LENGTH_M, 7)
+    road = random_road(_IRI, effort.count(_LENGTH_M, _LENGTH_M // 2), 7)
     drives = [drive_over(road, speed, PS_2119.on(_IRI, seed)) for seed, speed in enumerate(SPEEDS_MPS)]
     fits: list[tuple[str, list[Run]]] = [(f"one drive, {one.speed_mps[0]:g} m/s", [one]) for one in drives]
     fits.append(("both, over one road", drives))

@@ -27,7 +27,8 @@ def run(effort: Effort) -> Result:
             "exact_m_per_km", "by_rms_m_per_km", "iri_m_per_km", "iri_std_m_per_km"))
         drift = [float(np.ptp(one.mean(axis=1) / exact.mean(axis=1))) for one in (by_rms, ours)]
         limit = limits.at(one_mph * MPH_MPS, RoadSpectrum.of_iri(_IRI)).std_m_per_km
-        rows.append((float(one_mph), *(100 * one for one in drift), rms_error(by_rms, exact), rms_error(ours, exact), limit,
+        errors = (rms_error(by_rms, exact), rms_error(ours, exact), limit)
+        rows.append((float(one_mph), *(100 * one for one in drift), *errors,
                      100 * float((np.abs(ours - exact) < 2 * std).mean())))
     table = Table("Windows of 25 ft on roads of three wavinesses, one IRI (printed: nothing)", (
         Column("speed [mph]", ".0f"), Column("r.m.s. relation: how far the roads are apart [%]", ".0f"),
