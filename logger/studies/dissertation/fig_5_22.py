@@ -36,11 +36,12 @@ TUBE_SPACING_M = TUBE_M / 4
 
 @dataclass(frozen=True)
 class _Case:
-    """An obstacle at a speed, what the source says of it, and how finely the road has to be sampled."""
+    """An obstacle at a speed, what the source says and draws of it, and how finely the road has to be sampled."""
 
     what: str
     figure: str
     printed: str
+    drawn: str
     shape: Shape
     speed_mps: float
     spacing_m: float = 0.02
@@ -52,10 +53,14 @@ def tube(start_m: float) -> Shape:
 
 
 CASES = (
-    _Case("bump, 150 mm by 2.60 m", "Fig 5.22", "strong signal", bump(_AT_M), BUMP_MPS),
-    _Case("bridge, step of 38.1 mm", "Fig 5.25", "two large spikes", bridge(_AT_M), BRIDGE_MPS),
-    _Case("tube, 6.35 mm", "Fig 5.28", "not much above the road", tube(_AT_M), BUMP_MPS, TUBE_SPACING_M),
-    _Case("tube, 6.35 mm", "Fig 5.29", "cannot be located", tube(_AT_M), 2 * BUMP_MPS, TUBE_SPACING_M),
+    _Case("bump, 150 mm by 2.60 m", "Fig 5.22", "strong signal", "recorded and simulated, alike", bump(_AT_M),
+          BUMP_MPS),
+    _Case("bridge, step of 38.1 mm", "Fig 5.25", "two large spikes", "recorded and simulated, two spikes",
+          bridge(_AT_M), BRIDGE_MPS),
+    _Case("tube, 6.35 mm", "Fig 5.28", "not much above the road", "the record, an arrow for each axle", tube(_AT_M),
+          BUMP_MPS, TUBE_SPACING_M),
+    _Case("tube, 6.35 mm", "Fig 5.29", "cannot be located", "the record alone", tube(_AT_M), 2 * BUMP_MPS,
+          TUBE_SPACING_M),
 )
 
 
@@ -109,8 +114,8 @@ def _mass(record: Run) -> tuple[str, str]:
 def _picture(case: _Case, alone: Run, sensed: Run) -> Curves:
     seen = np.abs(alone.distance_m - _AT_M - 5) < 20
     lines = [(f"on a road of IRI {_IRI:g}", sensed), ("obstacle alone", alone)]
-    return Curves(f"{case.figure}: {case.what} at {3.6 * case.speed_mps:.0f} km/h. Printed: recorded beside simulated, "
-                  f"{case.printed}", "time [s]", "acceleration [m/s2]",
+    return Curves(f"{case.figure}: {case.what} at {3.6 * case.speed_mps:.0f} km/h. Printed: {case.drawn}", "time [s]",
+                  "acceleration [m/s2]",
                   tuple(Line(name, np.asarray(np.flatnonzero(seen) / RATE_HZ, float), one.measured_mps2[seen])
                         for name, one in lines))
 

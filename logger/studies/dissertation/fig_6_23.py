@@ -52,15 +52,15 @@ def run(effort: Effort) -> Result:
         Curves(f"Fig 6.21: IRI along segment {_SHOWN}. Printed: bars per 25 ft in the colours of the scale",
                "distance [m]", "IRI [m/km]", (
                    Line("exact", example.middle_m, example.exact_m_per_km),
-                   Line("r.m.s. relation", example.middle_m, example.by_rms_m_per_km),
-                   Line("ridelog estimate", example.middle_m, example.iri_m_per_km, example.iri_std_m_per_km))),
+                   Line("ridelog estimate", example.middle_m, example.iri_m_per_km, example.iri_std_m_per_km),
+                   Line("r.m.s. relation", example.middle_m, example.by_rms_m_per_km))),
         Curves(f"Fig 6.22: comfort along segment {_SHOWN}. Printed: bars per 25 ft in the colours of the scale",
                "distance [m]", "a_w [m/s2]", (Line("a_w", example.middle_m, example.a_w_mps2),),
                level=(0.315, "a little uncomfortable")),
         _map("Fig 6.23: the roughness map as strips. Printed: the streets of College Park, coloured by IRI",
-             {number: one.by_rms_m_per_km for number, one in found.items()}, "IRI [m/km]", 10.0),
+             {number: one.by_rms_m_per_km for number, one in found.items()}, "IRI [m/km]", 6.0),
         _map("Fig 6.24: the comfort map as strips. Printed: the same streets, coloured by a_w",
-             {number: one.a_w_mps2 for number, one in found.items()}, "a_w [m/s2]", 0.8)), tuple(
+             {number: one.a_w_mps2 for number, one in found.items()}, "a_w [m/s2]", 0.5)), tuple(
         Value(f"Table D.1: {mph} mph [km/h]", kmh, mph * MPH_MPS / KMH_MPS, 0.005) for mph, kmh in PRINTED_KMH.items()))
 
 

@@ -31,13 +31,13 @@ def run(effort: Effort) -> Result:
         Column("full car on both tracks: error", ".3f")), rows)
     apart, one_track = rows[len(rows) // 2 - 1], rows[0]
     verdict = ("Where both tracks are one, a full car with its sensor in the middle moves as the half car does: the "
-               f"half car leaves {one_track[4]:.3f} of the record, which is the sensor's noise. Where the tracks "
-               f"share nothing the middle of the car feels their mean, {-float(str(apart[3])):.0f} % less than the "
-               f"half car would, and a half car on the left track leaves {apart[4]:.2f} of the record, the full car "
-               f"on both {apart[5]:.2f}. So the model counts as soon as the tracks differ, and the profile of both "
-               "tracks has to be known for it. ridelog has the full car in every command (model: full_car), reads "
-               "elevation_right_m, and the lab's effect roll makes a full car of a half one where the record asks for "
-               "it.")
+               f"half car leaves {one_track[4]:.3f} of the record, which is the sensor's noise and steps. Where the "
+               f"tracks share nothing the middle of the car feels their mean, {-float(str(apart[3])):.0f} % less than "
+               f"the half car would, and a half car on the left track leaves {apart[4]:.2f} of the record, the full "
+               f"car on both {apart[5]:.2f}. So the model counts as soon as the tracks differ, and the profile of "
+               "both tracks has to be known for it. ridelog has the full car in every command (model: full_car), "
+               "reads elevation_right_m, and the lab's effect roll makes a full car of a half one where the record "
+               "asks for it.")
     road = _two_tracks(0.0)
     full, half = _drive(road, 0.0, PS_2119), _half(road)
     seen = slice(_SKIP, _SKIP + 300)

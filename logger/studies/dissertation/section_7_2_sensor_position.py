@@ -50,7 +50,7 @@ def run(effort: Effort) -> Result:
         Curves("What a sensor reads by its place. Printed: nothing, future work", "speed [mph]",
                "change of the r.m.s. acceleration [%]",
                tuple(Line(f"{place:+g} m ahead", np.array(SPEEDS_MPH, dtype=float), row)
-                     for place, row in zip(PLACES_M, change, strict=True) if place > 0),
+                     for place, row in zip(PLACES_M, change, strict=True) if place),
                level=(0.0, "at the centre")),))
 
 

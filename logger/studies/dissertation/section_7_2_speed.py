@@ -46,8 +46,8 @@ def run(effort: Effort) -> Result:
                "first.")
     return Result((table,), verdict, (
         Curves("R.m.s. error of a window of 25 ft by speed. Printed: nothing, future work", "speed [mph]",
-               "error [m/km]", (Line("r.m.s. relation", mph, by_relation), Line("ridelog estimate", mph, own),
-                                Line("least possible", mph, least))),))
+               "error [m/km]", (Line("ridelog estimate", mph, own),
+                                Line("least possible", mph, least), Line("r.m.s. relation", mph, by_relation))),))
 
 
 STUDY = Study("section_7_2_speed", "An IRI that does not drift with the speed", "Section 7.2, fifth item",

@@ -38,12 +38,15 @@ def run(effort: Effort) -> Result:
         Column("surface"), Column("speed [km/h]", ".1f"), Column("IRI assumed [m/km]", ".1f"),
         Column("printed, largest [g]", ".4f"), Column("ours [g]", ".4f"), Column("printed f1 [Hz]", ".2f"),
         Column("ours [Hz]", ".2f"), Column("printed f2 [Hz]", ".2f"), Column("ours [Hz]", ".2f")), rows)
+    comb_hz = PRINTED[0][1] / 3.6 / float(structure_of(rav4()).behind_m[-1])
     verdict = ("Of one kind only: the body swings at 1 to 2.5 Hz, and there is a second, broad hump. Segments of 2 s "
                "have bins 0.5 Hz apart and the printed values are multiples of nearly that, so no figure tells more. "
                "The measured peaks are two to five times the model's and f2 lies above its 11 Hz on every surface; "
                "the sensor sat on the console, whose own vibration the source later cuts off with a low-pass (6.5), "
-               "and which Table 4.2 does not have. After slow bumps the model's wheels hardly hop, and its second hump "
-               "is the flank of the first. The roads' roughness is not told and was chosen.")
+               "and which Table 4.2 does not have. After slow bumps the model's wheels hardly hop, and its second "
+               f"hump is the flank of the first. Front and rear wheels cancel each other {comb_hz:.1f} Hz apart at 40 "
+               "km/h, so the model's second hump is a comb, of which the highest tooth counts. The roads' roughness "
+               "is not told and was chosen.")
     spectra = Curves("Fig 5.13, 5.15, 5.17, 5.19: summed spectra. Printed: one below each response, a hump at 1 to "
                      "2.5 Hz and one at 12 to 14", "frequency [Hz]", "mean power [(m/s2)2]",
                      tuple(Line(printed[0], *_spectrum(accel))

@@ -43,7 +43,7 @@ def run(effort: Effort) -> Result:
                "damage of that IRI is severe, as the word is. The model is linear, so a_w goes with the size. The "
                "ranges of Table 2.5 overlap; the more severe word is taken.")
     depths = np.linspace(0.0, 60.0, 2)
-    limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit), faint=True)
+    limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit))
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)
     return Result((table,), verdict, (Curves(
         "a_w of the worst window by size. Printed (Fig 6.25 to 6.27): photographs of the three places",
