@@ -6,7 +6,6 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.identification.identifiability import NotIdentifiable
-from logger.roads.bumps import speed_bump
 from logger.runs import Run
 from logger.studies.drives import (
     BRIDGE_MPS,
@@ -47,9 +46,9 @@ class _Case:
     spacing_m: float = 0.02
 
 
-def tube(start_m: float) -> Shape:
-    """A cable of 6.35 mm, as high as it is wide."""
-    return lambda place_m: speed_bump(place_m, start_m, TUBE_M, TUBE_M)
+def tube(start_m: float, diameter_m: float = TUBE_M) -> Shape:
+    """A cable across the road, as high as it is wide."""
+    return bump(start_m, diameter_m, diameter_m)
 
 
 CASES = (

@@ -7,10 +7,9 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.estimation.rms_relation import rms_relation
 from logger.identification.identifiability import NotIdentifiable
-from logger.roads.bumps import speed_bump
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.studies.dissertation.fig_5_22 import TUBE_M, TUBE_SPACING_M
+from logger.studies.dissertation.fig_5_22 import TUBE_M, TUBE_SPACING_M, tube
 from logger.studies.drives import (
     BUMP_HEIGHT_M,
     BUMP_MPS,
@@ -49,16 +48,12 @@ class _Input:
     spacing_m: float = SPACING_M
 
 
-def _tube(diameter_m: float) -> Shape:
-    return lambda place_m: speed_bump(place_m, _AT_M, diameter_m, diameter_m)
-
-
 INPUTS = (
     *(_Input(f"bump, {1000 * height:.0f} mm", bump(_AT_M, height), 10)
       for height in (BUMP_HEIGHT_M / 2, BUMP_HEIGHT_M)),
     *(_Input(f"bridge, step of {1000 * height:.1f} mm", bridge(_AT_M, height), mph)
       for height in (STEP_M / 3, STEP_M) for mph in (30, 60)),
-    *(_Input(f"tube, {1000 * diameter:.2f} mm", _tube(diameter), mph, TUBE_SPACING_M)
+    *(_Input(f"tube, {1000 * diameter:.2f} mm", tube(_AT_M, diameter), mph, TUBE_SPACING_M)
       for diameter in (TUBE_M, 3 * TUBE_M) for mph in (10, 40)),
 )
 
@@ -83,7 +78,7 @@ def run(effort: Effort) -> Result:
                "and seven come with it. The bump of 5.5.2 tells the mass of each. A larger input tells more, in "
                "proportion; a bridge's step of 38 mm tells it to some 3 %, one of 13 mm to 8 to 9, as well at 60 mph "
                "as at 30. A tube tells nothing at any of these speeds, not even one of 19 mm: the road grows with "
-               "speed and the tube does not. ridelog plan says such things of any car before anybody drives.")
+               "speed and the tube does not. ridelog plan says of any car what a drive would show.")
     mph = np.arange(10.0, 71.0, 5.0)
     lines = tuple(Line(car.name, mph, rms_relation(known_vehicle(car), None, mph * MPH_MPS).iri_per_accel_rms)
                   for car in cars)
