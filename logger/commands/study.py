@@ -68,7 +68,7 @@ def _one(study: Study, args: argparse.Namespace) -> int:
     from logger.studies.study import Effort
 
     if study.data and args.folder is None:
-        raise BadInput(f"study {study.called}: expected the folder DIR of {study.data}")
+        raise BadInput(f"study {study.called}: expected DIR, {study.data}")
     if not study.data and args.folder is not None:
         raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
     tell = show_progress if sys.stderr.isatty() else _say_nothing

@@ -13,9 +13,15 @@ from logger.report.html import Html, concatenated, html
 from logger.studies.all_studies import Carried
 from logger.studies.study import Result, Study, Table, Word
 
+_FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
-_STYLE = "th,td{vertical-align:top}td:nth-child(4),td:nth-child(2){min-width:12em}"
+_STYLE = "td:first-child{white-space:normal}"
+_INDEX_STYLE = _STYLE + (
+    "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(5){white-space:nowrap}"
+    "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
+    "tr{border-bottom:1px solid;padding:8px 0}td,td.n,td:first-child{border:0;text-align:left;padding:1px 0}}")
+"""On a phone each study is a block, as a row of five columns does not fit."""
 
 
 def page(study: Study, result: Result) -> Html:
@@ -25,7 +31,7 @@ def page(study: Study, result: Result) -> Html:
         heading(study.title, f"{study.where} of {study.source}"),
         paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
-        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))])
+        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))], style=_STYLE)
 
 
 def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
@@ -33,14 +39,14 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
     names, without those that were not run."""
     words = {one.called: _word(one, carried.get(one.called)) for one in known}
     counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
-    rows = [(", ".join(one.covers), _link(one, carried.get(one.called)), words[one.called],
-             _because(one, carried.get(one.called)),
-             f"{carried[one.called].seconds:.1f}" if one.called in carried else "-") for one in known]
+    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers), _link(one, carried.get(one.called)),
+             words[one.called], _because(one, carried.get(one.called)),
+             f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in known]
     sources = sorted({one.source for one in known})
     return document("Studies", [
         heading("Studies: printed results, made again", "; ".join(sources)),
         tiles(tile for tile in counts if tile[1] != "0"),
-        section("Contents", grid(("printed", "study", "word", "because", "time [s]"), rows, range(4)))], style=_STYLE)
+        section("Contents", grid(("printed", "study", "word", "because", "time"), rows, range(4)))], style=_INDEX_STYLE)
 
 
 def _word(study: Study, found: Carried | None) -> str:

@@ -37,9 +37,9 @@ def run(effort: Effort) -> Result:
         Column("within 3 dB of it from [Hz]", ".3g"), Column("to [Hz]", ".3g")), rows)
     verdict = ("The curves meet the standard's factors to the printed digit. Eq 2.16 does not: its right side has f5 "
                "and Q5 in the denominator, too, and is then 1 at all frequencies, which would make Wk at 1 Hz twice "
-               "as large; f6 and Q6 belong there. The printed figures have the same curves in dB over a logarithmic "
-               "axis: Wk flat at half its height below 2 Hz and highest from 4 to 10 Hz, Wd highest from 0.5 to 2 Hz, "
-               "Wf about 0.17 Hz.")
+               "as large; f6 and Q6 belong there. The text says of the printed figures only that they have amplitude "
+               "against frequency; here Wk is level at half its height about 1 Hz and highest at 6 Hz, Wd is highest "
+               "at 1 Hz and Wf at 0.17 Hz.")
     pictures = tuple(Curves(title, "frequency [Hz]", "factor [dB]", tuple(
         Line(name, f_hz[levels[name] > -60], levels[name][levels[name] > -60]) for name in names), log_x=True)
         for title, names in (("Principal weightings (Fig 2.18)", PRINCIPAL),

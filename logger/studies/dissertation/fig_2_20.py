@@ -19,7 +19,8 @@ def run(effort: Effort) -> Result:
         Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),
         Column("n = 4, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"), Column("printed")), tuple(
         (hours, two.lower, two.upper, four.lower, four.upper,
-         "shaded" if PRINTED_SHADED_HOURS[0] <= hours <= PRINTED_SHADED_HOURS[1] else "") for hours, two, four in zones))
+         "shaded" if PRINTED_SHADED_HOURS[0] <= hours <= PRINTED_SHADED_HOURS[1] else "not shaded")
+        for hours, two, four in zones))
     eight = caution_zone(8.0, 4)
     upper, lower = (_DOSE_PER_RMS * bound * (8.0 * S_PER_HOUR) ** 0.25 for bound in (eight.upper, eight.lower))
     fine = np.geomspace(1 / 60, 24, 2000)
@@ -33,7 +34,8 @@ def run(effort: Effort) -> Result:
                f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
                "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
                f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high. "
-               "The printed figure has the same four lines over a logarithmic axis of hours.")
+               "The text has dashed lines for n = 2 in the printed figure and dotted ones for "
+               "n = 4.")
     hours = np.geomspace(1 / 60, 24, 60)
     lines = tuple(Line(f"n = {exponent}, {bound}", hours, np.array([
         getattr(caution_zone(hour, exponent), bound) for hour in hours.tolist()]))

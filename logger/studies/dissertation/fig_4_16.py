@@ -35,8 +35,8 @@ def run(effort: Effort) -> Result:
     verdict = (f"Four sets of {roads} roads lie about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
                "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
                "errors of the regression (the length of the printed roads is not told; ours have 500 m and differ by "
-               f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to 2.83 "
-               "cycle/m the factor is 0.543.")
+               f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to "
+               "2.83 cycle/m the factor is 0.543.")
     dots = tuple(Line(f"set {number + 1}", gd, one, dots=True) for number, one in enumerate(found))
     law = Line("Eq 4.39", gd, IRI_PER_ROOT_GD * gd**PRINTED_POWER)
     pictures = tuple(Curves(title, "Gd(n0) [cm3]", "IRI [m/km]", (*dots, law), log_x=logarithmic, log_y=logarithmic)

@@ -26,10 +26,11 @@ def run(effort: Effort) -> Result:
     table = Table("IRI of generated roads", (Column("printed: wanted [m/km]", ".0f"), Column("set 1 [m/km]", ".2f"),
                                              Column("set 2 [m/km]", ".2f")),
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
+    spread = relative_spread(_LENGTH_M)
     verdict = (f"As printed, highly linear: correlation {min(alike):.3f} and {max(alike):.3f}, slopes {slopes[0]:.3f} "
-               f"and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within {100 * relative_spread(_LENGTH_M):.0f} "
+               f"and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within {100 * spread:.0f} "
                "% r.m.s., which is why the source shows two sets; the tolerance is three standard errors of the slope, "
-               "and 1 % for Eq 4.40. The printed figure has two sets of dots along the diagonal, their IRI by ProVAL; "
+               "and 1 % for Eq 4.40. The printed figure has two sets as well, their IRI by ProVAL; "
                "ours is the exact one of ASTM E1926, which agrees with the published check profile.")
     picture = Curves("IRI of roads generated for an IRI", "IRI wanted [m/km]", "IRI [m/km]", (
         Line("as wanted", wanted, wanted), *(Line(f"set {number + 1}", wanted, one, dots=True)

@@ -39,7 +39,7 @@ def run(effort: Effort) -> Result:
     verdict = ("All limits and means agree. The printed unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
                "spectrum is in m2 per cycle/m, that is m3, and 1e-6 of it are cm3. Roads that were generated at each "
                "mean are found again with their degree of roughness, a waviness near 2 and their class. The printed "
-               "Fig 2.5 has these bounds as falling straight lines on logarithmic axes, as drawn here.")
+               "Fig 2.5 has these bounds over the spectrum's range of interest; so has the one here.")
     n = np.array([LOWEST_CPM, HIGHEST_CPM])
     picture = Curves("Bounds of the classes, waviness 2", "wave number [cycle/m]", "displacement spectrum [m3]",
                      tuple(Line(f"upper limit of {name}", n, displacement_psd(n, limit))

@@ -44,9 +44,8 @@ def run(effort: Effort) -> Result:
     verdict = ("All bounds agree. Table 2.4 writes its descriptions along a scale; each is taken to hold from the "
                "mark at which it stands up to the next, the first from 0. The targets of the text, 1.50 and 2.68 m/km, "
                "are 95 and 170 in/mi, between which a road of the federal system is called fair today. The printed Fig "
-               "2.16 draws the same ranges as bars over the IRI, with the speeds that drivers choose; its bars overlap "
-               "as these do.")
-    picture = Curves("Which roads have it", "IRI [m/km]", "kind of road, the smoothest on top", tuple(lines))
+               "2.16 is that of Sayers and Karamihas (1998), from which Table 2.3 takes its ranges.")
+    picture = Curves("Which roads have it", "IRI [m/km]", "kind of road, as in the table", tuple(lines))
     return Result((ranges, rides), verdict, (picture,), tuple(values))
 
 
