@@ -42,11 +42,11 @@ def run(effort: Effort) -> Result:
                "times, and most of the rest is the tire, whose patch of 250 mm swallows the short waves that a slow "
                "car's wheels would answer.")
     return Result((table,), verdict, (
-        Curves("Fig 6.16: comfort by IRI at each speed. Printed: lines that fan out with speed, over the same axes",
+        Curves("Fig 6.16: comfort by IRI at each speed. Printed: the same, IRI 1 to 10 m/km, 10 to 70 mph",
                "IRI [m/km]", "a_w [m/s2]",
                tuple(Line(f"{one:.0f} mph", levels, row) for one, row in zip(mph, a_w, strict=True)),
                level=(COMFORT_WORDS[-2][0], "a little uncomfortable")),
-        Field("Fig 6.17: the same over both. Printed: a surface in three dimensions that rises to rough and fast",
+        Field("Fig 6.17: the same over both. Printed: the same as a surface in three dimensions",
               "IRI [m/km]", "speed [mph]", levels, mph, a_w, "a_w [m/s2]", 1.2)))
 
 

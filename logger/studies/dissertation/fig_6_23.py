@@ -15,6 +15,8 @@ PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 3
 """Table D.1: the speed on each segment."""
 PRINTED_KMH = {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
 PRINTED_SLOW_KMH = 32.2
+PRINTED_COMFORT = {"not_uncomfortable": "a majority", **dict.fromkeys(
+    ("a_little_uncomfortable", "fairly_uncomfortable", "uncomfortable"), "a place (Table 6.5)")}
 LOW_PASS_HZ = 15.0
 _MEDIAN_IRI, _SPREAD, _WAVINESS = 2.5, 0.4, 1.7
 _WINDOWS = 24
@@ -34,9 +36,9 @@ def run(effort: Effort) -> Result:
         _row(mph, [one for number, one in found.items() if PRINTED_MPH[number] == mph]) for mph in speeds))
     a_w = np.concatenate([one.a_w_mps2 for one in found.values()])
     shares = comfort_shares(a_w)
-    comfort = Table("Comfort of all windows", (Column("word of Table 2.5"), Column("printed (Fig 6.24)"),
+    comfort = Table("Comfort of all windows", (Column("word of Table 2.5"), Column("printed (6.5.2)"),
                                               Column("ours [% of windows]", ".1f")), tuple(
-        (word.replace("_", " "), "a majority" if word == "not_uncomfortable" else "some", share)
+        (word.replace("_", " "), PRINTED_COMFORT.get(word, "not named"), share)
         for word, share in shares.items()))
     slow = [row for row in by_speed.rows if float(str(row[0])) <= 20]
     verdict = ("Table D.1 agrees with itself: its two columns are one speed each. The records were never published, "
@@ -49,17 +51,17 @@ def run(effort: Effort) -> Result:
                "with GPS ridelog report draws both maps on the ground.")
     example = found[min(segments, key=lambda number: abs(number - _SHOWN))]
     return Result((by_speed, comfort, _scales()), verdict, (
-        Curves(f"Fig 6.21: IRI along segment {_SHOWN}. Printed: bars per 25 ft in the colours of the scale",
+        Curves(f"Fig 6.21: IRI along segment {_SHOWN}. Printed: an example, every 25 ft in the colours of the scale",
                "distance [m]", "IRI [m/km]", (
                    Line("exact", example.middle_m, example.exact_m_per_km),
                    Line("ridelog estimate", example.middle_m, example.iri_m_per_km, example.iri_std_m_per_km),
                    Line("r.m.s. relation", example.middle_m, example.by_rms_m_per_km))),
-        Curves(f"Fig 6.22: comfort along segment {_SHOWN}. Printed: bars per 25 ft in the colours of the scale",
+        Curves(f"Fig 6.22: comfort along segment {_SHOWN}. Printed: the same example",
                "distance [m]", "a_w [m/s2]", (Line("a_w", example.middle_m, example.a_w_mps2),),
                level=(0.315, "a little uncomfortable")),
-        _map("Fig 6.23: the roughness map as strips. Printed: the streets of College Park, coloured by IRI",
+        _map("Fig 6.23: the roughness map as strips. Printed: 37 streets around College Park, coloured",
              {number: one.by_rms_m_per_km for number, one in found.items()}, "IRI [m/km]", 6.0),
-        _map("Fig 6.24: the comfort map as strips. Printed: the same streets, coloured by a_w",
+        _map("Fig 6.24: the comfort map as strips. Printed: the same streets, coloured",
              {number: one.a_w_mps2 for number, one in found.items()}, "a_w [m/s2]", 0.5)), tuple(
         Value(f"Table D.1: {mph} mph [km/h]", kmh, mph * MPH_MPS / KMH_MPS, 0.005) for mph, kmh in PRINTED_KMH.items()))
 

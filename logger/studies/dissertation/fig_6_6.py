@@ -50,14 +50,14 @@ def run(effort: Effort) -> Result:
                 for mph, factor in zip(SPEEDS_MPH, factors, strict=True))
     axes, gd_axes = ("r.m.s. acceleration [m/s2]", "IRI [m/km]"), ("Gd(n0) [cm3]", "r.m.s. acceleration [m/s2]")
     loads = tuple(
-        Curves(f"{figure}: IRI by r.m.s. acceleration, {what}. Printed: the same lines, steeper", *axes, _fan(slopes))
+        Curves(f"{figure}: IRI by r.m.s., {what}. Printed: less response at every speed", *axes, _fan(slopes))
         for figure, what, slopes in (("Fig 6.7", "two people more", two), ("Fig 6.8", "twice the mass", heavy)))
     return Result((table, by_gd), verdict, (
-        Curves("Fig 6.4: r.m.s. acceleration by degree of roughness. Printed: points with power trendlines",
+        Curves("Fig 6.4: r.m.s. acceleration by degree of roughness. Printed: power trendlines, one a speed",
                *gd_axes, rms),
-        Curves("Fig 6.5: the same, logarithmic. Printed: parallel straight lines", *gd_axes, rms, log_x=True,
+        Curves("Fig 6.5: the same, logarithmic. Printed: the same", *gd_axes, rms, log_x=True,
                log_y=True),
-        Curves("Fig 6.6: IRI by r.m.s. acceleration. Printed: straight lines that fan out, the slowest steepest",
+        Curves("Fig 6.6: IRI by r.m.s. acceleration. Printed: a linear relation for each speed",
                *axes, _fan(own)), *loads))
 
 

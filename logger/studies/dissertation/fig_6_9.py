@@ -51,16 +51,16 @@ def run(effort: Effort) -> Result:
     shown = (place_m >= 0) & (place_m <= _LENGTH_M)
     x_mph = np.array(speeds, dtype=float)
     return Result((table, windows), verdict, (
-        Curves("Fig 6.9: the profile. Printed: a measured one of ProVAL", "distance [m]", "elevation [mm]",
+        Curves("Fig 6.9: the profile. Printed: one that a profiler measured", "distance [m]", "elevation [mm]",
                (Line("profile", place_m[shown], 1000 * road.elevation_m[shown]),)),
-        Curves(f"Fig 6.10: the response at {_WINDOWED_MPH} mph. Printed: the same of that profile", "distance [m]",
+        Curves(f"Fig 6.10: the response at {_WINDOWED_MPH} mph. Printed: the same of the half car", "distance [m]",
                "acceleration [m/s2]", (Line("response", drive.distance_m, drive.measured_mps2),)),
         Curves("Fig 6.11: error of the IRI by speed. Printed: too high at 10 mph, too low at 70", "speed [mph]",
                "error [%]", (*(Line(f"waviness {waviness:g}", x_mph, drift[:, index])
                                for index, waviness in enumerate(WAVINESS)), Line("ridelog estimate", x_mph, own)),
                level=(0.0, "exact")),
-        *(_compared(f"{figures}: windows of {window_m:.2f} m at {_WINDOWED_MPH} mph. Printed: exact and approximated, "
-                    "near each other", one)
+        *(_compared(f"{figures}: windows of {window_m:.2f} m at {_WINDOWED_MPH} mph. Printed: both, the approximation "
+                    "accurate", one)
           for figures, window_m, one in zip(("Fig 6.12, 6.13", "Fig 6.14, 6.15"), WINDOWS_M, cut, strict=True))))
 
 

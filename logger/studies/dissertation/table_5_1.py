@@ -36,7 +36,7 @@ def run(effort: Effort) -> Result:
                "0.0855 g (Eq 5.3) and 1.34 % of damping make some 0.05 g, ten times as much as 0.05 m/s2.")
     records = tuple(Line(sensor.name, *_shown(number)) for number, sensor in reversed(list(enumerate(SENSORS))))
     return Result((apart,), verdict, (
-        Curves("Fig 5.8: the first 15 s. Printed: both records, their peaks and phases alike", "time [s]",
+        Curves("Fig 5.8: the first 15 s. Printed: both records, peaks and phases alike", "time [s]",
                "acceleration [g]", records),), values)
 
 

@@ -38,7 +38,7 @@ def run(effort: Effort) -> Result:
               Value("mode 2 [Hz]", PRINTED_HZ[1], ps2119.peaks_hz[1], 0.1, Word.NOT_REPRODUCIBLE),
               Value("mode 3 [Hz]", PRINTED_HZ[2], ps2119.peaks_hz[2], 0.4, Word.NOT_REPRODUCIBLE),
               Value("damping ratio, Eq 5.3 [%]", PRINTED_DAMPING_PERCENT, 100 * ps2119.decrement.damping_ratio, 0.05))
-    spectra = Curves("Fig 5.9: spectra of both records. Printed: both transforms, with the same three peaks",
+    spectra = Curves("Fig 5.9: spectra of both records. Printed: both transforms, the same three peaks",
                      "frequency [Hz]", "mean power [(m/s2)2]", tuple(_line(number) for number in (1, 0)), log_y=True)
     return Result((table, damping), verdict, (spectra,), values)
 

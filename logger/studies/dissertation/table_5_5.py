@@ -47,8 +47,8 @@ def run(effort: Effort) -> Result:
                f"hump is the flank of the first. Front and rear wheels cancel each other {comb_hz:.1f} Hz apart at 40 "
                "km/h, so the model's second hump is a comb, of which the highest tooth counts. The roads' roughness "
                "is not told and was chosen.")
-    spectra = Curves("Fig 5.13, 5.15, 5.17, 5.19: summed spectra. Printed: one below each response, a hump at 1 to "
-                     "2.5 Hz and one at 12 to 14", "frequency [Hz]", "mean power [(m/s2)2]",
+    spectra = Curves("Fig 5.13, 5.15, 5.17, 5.19: summed spectra. Printed: peaks at 1 to "
+                     "2.5 Hz and at 12 to 14 Hz", "frequency [Hz]", "mean power [(m/s2)2]",
                      tuple(Line(printed[0], *_spectrum(accel))
                            for printed, accel in zip(PRINTED, records, strict=True)),
                      log_y=True)
