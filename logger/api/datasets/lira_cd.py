@@ -1,0 +1,196 @@
+"""LiRA-CD: electric cars on Danish roads, beside the road directorate's profiler (Skar et al., Data in Brief, 2023).
+
+Layout as the readers of the set's own users have it (github.com/rreezN/CrackDetect, Apache 2.0; names and columns alone
+were taken from there). ``platoon_CPH1_HH.hdf5``: group GM, below it trips, below those passes, each with signals (n, 2
+or more), seconds in the first column: ``acc.xyz`` [g], ``gps`` (latitude, longitude), ``spd_veh`` [km/h].
+``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for 10 m each, from ``Distance [m]``
+on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of another profiler, ARAN, with
+places. HH and VH are the two carriageways: two roads.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
+from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
+from logger.store.formats.semicolon_table import read_semicolons
+from logger.errors import BadInput
+from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.roads.agreement import best_shift_m, mean_between
+from logger.studies.study import Result, Table
+from logger.units import KMH_MPS
+
+Array = npt.NDArray[np.float64]
+
+_CAR = "sedan-2015"
+_CELL_M, _PLACE_EVERY_M = 10.0, 5.0
+_MOST_SHIFT_M = 30.0  # what a second's delay is at 110 km/h
+_LENGTHS_DIFFER = 0.2  # a window that is so much longer or shorter on the line was driven elsewhere
+_EXTRA = "expected the 'hdf5' extra to read {}: pip install 'ridelog[hdf5]' ({})"
+
+
+@dataclass(frozen=True, eq=False)
+class ProfiledRoad:
+    """A carriageway as P79 measured it: cells (k,) of 10 m, and its places; ARAN's IRI by its own places."""
+
+    name: str
+    edges_m: Array
+    left_m_per_km: Array
+    right_m_per_km: Array
+    line: MeasuredLine
+    aran_m: Array | None
+    aran_m_per_km: Array | None
+
+    @property
+    def iri_m_per_km(self) -> Array:
+        """The mean of both tracks (k,)."""
+        return (self.left_m_per_km + self.right_m_per_km) / 2
+
+
+def run(asked: Asked) -> Result:
+    """As ``RoadSet.run``."""
+    files = expected_files(asked.folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
+    parts: list[Compared] = []
+    refused: list[str] = []
+    repeats: list[Any] = []
+    for file in files:
+        road = profiled_road(asked.folder, file)
+        passes = asked.effort.some(recordings(file), 1)
+        found, left = each_pass(passes, lambda one: driven_windows(one, asked.vehicle or _CAR), asked.effort.progress)
+        refused += left
+        parts += [_placed(road, [one for _, one in found if one.window_m == window_m], window_m, moves)
+                  for window_m in WINDOWS_M for moves in (False, True)]
+        repeats += [row for window_m in WINDOWS_M for row in _repeats(road, window_m)]
+    tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
+    tables.append(Table("The profilers beside each other", REPEAT_COLUMNS, tuple(repeats)))
+    pictures = tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
+    return Result(tuple(tables), verdict_of(parts, refused, _CEILING), pictures)
+
+
+_CEILING = ("The profilers beside each other are the ceiling: no car can agree better with one of them than the other "
+            "does.")
+
+
+# --- files ---
+
+
+def recordings(file: Path) -> list[Recording]:
+    """The passes of a file. Raises BadInput for one that is not of this layout, or where HDF5 cannot be read."""
+    try:
+        import h5py
+    except ImportError as error:
+        raise BadInput(_EXTRA.format(file, error)) from None
+    try:
+        with h5py.File(file, "r") as read:
+            trips = read["GM"] if "GM" in read else None
+            if not isinstance(trips, h5py.Group):
+                raise BadInput(f"{file}: expected a group GM with the trips, found {', '.join(read)[:80] or 'nothing'}")
+            return [_recording(file, f"{trip}-{one}", group) for trip, passes in trips.items()
+                    for one, group in passes.items()]
+    except OSError as error:
+        raise BadInput(f"{file}: expected an HDF5 file, found {error}") from None
+
+
+def _recording(file: Path, name: str, group: Any) -> Recording:
+    def signal(key: str, columns: int) -> Array:
+        found = np.asarray(group[key][()], dtype=np.float64) if key in group else np.empty(0)
+        if found.ndim != 2 or found.shape[1] < columns or len(found) < 2:
+            size = " x ".join(map(str, found.shape)) if found.size else "nothing"
+            raise BadInput(f"{file}: {name}: expected {key} with {columns} columns, found {size}")
+        return found[np.argsort(found[:, 0], kind="stable")]
+
+    accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
+    inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
+    gps = gps[inside]
+    return Recording(name, accel[:, 0], accel[:, 1:4], "g", gps[:, 0],
+                     np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
+
+
+def profiled_road(folder: Path, cars: Path) -> ProfiledRoad:
+    """The profiler's files of the road of a file of cars. Raises BadInput."""
+    named = re.fullmatch(r"platoon_(\w+)_(HH|VH)", cars.stem, re.IGNORECASE)
+    if named is None:
+        raise BadInput(f"{cars}: expected a name like platoon_CPH1_HH.hdf5")
+    route, side = (one.lower() for one in named.groups())
+    iri, places = (expected_files(folder, f"{route}_{what}_{side}.csv", f"the profiler's {what} of {cars.name}")[0]
+                   for what in ("iri_mpd_rut", "zp"))
+    begin_m, left, right = read_semicolons(iri, ("Distance [m]", "IRI (5) [m/km]", "IRI (21) [m/km]"))
+    begin_m, first = np.unique(begin_m, return_index=True)
+    edges_m = np.append(begin_m, begin_m[-1] + _CELL_M)
+    holes = np.diff(edges_m) > 1.5 * _CELL_M  # a cell is 10 m long, also before a hole
+    left, right = (np.where(holes, np.nan, one[first]) for one in (left, right))
+    line = _line(places, *read_semicolons(places, ("Distance [m]", "Lat", "Lon")))
+    found = sorted(folder.rglob(f"{route}_aran_{side}.csv"))
+    aran = _aran(found[0], line) if found else (None, None)
+    return ProfiledRoad(f"{route.upper()} {side.upper()}", edges_m, left, right, line, *aran)
+
+
+def _line(path: Path, at_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLine:
+    known = np.isfinite(at_m) & (np.abs(lat_deg) > 1e-6) & (np.abs(lat_deg) <= 90) & (np.abs(lon_deg) <= 180)
+    at_m, lat_deg, lon_deg = at_m[known], lat_deg[known], lon_deg[known]
+    cell = np.floor(at_m / _PLACE_EVERY_M)
+    kept = np.unique(cell, return_index=True)[1]
+    try:
+        return MeasuredLine.of(at_m[kept], lat_deg[kept], lon_deg[kept])
+    except ValueError as error:
+        raise BadInput(f"{path}: {error}") from None
+
+
+def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
+    """ARAN's IRI, the mean of both tracks, and where on P79's line each of its rows begins."""
+    lat_deg, lon_deg, left, right = read_semicolons(path, ("Lat", "Lon", "Venstre IRI (m/km)", "Højre IRI (m/km)"))
+    known = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg)
+    at_m, aside_m = line.passed(lat_deg[known], lon_deg[known])
+    on = aside_m <= ASIDE_M
+    order = np.argsort(at_m[on], kind="stable")
+    at_m, values = at_m[on][order], ((left + right) / 2)[known][on][order]
+    grows = np.append(np.diff(at_m) > 1e-3, True)
+    return at_m[grows], values[grows]
+
+
+# --- the car, and one profiler beside the other ---
+
+
+def _placed(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, moves: bool) -> Compared:
+    """Windows of all drives by their places on the line; ``moves``: each drive's moved along by what fits best."""
+    columns: list[Array] = []
+    for one in drives:
+        (begin_m, aside_m), (end_m, also_m) = (road.line.passed(*ends.T) for ends in (one.begin_deg, one.end_deg))
+        on = (np.maximum(aside_m, also_m) <= ASIDE_M) & (np.abs(end_m - begin_m - window_m) <= _LENGTHS_DIFFER * window_m)
+        begin_m, iri, std = begin_m[on], one.iri_m_per_km[on], one.iri_std_m_per_km[on]
+        end_m = begin_m + window_m
+        shift_m = best_shift_m(road.edges_m, road.iri_m_per_km, begin_m, end_m, iri, _MOST_SHIFT_M) if moves else 0.0
+        theirs = mean_between(road.edges_m, road.iri_m_per_km, begin_m + shift_m, end_m + shift_m)
+        columns.append(np.stack([begin_m, iri, std, theirs]))
+    whole = np.concatenate(columns, axis=1) if columns else np.empty((4, 0))
+    return Compared(road.name, window_m, *whole, what="car, moved along to fit" if moves else "car")
+
+
+def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
+    begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
+    left, right, both = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
+                         for one in (road.left_m_per_km, road.right_m_per_km, road.iri_m_per_km))
+    rows = [repeat_row(road.name, f"P79, right track beside left, {window_m:g} m", right, left)]
+    if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
+        edges_m, values = np.append(road.aran_m, road.aran_m[-1] + _CELL_M), road.aran_m_per_km
+        shift_m = best_shift_m(edges_m, values, begin_m, begin_m + window_m, both, _MOST_SHIFT_M)
+        theirs = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
+        rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", theirs, both, shift_m))
+    return rows
+
+
+SET = RoadSet(
+    "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "LiRA-CD, Skar et al. 2023",
+    "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie where the "
+    "receiver says. The cars are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless "
+    "--vehicle names another. The real files have not been run here; the reader is tested on small files of the same "
+    "layout.",
+    "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read", run)

@@ -1,0 +1,103 @@
+"""Passes of a reference profiler over one road, IRI per 10 m: how well a profiler repeats itself.
+
+Layout of github.com/peacefulotter/LiRA-Map (MIT), ``server/backup/trip_iri_*.json``, compressed or not: ``path.data`` is
+a list of ``{"pos": {"lat", "lng"}, "timestamp": metres from the start, "value": IRI [m/km]}``. What the files are is not
+said there; it is inferred from names and content.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from itertools import combinations
+from pathlib import Path
+from zlib import error as ZlibError
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_tables import REPEAT_COLUMNS, repeat_row
+from logger.chart_data import Curves, Line
+from logger.errors import BadInput
+from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.files import read_bounded
+from logger.roads.agreement import best_shift_m, mean_between
+from logger.studies.study import Column, Result, Table
+
+Array = npt.NDArray[np.float64]
+
+PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
+_WINDOWS_M = (10.0, 100.0)
+_MOST_SHIFT_M = 10.0  # a cell
+_MOST_BYTES = 64 << 20
+
+
+class ProfilerPass:
+    """Cells (k,) of 10 m with their IRI [m/km], and the places at which they begin."""
+
+    def __init__(self, path: Path) -> None:
+        data = read_bounded(path, _MOST_BYTES)
+        try:
+            points = json.loads(gzip.decompress(data) if path.suffix == ".gz" else data)["path"]["data"]
+            rows = np.array([(float(one["timestamp"]), one["value"], one["pos"]["lat"], one["pos"]["lng"])
+                             for one in points], dtype=np.float64)
+            at_m, self.iri_m_per_km, lat_deg, lon_deg = rows.T
+            self.line = MeasuredLine.of(at_m, lat_deg, lon_deg)
+        except (KeyError, TypeError, ValueError, OSError, EOFError, ZlibError) as error:
+            raise BadInput(f"{path}: expected path.data with pos, timestamp (metres, growing) and value, found "
+                           f"{type(error).__name__}: {str(error)[:80]}") from None
+        self.name = path.name.split(".")[0].removeprefix("trip_iri_")
+        self.begin_m, self.lat_deg, self.lon_deg = at_m, lat_deg, lon_deg
+        self.edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
+
+
+def run(asked: Asked) -> Result:
+    """As ``RoadSet.run``."""
+    passes = [ProfilerPass(expected_files(asked.folder, f"{name}.json*", "a pass of the profiler")[0])
+              for name in PASSES]
+    pairs = list(asked.effort.each(list(combinations(passes, 2))))
+    tables, ours, off_m_per_km = [], [], []
+    for window_m in _WINDOWS_M:
+        rows = [_beside(one, other, window_m) for one, other in pairs]
+        tables.append(Table(f"Windows of {window_m:g} m", REPEAT_COLUMNS, tuple(rows)))
+        ours.append([row[3] for row in rows])
+        off_m_per_km.append(max(float(row[8]) for row in rows if isinstance(row[8], float)))
+    length = Table("The passes", (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f")), tuple(
+        (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
+    spans = ["{:.3f} to {:.3f}".format(*(f(one) for f in (min, max))) for one in ours]
+    verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m; two passes "
+               f"differ by up to {off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be "
+               "better than that against one pass: it is the ceiling of every comparison on real roads.")
+    return Result((*tables, length), verdict, (_picture(passes),))
+
+
+def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> tuple[str | float | None, ...]:
+    """The other pass on the distance of the one, moved along by what fits best."""
+    at_m, aside_m = one.line.passed(other.lat_deg, other.lon_deg)
+    step_m = float(np.median(np.diff(other.begin_m)))
+    on = (aside_m <= ASIDE_M) & (np.append(np.diff(at_m), step_m) > 0.5 * step_m)
+    at_m, values = np.maximum.accumulate(at_m[on]), other.iri_m_per_km[on]
+    grows = np.append(np.diff(at_m) > 0, True)
+    edges_m = np.append(at_m[grows], at_m[-1] + step_m)
+    values = values[grows]
+    begin_m = np.arange(max(one.edges_m[0], edges_m[0]), min(one.edges_m[-1], edges_m[-1]) - window_m + 1, window_m)
+    mine = mean_between(one.edges_m, one.iri_m_per_km, begin_m, begin_m + window_m)
+    shift_m = best_shift_m(edges_m, values, begin_m, begin_m + window_m, mine, _MOST_SHIFT_M)
+    theirs = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
+    return repeat_row("one road", f"{other.name} beside {one.name}", theirs, mine, shift_m)
+
+
+def _picture(passes: list[ProfilerPass]) -> Curves:
+    lines = []
+    for one in passes:
+        begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - 99, 100.0)
+        lines.append(Line(one.name, begin_m / 1000, mean_between(one.edges_m, one.iri_m_per_km, begin_m, begin_m + 100)))
+    return Curves("Three passes, IRI over 100 m", "along the road [km]", "IRI [m/km]", tuple(lines))
+
+
+SET = RoadSet(
+    "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "peacefulotter/LiRA-Map",
+    "Three passes over some 26 km of Danish road. One is laid on the distance of the other by its places, and moved "
+    "along by up to 10 m so that both fit best. This was run on the real files.",
+    "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read", run)

@@ -1,0 +1,146 @@
+"""Zenodo 4386256: phones in two cars on three roads of Massachusetts, beside laser profiles (Botshekan et al., CC0).
+
+Layout as a reader of the set has it (github.com/JMMA84/DIMMIT-V1; names alone were taken from there), files of MATLAB:
+``*-2019-*.mat``, one trip each: ``t`` [s], ``x``, ``y``, ``z`` (acceleration with gravity, 100 Hz), ``speedMS`` [m/s],
+``LAT``, ``LON``. ``road_elevation_NB_SB.mat``: ``dist`` [km] and ``elevation`` [cm], northbound, then southbound.
+``road_elevation_concord.mat``: the same of Route 2. ``geopoint_*.mat``: the places of those, evenly spread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
+from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
+from logger.errors import BadInput
+from logger.geodesy import EARTH_RADIUS_M
+from logger.store.formats.mat_file import read_arrays, read_geopoint
+from logger.studies.study import Result
+
+Array = npt.NDArray[np.float64]
+
+_CAR = "sedan-2015"
+_BOTH = "road_elevation_NB_SB.mat"
+_ROADS = (
+    ("Massachusetts Avenue, north", _BOTH, 0, "geopoint_Massachusetts_NB_INSIDE.mat"),
+    ("Massachusetts Avenue, south", _BOTH, 1, "geopoint_Massachusetts_SB_INSIDE.mat"),
+    ("Route 2, Concord", "road_elevation_concord.mat", 0, "geopoint_ConcordTurnpike_LongLoop_MIDDLE.mat"),
+)
+_TRIP = ("t", "x", "y", "z", "speedMS", "LAT", "LON")
+_FIX_S = 1.0  # places come at the phone's 100 Hz, of a receiver that has one a second
+_UNEVEN = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class LaserRoad:
+    """A profile (n,) with a place for each of its points."""
+
+    name: str
+    spacing_m: float
+    elevation_m: Array
+    lat_deg: Array
+    lon_deg: Array
+
+    def write(self, path: Path) -> None:
+        """As a profile with places."""
+        columns = (self.spacing_m * np.arange(len(self.elevation_m)), self.elevation_m, self.lat_deg, self.lon_deg)
+        np.savetxt(path, np.column_stack(columns), fmt="%.10g", delimiter=",", comments="",
+                   header="distance_m,elevation_m,lat_deg,lon_deg")
+
+
+def run(asked: Asked) -> Result:
+    """As ``RoadSet.run``."""
+    roads = laser_roads(asked.folder)
+    trips = [trip(one) for one in expected_files(asked.folder, "*-2019-*.mat", "the phones' trips")]
+    found: list[tuple[str, DrivenWindows]] = []
+    refused: list[str] = []
+    pairs = asked.effort.some([(road, one) for road in roads for one in trips], 1)
+    with TemporaryDirectory() as scratch:
+        for number, road in enumerate(roads):
+            line = Path(scratch) / f"profile-{number}.csv"
+            road.write(line)
+            mine = [one for each, one in pairs if each is road]
+            try:
+                windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
+                    one, asked.vehicle or _CAR, profile=line), asked.effort.progress)
+            except BadInput as error:
+                refused.append(str(error))
+                continue
+            found += [(road.name, one) for _, one in windows]
+            refused += [one for one in left if "aside of it" not in one and "end to its beginning" not in one]
+    parts = [part for road in roads for window_m in WINDOWS_M
+             if (part := _together(road.name, window_m, found)) is not None]
+    if not parts:
+        raise BadInput(f"{asked.folder}: expected trips on the profiled roads, found none; {refused[0]}")
+    low, high = (f"{REPEAT_R2[window_m][0]:.2f} to {REPEAT_R2[window_m][1]:.2f}" for window_m in WINDOWS_M)
+    return Result(tuple(compared_table(parts, window_m) for window_m in WINDOWS_M), verdict_of(parts, refused, (
+        f"The set holds one profile of each road, no repeat; passes of another profiler repeat each other with R2 {low} "
+        f"per 10 m and {high} per 100 m (lira-map).")), tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))
+
+
+def laser_roads(folder: Path) -> list[LaserRoad]:
+    """The three roads. Raises BadInput and FileNotFoundError."""
+    return [_laser_road(name, *(expected_files(folder, file, what)[0] for file, what in (
+        (elevation, "the laser profiles"), (places, "their places"))), half) for name, elevation, half, places in _ROADS]
+
+
+def _laser_road(name: str, elevation: Path, places: Path, half: int) -> LaserRoad:
+    at_km, elevation_cm = read_arrays(elevation, ("dist", "elevation"))
+    if len(at_km) != len(elevation_cm):
+        raise BadInput(f"{elevation}: expected dist and elevation of one length, found {len(at_km)} and "
+                       f"{len(elevation_cm)}")
+    if elevation.name == _BOTH:
+        middle = len(at_km) // 2
+        part = slice(half * middle, (half + 1) * middle)
+        at_km, elevation_cm = at_km[part], elevation_cm[part]
+    at_m, elevation_m = 1000.0 * (at_km - at_km[0]), elevation_cm / 100.0
+    spacing_m = float(at_m[-1]) / (len(at_m) - 1)
+    if not spacing_m > 0 or np.abs(np.diff(at_m) / spacing_m - 1).max() > _UNEVEN:
+        raise BadInput(f"{elevation}: expected dist evenly spaced, found steps of {np.diff(at_m).min():.4g} to "
+                       f"{np.diff(at_m).max():.4g} m")
+    lat_deg, lon_deg = read_geopoint(places)
+    north_m, east_m = (EARTH_RADIUS_M * np.radians(np.diff(one)) for one in (lat_deg, lon_deg))
+    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(north_m, east_m * np.cos(np.radians(lat_deg[0]))))])
+    if not way_m[-1] > 0:
+        raise BadInput(f"{places}: expected places along a road, found one place")
+    along_m = way_m * (at_m[-1] / way_m[-1])  # both are the whole road
+    return LaserRoad(name, spacing_m, elevation_m, *(np.interp(at_m, along_m, one) for one in (lat_deg, lon_deg)))
+
+
+def trip(file: Path) -> Recording:
+    """A phone's record. Raises BadInput."""
+    columns = read_arrays(file, _TRIP)
+    if len(set(map(len, columns))) > 1:
+        raise BadInput(f"{file}: expected {', '.join(_TRIP)} of one length, found "
+                       f"{', '.join(str(len(one)) for one in columns)}")
+    time_s, x, y, z, speed_mps, lat_deg, lon_deg = columns
+    size = float(np.median(np.sqrt(x**2 + y**2 + z**2)))
+    unit = "g" if size < 5 else "m/s2"  # what gravity is in them
+    fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
+    second = np.floor((time_s - time_s[0]) / _FIX_S)
+    kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
+    return Recording(file.stem, time_s, np.column_stack([x, y, z]), unit, time_s[kept], speed_mps[kept], lat_deg[kept],
+                     lon_deg[kept])
+
+
+def _together(road: str, window_m: float, found: list[tuple[str, DrivenWindows]]) -> Compared | None:
+    chosen = [one for name, one in found if name == road and one.window_m == window_m]
+    if not chosen:
+        return None
+    return Compared(road, window_m, *(np.concatenate([getattr(one, name) for one in chosen]) for name in (
+        "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km")))
+
+
+SET = RoadSet(
+    "zenodo_4386256", "Phones at 100 Hz beside laser profiles, 10 m and 100 m", "Zenodo 4386256, Botshekan et al.",
+    "Each trip goes the way of any recording: extract --csv --profile lays it on the laser profile, by the phone's "
+    "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
+    "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The real files have not "
+    "been run here; the reader is tested on small files of the same layout.",
+    "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder", run)
