@@ -1,11 +1,13 @@
-"""Reproduce a table or a figure of the reference dissertation beside its printed values.
+"""Reproduce a table or a figure of the reference dissertation, or of other papers, beside its printed values.
 
   ridelog study --list
   ridelog study table-4-4
   ridelog study fig-4-27 --out fig-4-27.html
+  ridelog study all --quick --out studies
+  ridelog study all --shelf field --out studies
 
-Where the dissertation measured, the study simulates under the conditions that its text gives: the records were never
-published.
+Each study ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation measured, the
+study simulates under the conditions that its text gives: the records were never published.
 """
 
 from __future__ import annotations
@@ -18,31 +20,35 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from logger.errors import EXIT_DONE, BadInput
-from logger.files import write_text
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.files import naming, write_text
 
 if TYPE_CHECKING:
     from logger.chart_data import Curves, Field
     from logger.studies.study import Cell, Result, Study, Table
 
 QUICK_SHARE = 0.1
+SHELF_NAMES = ("dissertation", "field")
 _WIDTH = 118
 _BAR = 30
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", metavar="NAME", help="the study, as --list names it")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="the study, as --list names it, or all")
+    parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="the data of a study that needs some")
     parser.add_argument("--list", action="store_true", help="list the studies there are")
+    parser.add_argument("--shelf", choices=SHELF_NAMES, help="only this shelf: the dissertation's, or other papers'")
     parser.add_argument("--quick", action="store_true", help="a tenth of the draws and grid points")
-    parser.add_argument("--out", type=Path, metavar="FILE.html", help="also write a page with tables and pictures")
+    parser.add_argument("--out", type=Path, metavar="PLACE",
+                        help="also write a page with tables and pictures; for all: a folder of pages with index.html")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog study``."""
-    from logger.studies.study import Effort, studies, study_of
+    from logger.studies.study import studies, study_of
 
-    known = studies()
+    known = studies(args.shelf)
     if args.list:
         if args.name is not None:
             raise BadInput(f"study --list: expected no NAME beside it, found {args.name}")
@@ -52,10 +58,21 @@ def run(args: argparse.Namespace) -> int:
         _list(list(known.values()), args.json)
         return EXIT_DONE
     if args.name is None:
-        raise BadInput("study: expected the NAME of a study, or --list")
-    study = study_of(args.name, known)
+        raise BadInput("study: expected the NAME of a study, all, or --list")
+    if args.name == "all":
+        return _all(list(known.values()), args)
+    return _one(study_of(args.name, known), args)
+
+
+def _one(study: Study, args: argparse.Namespace) -> int:
+    from logger.studies.study import Effort
+
+    if study.data and args.folder is None:
+        raise BadInput(f"study {study.called}: expected the folder DIR of {study.data}")
+    if not study.data and args.folder is not None:
+        raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
     tell = show_progress if sys.stderr.isatty() else _say_nothing
-    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell))
+    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell, args.folder))
     if args.out is not None:
         from logger.report.study_page import page
 
@@ -66,7 +83,37 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(lines(study, result)))
         if args.out is not None:
             print(f"\nPage: {args.out}")
-    return EXIT_DONE
+    return EXIT_CHECK_FAILED if study.differs(result) else EXIT_DONE
+
+
+def _all(known: list[Study], args: argparse.Namespace) -> int:
+    """Every study that needs no data of its own; pages of each and of all."""
+    from logger.report.study_page import index, page
+    from logger.studies.all_studies import carry_out_all
+
+    if args.out is None:
+        raise BadInput("study all: expected --out DIR, a folder for its pages")
+    if args.folder is not None:
+        raise BadInput(f"study all: expected no DIR, found {args.folder}")
+    with naming(args.out):
+        args.out.mkdir(parents=True, exist_ok=True)
+    chosen = [one for one in known if not one.data]
+    carried = {}
+    for study, found in carry_out_all(chosen, QUICK_SHARE if args.quick else 1.0):
+        carried[study.called] = found
+        if found.result is not None:
+            write_text(args.out / f"{study.called}.html", page(study, found.result))
+        print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
+              f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
+    write_text(args.out / "index.html", index(known, carried))
+    failed = [one for one in chosen if carried[one.called].failure]
+    if args.json:
+        print(json.dumps({"page": str(args.out / "index.html"), "studies": [
+            {**_in_short(one), "seconds": round(carried[one.called].seconds, 2),
+             "failure": carried[one.called].failure or None} for one in chosen]}))
+    else:
+        print(f"{len(chosen)} studies, {len(failed)} not as they state. Page: {args.out / 'index.html'}")
+    return EXIT_CHECK_FAILED if failed else EXIT_DONE
 
 
 def show_progress(done: int, of: int) -> None:
@@ -82,11 +129,19 @@ def _say_nothing(_done: int, _of: int) -> None:
 
 def _list(known: list[Study], wants_json: bool) -> None:
     if wants_json:
-        print(json.dumps({"studies": [{"name": one.called, "where": one.where, "title": one.title} for one in known]}))
+        print(json.dumps({"studies": [_in_short(one) for one in known]}))
         return
-    name, where = (max(len(getattr(one, what)) for one in known) for what in ("called", "where"))
+    if not known:
+        print("No studies on this shelf.")
+        return
+    name, where, word = (max(len(getattr(one, what)) for one in known) for what in ("called", "where", "word"))
     for one in known:
-        print(f"{one.called:{name}}  {one.where:{where}}  {one.title}")
+        print(f"{one.called:{name}}  {one.word:{word}}  {one.where:{where}}  {one.title}")
+
+
+def _in_short(study: Study) -> dict[str, Any]:
+    return {"name": study.called, "where": study.where, "title": study.title, "covers": list(study.covers),
+            "word": str(study.word), "because": study.because}
 
 
 # --- what is shown ---
@@ -95,9 +150,10 @@ def _list(known: list[Study], wants_json: bool) -> None:
 def lines(study: Study, result: Result) -> list[str]:
     """What a person reads."""
     shown = [f"{study.where}: {study.title}", fill(study.how, _WIDTH)]
-    for table in result.tables:
+    for table in result.all_tables:
         shown += ["", table.title, *_table_lines(table)]
-    return [*shown, "", fill(result.verdict, _WIDTH)]
+    word = fill(study.differs(result) or f"{str(study.word).capitalize()}: {study.because}", _WIDTH)
+    return [*shown, "", word, "", fill(result.verdict, _WIDTH)]
 
 
 def _table_lines(table: Table) -> list[str]:
@@ -117,9 +173,10 @@ def _table_lines(table: Table) -> list[str]:
 def as_json(study: Study, result: Result) -> dict[str, Any]:
     """All of it for a program; null for what is not there or has no number."""
     return {
-        "study": study.called, "title": study.title, "where": study.where, "how": study.how,
+        "study": study.called, **{key: value for key, value in _in_short(study).items() if key != "name"},
+        "how": study.how, "source": study.source, "failure": study.differs(result) or None,
         "tables": [{"title": table.title, "columns": [column.name for column in table.columns],
-                    "rows": [[_known(cell) for cell in row] for row in table.rows]} for table in result.tables],
+                    "rows": [[_known(cell) for cell in row] for row in table.rows]} for table in result.all_tables],
         "verdict": result.verdict, "figures": [_figure(one) for one in result.pictures],
     }
 

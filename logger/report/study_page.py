@@ -1,20 +1,64 @@
-"""The page of a study: its tables and pictures, self-contained, in the style of the report."""
+"""Pages of studies: one study with its tables and pictures, and all of them with a table of contents.
+
+Self-contained, in the style of the report.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from logger.report.charts import chart
-from logger.report.document import document, grid, heading, paragraphs, section
-from logger.report.html import Html, concatenated
-from logger.studies.study import Result, Study, Table
+from logger.report.document import document, grid, heading, paragraphs, section, tiles
+from logger.report.html import Html, concatenated, html
+from logger.studies.all_studies import Carried
+from logger.studies.study import Result, Study, Table, Word
+
+_NOT_RUN = "not run"
+_FAILED = "failed"
+_STYLE = "th,td{vertical-align:top}td:nth-child(4),td:nth-child(2){min-width:12em}"
 
 
 def page(study: Study, result: Result) -> Html:
     """The study as one HTML document."""
+    word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
     return document(f"{study.where}: {study.title}", [
-        heading(study.title, f"{study.where} of N. Blum, dissertation, University of Maryland, 2015"),
-        paragraphs([result.verdict]), *map(_table, result.tables),
+        heading(study.title, f"{study.where} of {study.source}"),
+        paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
         section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))])
+
+
+def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
+    """The table of contents of studies whose pages lie beside it, with the word of each; ``carried`` by the studies'
+    names, without those that were not run."""
+    words = {one.called: _word(one, carried.get(one.called)) for one in known}
+    counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
+    rows = [(", ".join(one.covers), _link(one, carried.get(one.called)), words[one.called],
+             _because(one, carried.get(one.called)),
+             f"{carried[one.called].seconds:.1f}" if one.called in carried else "-") for one in known]
+    sources = sorted({one.source for one in known})
+    return document("Studies", [
+        heading("Studies: printed results, made again", "; ".join(sources)),
+        tiles(tile for tile in counts if tile[1] != "0"),
+        section("Contents", grid(("printed", "study", "word", "because", "time [s]"), rows, range(4)))], style=_STYLE)
+
+
+def _word(study: Study, found: Carried | None) -> str:
+    if found is None:
+        return _NOT_RUN
+    return _FAILED if found.failure else str(study.word)
+
+
+def _because(study: Study, found: Carried | None) -> str:
+    if found is None:
+        return f"Needs {study.data}: ridelog study {study.called} DIR."
+    return found.failure or study.because
+
+
+def _link(study: Study, found: Carried | None) -> Html:
+    if found is None or found.result is None:
+        return html("{}", study.title)
+    return html('<a href="{}.html">{}</a>', study.called, study.title)
 
 
 def _table(table: Table) -> Html:

@@ -1,15 +1,17 @@
-"""What a study is: a table or a figure of the reference dissertation, made again and set beside what is printed there.
+"""What a study is: a table or a figure that was printed, made again and set beside what is printed there.
 
-Every file of ``logger/studies/dissertation`` is one, offered as ``STUDY``. A study holds the printed values in its
-tables, so that what is ours is never seen without them, and says in a sentence what agrees, what does not, and why.
-The records that the dissertation measured were never published: where it measured, a study simulates under the
-conditions that the text gives, and says so.
+Every file of a shelf's folder is one, offered as ``STUDY``. A study holds the printed values, so that what is ours is
+never seen without them, says in a word and a sentence how they agree, and why where they do not. The records that the
+dissertation measured were never published: where it measured, a study simulates under the conditions that the text
+gives, and says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -23,7 +25,19 @@ Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 Cell = str | float | None
 
-PACKAGE, OFFER = "logger.studies.dissertation", "STUDY"
+OFFER = "STUDY"
+SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studies.field"}
+"""Folders of studies: of the reference dissertation, and of other papers and data that a reader knows."""
+DISSERTATION = "N. Blum, dissertation, University of Maryland, 2015"
+
+
+class Word(StrEnum):
+    """How a study's result stands beside the print."""
+
+    AGREES = "agrees"
+    MISPRINT = "misprint"
+    BETTER = "better"
+    NOT_REPRODUCIBLE = "not reproducible"
 
 
 def _silent(_done: int, _of: int) -> None:
@@ -36,10 +50,12 @@ class Effort:
 
     share       of the full number of draws and grid points, above 0, up to 1
     progress    called with how many of how many parts are done
+    folder      of the data, for a study that needs some (``Study.data``)
     """
 
     share: float = 1.0
     progress: Callable[[int, int], None] = _silent
+    folder: Path | None = None
 
     def count(self, full: int, least: int = 2) -> int:
         """How many draws to make instead of ``full``."""
@@ -82,23 +98,67 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Value:
+    """A printed value beside ours, and how far apart they may lie.
+
+    name         what it is, with its unit in brackets
+    tolerance    of the difference, in the value's unit
+    word         AGREES, NOT_REPRODUCIBLE: ours lies within the tolerance of the print. MISPRINT: ours lies farther off
+                 than that. BETTER: the value is an error (a scatter, a bias), and ours is smaller than the print by at
+                 least the tolerance
+    """
+
+    name: str
+    printed: float
+    ours: float
+    tolerance: float
+    word: Word = Word.AGREES
+
+    @property
+    def holds(self) -> bool:
+        """Whether ours stands beside the print as ``word`` says."""
+        if self.word is Word.BETTER:
+            return abs(self.ours) <= abs(self.printed) - self.tolerance
+        return (abs(self.ours - self.printed) <= self.tolerance) != (self.word is Word.MISPRINT)
+
+
+@dataclass(frozen=True)
 class Result:
-    """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures."""
+    """What a study found: tables, printed beside ours; what agrees and what does not, and why; pictures; the printed
+    values that can be checked."""
 
     tables: tuple[Table, ...]
     verdict: str
     pictures: tuple[Chart, ...] = ()
+    values: tuple[Value, ...] = ()
+
+    @property
+    def all_tables(self) -> tuple[Table, ...]:
+        """The checked values first, where there are any."""
+        return (_checked(self.values), *self.tables) if self.values else self.tables
+
+
+def _checked(values: Sequence[Value]) -> Table:
+    rows = tuple((one.name, one.printed, one.ours, one.ours - one.printed, one.tolerance,
+                  str(one.word) if one.holds else f"expected: {one.word}") for one in values)
+    return Table("Printed and ours", (Column("value"), Column("printed", ".5g"), Column("ours", ".5g"), Column(
+        "difference", "+.3g"), Column("tolerance", ".2g"), Column("word")), rows)
 
 
 @dataclass(frozen=True)
 class Study:
-    """One table or figure of the dissertation.
+    """A printed table, figure or statement.
 
-    name     as its file is called; people write it with - for _
-    title    what it shows
-    where    its place in the dissertation
-    how      under which conditions it is made again here, and what is simulated that was measured there
-    run      make it
+    name       as its file is called; people write it with - for _
+    title      what it shows
+    where      its place in what was printed
+    how        under which conditions it is made again here, and what is simulated that was measured there
+    run        make it
+    covers     the printed items that it holds, each "Table 4.4", "Fig 4.26" or "7.2 full car"
+    word       how ours stands beside the print
+    because    the reason for the word, one sentence
+    source     who printed it
+    data       what a person has to download before it can run; empty: nothing
     """
 
     name: str
@@ -106,6 +166,17 @@ class Study:
     where: str
     how: str
     run: Callable[[Effort], Result]
+    covers: tuple[str, ...]
+    word: Word
+    because: str
+    source: str = DISSERTATION
+    data: str = ""
+
+    def differs(self, result: Result) -> str:
+        """A sentence that names the values which do not stand beside the print as they should; empty: all do."""
+        wrong = [f"{one.name} ({one.ours:.5g}, printed {one.printed:.5g}, tolerance {one.tolerance:.2g}, expected: "
+                 f"{one.word})" for one in result.values if not one.holds]
+        return f"Not as this study states: {'; '.join(wrong)}." if wrong else ""
 
     @property
     def called(self) -> str:
@@ -113,20 +184,31 @@ class Study:
         return self.name.replace("_", "-")
 
 
-def studies() -> dict[str, Study]:
-    """All there are, by the names that people write, in the order of the dissertation."""
-    found: Iterable[Study] = catalogue(PACKAGE, OFFER).values()
-    return {one.called: one for one in sorted(found, key=lambda one: _order(one.name))}
+def studies(shelf: str | None = None) -> dict[str, Study]:
+    """All of a shelf, or of all shelves, by the names that people write; the dissertation's in its order."""
+    shelves = SHELVES.values() if shelf is None else [SHELVES[shelf]]
+    found: Iterable[Study] = (one for package in shelves
+                              for one in sorted(catalogue(package, OFFER).values(), key=lambda one: _order(one.name)))
+    return {one.called: one for one in found}
 
 
 def study_of(name: str, among: Mapping[str, Study]) -> Study:
-    """The study of a name, written with - or _. Raises BadInput, which lists the names there are."""
+    """The study of a name, or of an item that it covers (``table-4-5``), written with - or _.
+
+    Raises BadInput, which lists the names there are.
+    """
     called = name.strip().lower().replace("_", "-")
-    if called not in among:
+    items = {slug(item): one for one in among.values() for item in one.covers}
+    if called not in among and called not in items:
         raise BadInput(f"study {name!r}: expected one of {', '.join(among)}")
-    return among[called]
+    return among.get(called) or items[called]
+
+
+def slug(item: str) -> str:
+    """An item as people may write it: ``fig-4-26`` for Fig 4.26."""
+    return item.lower().replace(" ", "-").replace(".", "-")
 
 
 def _order(name: str) -> tuple[list[int], str]:
-    kind, *numbers = name.split("_")
-    return [int(number) for number in numbers], kind
+    """By the numbers in a name, then by its words."""
+    return [int(part) for part in name.split("_") if part.isdigit()], name

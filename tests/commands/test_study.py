@@ -20,7 +20,9 @@ def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["studies"]
     assert len(listed) == len(text.splitlines())
-    assert set(listed[0]) == {"name", "where", "title"}
+    assert set(listed[0]) == {"name", "where", "title", "covers", "word", "because"}
+    assert main(["study", "--list", "--shelf", "field"]) == 0
+    assert "table-4-4" not in capsys.readouterr().out
 
 
 def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,7 +39,9 @@ def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFix
 def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "fig-4-25", "--quick", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["study", "title", "where", "how", "tables", "verdict", "figures"]
+    assert list(told) == ["study", "where", "title", "covers", "word", "because", "how", "source", "failure", "tables",
+                          "verdict", "figures"]
+    assert told["failure"] is None
     table = told["tables"][0]
     assert all(len(row) == len(table["columns"]) for row in table["rows"])
     assert told["figures"][0]["lines"][0]["name"] == "102 mm"
@@ -45,9 +49,10 @@ def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
-    [(["table-9-9"], "study 'table-9-9': expected one of fig-2-13"), ([], "expected the NAME of a study, or --list"),
+    [(["table-9-9"], "study 'table-9-9': expected one of fig-2-13"), ([], "expected the NAME of a study, all, or --list"),
      (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
-     (["--list", "--quick"], "--quick: expected a NAME with it")],
+     (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
+     (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],
 )
 def test_wrong_use(arguments: list[str], complaint: str) -> None:
     with pytest.raises(BadInput, match=complaint):

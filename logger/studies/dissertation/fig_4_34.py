@@ -8,7 +8,7 @@ from logger.chart_data import Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.studies.drives import BRIDGE_MPS, RATE_HZ, STEP_M, Array, Conditions, bridge, record_of
-from logger.studies.study import Column, Effort, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
 
 PRINTED_PEAK_MPS2 = 1.5
 SECTIONS_M = (1.0, 10.0)
@@ -50,4 +50,7 @@ def _per_section(seed: int) -> list[Array]:
 
 STUDY = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m", "Fig 4.34 (and 4.35), section 4.4.6",
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
-              run)
+              run,
+              covers=("Fig 4.34", "Fig 4.35"), word=Word.NOT_REPRODUCIBLE,
+              because="Road and filter of the figure are not printed; simulated under its conditions the discomfort "
+                      "per metre is of the printed size.")

@@ -6,7 +6,7 @@ from logger.chart_data import Curves, Line
 from logger.estimation.rms_calibration import PASSENGER_KG, Settings, calibrate, loaded
 from logger.estimation.rms_relation import rms_relation
 from logger.studies.drives import rav4
-from logger.studies.study import Column, Effort, Result, Study, Table
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
 from logger.units import MPH_MPS
 from logger.vehicle.linearise import known_vehicle
 
@@ -43,4 +43,7 @@ def run(effort: Effort) -> Result:
 STUDY = Study("fig_6_6", "IRI per r.m.s. acceleration at each speed, and what load does to it",
               "Fig 6.6 (and 6.7, 6.8), section 6.3",
               "Computed from the half car of Table 4.2 and the spectrum of ISO 8608, and from simulated drives over "
-              "random roads of IRI 1 to 10 m/km as in the source.", run)
+              "random roads of IRI 1 to 10 m/km as in the source.", run,
+              covers=("Fig 6.6", "Fig 6.7", "Fig 6.8"), word=Word.AGREES,
+              because="One line through the origin for each speed, the flatter the faster, and more mass makes it "
+                      "steeper, as drawn.")

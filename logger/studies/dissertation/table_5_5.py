@@ -4,7 +4,7 @@ import numpy as np
 
 from logger.modal.spectral_peaks import summed_spectrum
 from logger.studies.drives import PS_2119, RATE_HZ, bump, record_of
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table
+from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
 from logger.units import STANDARD_GRAVITY_MPS2
 
 PRINTED = (("newly paved road", 40.2, 0.2017, 2.51, 13.57), ("rough road", 40.2, 0.8899, 1.01, 12.82),
@@ -57,4 +57,6 @@ def _bumps(place_m: np.ndarray) -> np.ndarray:
 STUDY = Study("table_5_5", "Resonances of the car on four surfaces", "Table 5.5, section 5.5.1",
               "The source measured. Simulated: the car of Table 4.2 for a minute on random roads of a roughness that "
               "was chosen, four bumps of 5.5.2 on the last; a PS-2119; f1 and f2 the highest bins of the summed "
-              "spectra of even segments of 2 s within 0.5 to 5 and 7 to 18 Hz.", run)
+              "spectra of even segments of 2 s within 0.5 to 5 and 7 to 18 Hz.", run,
+              covers=("Table 5.5",), word=Word.NOT_REPRODUCIBLE,
+              because="The records were never published; a simulated car shows peaks of the same kind.")

@@ -12,7 +12,7 @@ from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, PS_2119, STEP_M, bridge, record_of, without_profile
 from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, standard_error_percent
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table
+from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
 
 PRINTED = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
            ("2-1", 576.042, 34.17, 460.687, 47.35), ("2-2", 416.843, 52.36, 496.564, 43.25))
@@ -93,4 +93,6 @@ def _rms(values: Sequence[tuple[float, ...]]) -> list[float]:
 STUDY = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2",
               "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
               "with steps of 0.01 g, steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step "
-              "is estimated, too.", run)
+              "is estimated, too.", run,
+              covers=("Table 6.3", "Table 6.4"), word=Word.NOT_REPRODUCIBLE,
+              because="The records were never published; a flat input tells nothing of the mass, and ours refuses it.")
