@@ -1,7 +1,7 @@
 """A pass of a public record of roads, through the same path as any recording: CSV, extraction, estimate.
 
-Problem: a figure of a data set is worth what the program is worth only if the program's own path was gone: a reader that
-filters, levels and aligns on its own measures itself. Solution: a pass is written as the CSV files that a phone would
+Problem: a figure of a data set says something of the program only if the program's own path was gone: a reader that
+filters, levels and aligns by itself measures itself. Solution: a pass is written as the CSV files that a phone would
 have left, ``extract --csv`` makes its runs, ``estimate`` its windows; what is left here is where each window lies.
 """
 

@@ -1,70 +1,36 @@
-"""Public records of real roads: which there are, what a folder of each holds, and what is made of it.
+"""Studies of public records of real roads: what a folder has to hold, and what is said where it does not.
 
-Every file of ``logger/api/datasets`` knows one set, offered as ``SET``: it reads the folder that a person downloaded
-and compares what ridelog says of the car's acceleration with what a profiler measured. Nothing of a set is kept here.
+Every file of ``logger/api/datasets`` knows one set and offers a study of it: it reads the folder that a person
+downloaded and compares what ridelog says of the car's acceleration with what a profiler measured. Nothing of a set is
+kept here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 from logger.errors import BadInput
-from logger.plugins import catalogue
 from logger.studies.study import Effort, Result
 
-PACKAGE, OFFER = "logger.api.datasets", "SET"
+NOT_RUN = "Only a person can download the set: the real files have not been run here, and nothing is claimed of them."
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What is asked of a set: its folder; the car, a name or a file, None: what the set takes; how much work."""
+def from_folder(called: str, download: str, read: Callable[[Path, Effort], Result]) -> Callable[[Effort], Result]:
+    """A study's ``run`` that reads a folder: where that is not what it should be, it says where to download it.
 
-    folder: Path
-    vehicle: str | None
-    effort: Effort
-
-
-@dataclass(frozen=True)
-class RoadSet:
-    """A public record of roads.
-
-    name        as its file is called; people write it with - for _
-    title       what it shows
-    where       its authors or its place
-    how         what is done with it, and whether it was run on the real files
-    download    from where, under which licence
-    run         make it; raises BadInput (``path: expected ..., found ...``) for a folder that is not it
+    ``read`` raises FileNotFoundError for a file that is not there, and BadInput for one that is something else.
     """
-
-    name: str
-    title: str
-    where: str
-    how: str
-    download: str
-    run: Callable[[Asked], Result]
-
-    @property
-    def called(self) -> str:
-        """The name as people write it."""
-        return self.name.replace("_", "-")
-
-    def of(self, asked: Asked) -> Result:
-        """What is found in a folder. BadInput says what was expected, and where to download it."""
-        if not asked.folder.is_dir():
-            found = "a file" if asked.folder.exists() else "nothing there"
-            raise BadInput(f"{asked.folder}: expected a folder with {self.called}, found {found}: {self.download}")
+    def run(effort: Effort) -> Result:
+        if effort.folder is None or not effort.folder.is_dir():
+            found = "a file" if effort.folder is not None and effort.folder.exists() else "nothing there"
+            raise BadInput(f"{effort.folder}: expected a folder with {called}, found {found}: {download}")
         try:
-            return self.run(asked)
+            return read(effort.folder, effort)
         except FileNotFoundError as error:
-            raise BadInput(f"{error}: {self.download}") from None
+            raise BadInput(f"{error}: {download}") from None
 
-
-def road_sets() -> dict[str, RoadSet]:
-    """All there are, by the names that people write."""
-    found: Iterable[RoadSet] = catalogue(PACKAGE, OFFER).values()
-    return {one.called: one for one in found}
+    return run
 
 
 def expected_files(folder: Path, pattern: str, what: str) -> list[Path]:

@@ -1,9 +1,9 @@
 """comma2k19: a minute on a highway in a Toyota RAV4, device on the windscreen (Schafer et al., arXiv:1812.05752, MIT).
 
 Layout of a segment (README of github.com/commaai/comma2k19): NumPy arrays ``t`` [s] and ``value`` in
-``processed_log/IMU/accelerometer`` (forward, right, down [m/s2], gravity in it), ``processed_log/GNSS/live_gnss_ublox``
-(latitude, longitude [degrees], speed [m/s], ...) and ``processed_log/CAN/speed`` [m/s]. There is no profiler: what comes
-out is rows and a map, and the speeds beside each other.
+``processed_log/IMU/accelerometer`` (forward, right, down [m/s2], gravity in it),
+``processed_log/GNSS/live_gnss_ublox`` (latitude, longitude [degrees], speed [m/s], ...) and ``processed_log/CAN/speed``
+[m/s]. There is no profiler: what comes out is rows and a map, and the speeds beside each other.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.road_passes import DrivenWindows, Recording, driven_windows
-from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_sets import expected_files, from_folder
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.report.summary import IRI_CLASSES
 from logger.roads.iso8608 import iri_class
-from logger.studies.study import Column, Result, Table
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -29,11 +29,11 @@ _WINDOW_M = 25.0
 _LAGS_S = np.arange(-0.5, 0.51, 0.01)
 
 
-def run(asked: Asked) -> Result:
-    """As ``RoadSet.run``."""
-    log = expected_files(asked.folder, "processed_log/IMU/accelerometer/value", "a segment's IMU")[0].parents[2]
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    log = expected_files(folder, "processed_log/IMU/accelerometer/value", "a segment's IMU")[0].parents[2]
     recording = segment(log)
-    drives = driven_windows(recording, asked.vehicle or _CAR, (_WINDOW_M,))
+    drives = driven_windows(recording, effort.vehicle or _CAR, (_WINDOW_M,))
     rows = tuple(row for one in drives for row in _rows(one))
     known = np.array([row[6] for row in rows if row[6] is not None], dtype=np.float64)
     if not len(known):
@@ -116,9 +116,13 @@ def _map(drives: list[DrivenWindows]) -> Curves:
     return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines)
 
 
-SET = RoadSet(
-    "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "comma2k19, arXiv:1812.05752",
+_DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"
+STUDY = Study(
+    "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
     "The segment goes the way of any recording: extract --csv with the receiver's places and speed, then estimate with "
     "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
-    "middle, unless --vehicle names another car.",
-    "clone github.com/commaai/comma2k19 (MIT), which holds the segment in Example_1, or download the whole set", run)
+    "middle, unless --vehicle names another car. This was run on the real minute.",
+    from_folder("comma2k19", _DOWNLOAD, run), ("comma2k19",), Word.AGREES,
+    "The receiver's speed is as much later and faster than the car's as was read before; of its IRI there is no "
+    "print.",
+    source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

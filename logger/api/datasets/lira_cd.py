@@ -19,13 +19,13 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
-from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
-from logger.store.formats.semicolon_table import read_semicolons
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.roads.agreement import best_shift_m, mean_between
-from logger.studies.study import Result, Table
+from logger.store.formats.semicolon_table import read_semicolons
+from logger.studies.study import Effort, Result, Study, Table, Word
 from logger.units import KMH_MPS
 
 Array = npt.NDArray[np.float64]
@@ -55,16 +55,16 @@ class ProfiledRoad:
         return (self.left_m_per_km + self.right_m_per_km) / 2
 
 
-def run(asked: Asked) -> Result:
-    """As ``RoadSet.run``."""
-    files = expected_files(asked.folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    files = expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
     parts: list[Compared] = []
     refused: list[str] = []
     repeats: list[Any] = []
     for file in files:
-        road = profiled_road(asked.folder, file)
-        passes = asked.effort.some(recordings(file), 1)
-        found, left = each_pass(passes, lambda one: driven_windows(one, asked.vehicle or _CAR), asked.effort.progress)
+        road = profiled_road(folder, file)
+        passes = effort.some(recordings(file), 1)
+        found, left = each_pass(passes, lambda one: driven_windows(one, effort.vehicle or _CAR), effort.progress)
         refused += left
         parts += [_placed(road, [one for _, one in found if one.window_m == window_m], window_m, moves)
                   for window_m in WINDOWS_M for moves in (False, True)]
@@ -90,7 +90,7 @@ def recordings(file: Path) -> list[Recording]:
         raise BadInput(_EXTRA.format(file, error)) from None
     try:
         with h5py.File(file, "r") as read:
-            trips = read["GM"] if "GM" in read else None
+            trips = read.get("GM")
             if not isinstance(trips, h5py.Group):
                 raise BadInput(f"{file}: expected a group GM with the trips, found {', '.join(read)[:80] or 'nothing'}")
             return [_recording(file, f"{trip}-{one}", group) for trip, passes in trips.items()
@@ -164,14 +164,15 @@ def _placed(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, mo
     columns: list[Array] = []
     for one in drives:
         (begin_m, aside_m), (end_m, also_m) = (road.line.passed(*ends.T) for ends in (one.begin_deg, one.end_deg))
-        on = (np.maximum(aside_m, also_m) <= ASIDE_M) & (np.abs(end_m - begin_m - window_m) <= _LENGTHS_DIFFER * window_m)
+        as_long = np.abs(end_m - begin_m - window_m) <= _LENGTHS_DIFFER * window_m
+        on = (np.maximum(aside_m, also_m) <= ASIDE_M) & as_long
         begin_m, iri, std = begin_m[on], one.iri_m_per_km[on], one.iri_std_m_per_km[on]
         end_m = begin_m + window_m
         shift_m = best_shift_m(road.edges_m, road.iri_m_per_km, begin_m, end_m, iri, _MOST_SHIFT_M) if moves else 0.0
         theirs = mean_between(road.edges_m, road.iri_m_per_km, begin_m + shift_m, end_m + shift_m)
         columns.append(np.stack([begin_m, iri, std, theirs]))
-    whole = np.concatenate(columns, axis=1) if columns else np.empty((4, 0))
-    return Compared(road.name, window_m, *whole, what="car, moved along to fit" if moves else "car")
+    begin_m, iri, std, theirs = np.concatenate(columns, axis=1) if columns else np.empty((4, 0))
+    return Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moves else "car")
 
 
 def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
@@ -187,10 +188,11 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     return rows
 
 
-SET = RoadSet(
-    "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "LiRA-CD, Skar et al. 2023",
+_DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
+STUDY = Study(
+    "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "IRI of P79",
     "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie where the "
     "receiver says. The cars are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless "
-    "--vehicle names another. The real files have not been run here; the reader is tested on small files of the same "
-    "layout.",
-    "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read", run)
+    "--vehicle names another. The reader is tested on small files of the same layout.",
+    from_folder("LiRA-CD", _DOWNLOAD, run), ("LiRA-CD",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")

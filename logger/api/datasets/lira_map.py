@@ -1,29 +1,29 @@
 """Passes of a reference profiler over one road, IRI per 10 m: how well a profiler repeats itself.
 
-Layout of github.com/peacefulotter/LiRA-Map (MIT), ``server/backup/trip_iri_*.json``, compressed or not: ``path.data`` is
-a list of ``{"pos": {"lat", "lng"}, "timestamp": metres from the start, "value": IRI [m/km]}``. What the files are is not
-said there; it is inferred from names and content.
+Layout of github.com/peacefulotter/LiRA-Map (MIT), ``server/backup/trip_iri_*.json``, compressed or not: ``path.data``
+is a list of ``{"pos": {"lat", "lng"}, "timestamp": metres from the start, "value": IRI [m/km]}``. What the files are is
+not said there; it is inferred from names and content.
 """
 
 from __future__ import annotations
 
 import gzip
 import json
+import zlib
 from itertools import combinations
 from pathlib import Path
-from zlib import error as ZlibError
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_sets import expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, repeat_row
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.agreement import best_shift_m, mean_between
-from logger.studies.study import Column, Result, Table
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class ProfilerPass:
                              for one in points], dtype=np.float64)
             at_m, self.iri_m_per_km, lat_deg, lon_deg = rows.T
             self.line = MeasuredLine.of(at_m, lat_deg, lon_deg)
-        except (KeyError, TypeError, ValueError, OSError, EOFError, ZlibError) as error:
+        except (KeyError, TypeError, ValueError, OSError, EOFError, zlib.error) as error:
             raise BadInput(f"{path}: expected path.data with pos, timestamp (metres, growing) and value, found "
                            f"{type(error).__name__}: {str(error)[:80]}") from None
         self.name = path.name.split(".")[0].removeprefix("trip_iri_")
@@ -52,23 +52,26 @@ class ProfilerPass:
         self.edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
 
 
-def run(asked: Asked) -> Result:
-    """As ``RoadSet.run``."""
-    passes = [ProfilerPass(expected_files(asked.folder, f"{name}.json*", "a pass of the profiler")[0])
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0])
               for name in PASSES]
-    pairs = list(asked.effort.each(list(combinations(passes, 2))))
-    tables, ours, off_m_per_km = [], [], []
+    pairs = list(effort.each(list(combinations(passes, 2))))
+    tables: list[Table] = []
+    ours: list[list[float]] = []
+    off_m_per_km: list[float] = []
     for window_m in _WINDOWS_M:
         rows = [_beside(one, other, window_m) for one, other in pairs]
         tables.append(Table(f"Windows of {window_m:g} m", REPEAT_COLUMNS, tuple(rows)))
-        ours.append([row[3] for row in rows])
-        off_m_per_km.append(max(float(row[8]) for row in rows if isinstance(row[8], float)))
-    length = Table("The passes", (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f")), tuple(
+        ours.append([row[3] for row in rows if isinstance(row[3], float)])
+        off_m_per_km.append(max(row[8] for row in rows if isinstance(row[8], float)))
+    columns = (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f"))
+    length = Table("The passes", columns, tuple(
         (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
-    spans = ["{:.3f} to {:.3f}".format(*(f(one) for f in (min, max))) for one in ours]
+    spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]
     verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m; two passes "
-               f"differ by up to {off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be "
-               "better than that against one pass: it is the ceiling of every comparison on real roads.")
+               f"differ by up to {off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to "
+               "be better than that against one pass: it is the ceiling of every comparison on real roads.")
     return Result((*tables, length), verdict, (_picture(passes),))
 
 
@@ -92,12 +95,16 @@ def _picture(passes: list[ProfilerPass]) -> Curves:
     lines = []
     for one in passes:
         begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - 99, 100.0)
-        lines.append(Line(one.name, begin_m / 1000, mean_between(one.edges_m, one.iri_m_per_km, begin_m, begin_m + 100)))
+        values = mean_between(one.edges_m, one.iri_m_per_km, begin_m, begin_m + 100.0)
+        lines.append(Line(one.name, begin_m / 1000, values))
     return Curves("Three passes, IRI over 100 m", "along the road [km]", "IRI [m/km]", tuple(lines))
 
 
-SET = RoadSet(
-    "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "peacefulotter/LiRA-Map",
+_DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read"
+STUDY = Study(
+    "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
     "Three passes over some 26 km of Danish road. One is laid on the distance of the other by its places, and moved "
     "along by up to 10 m so that both fit best. This was run on the real files.",
-    "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read", run)
+    from_folder("LiRA-Map", _DOWNLOAD, run), ("LiRA-Map",), Word.AGREES,
+    "Run on the real files, it gives the ceiling that is printed beside every other set; no paper prints it.",
+    source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
-from logger.api.road_sets import Asked, RoadSet, expected_files
+from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.study import Result
+from logger.studies.study import Effort, Result, Study, Word
 
 Array = npt.NDArray[np.float64]
 
@@ -54,13 +54,13 @@ class LaserRoad:
                    header="distance_m,elevation_m,lat_deg,lon_deg")
 
 
-def run(asked: Asked) -> Result:
-    """As ``RoadSet.run``."""
-    roads = laser_roads(asked.folder)
-    trips = [trip(one) for one in expected_files(asked.folder, "*-2019-*.mat", "the phones' trips")]
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    roads = laser_roads(folder)
+    trips = [trip(one) for one in expected_files(folder, "*-2019-*.mat", "the phones' trips")]
     found: list[tuple[str, DrivenWindows]] = []
     refused: list[str] = []
-    pairs = asked.effort.some([(road, one) for road in roads for one in trips], 1)
+    pairs = effort.some([(road, one) for road in roads for one in trips], 1)
     with TemporaryDirectory() as scratch:
         for number, road in enumerate(roads):
             line = Path(scratch) / f"profile-{number}.csv"
@@ -68,7 +68,7 @@ def run(asked: Asked) -> Result:
             mine = [one for each, one in pairs if each is road]
             try:
                 windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
-                    one, asked.vehicle or _CAR, profile=line), asked.effort.progress)
+                    one, effort.vehicle or _CAR, profile=line), effort.progress)
             except BadInput as error:
                 refused.append(str(error))
                 continue
@@ -77,20 +77,26 @@ def run(asked: Asked) -> Result:
     parts = [part for road in roads for window_m in WINDOWS_M
              if (part := _together(road.name, window_m, found)) is not None]
     if not parts:
-        raise BadInput(f"{asked.folder}: expected trips on the profiled roads, found none; {refused[0]}")
-    low, high = (f"{REPEAT_R2[window_m][0]:.2f} to {REPEAT_R2[window_m][1]:.2f}" for window_m in WINDOWS_M)
-    return Result(tuple(compared_table(parts, window_m) for window_m in WINDOWS_M), verdict_of(parts, refused, (
-        f"The set holds one profile of each road, no repeat; passes of another profiler repeat each other with R2 {low} "
-        f"per 10 m and {high} per 100 m (lira-map).")), tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))
+        raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {refused[0]}")
+    tables = tuple(compared_table(parts, window_m) for window_m in WINDOWS_M)
+    return Result(tables, verdict_of(parts, refused, _ceiling()),
+                  tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))
+
+
+def _ceiling() -> str:
+    spans = [f"{low:.2f} to {high:.2f} per {window_m:g} m" for window_m, (low, high) in REPEAT_R2.items()]
+    return ("The set holds one profile of each road, no repeat; passes of another profiler repeat each other with R2 "
+            f"{' and '.join(spans)} (lira-map).")
 
 
 def laser_roads(folder: Path) -> list[LaserRoad]:
     """The three roads. Raises BadInput and FileNotFoundError."""
-    return [_laser_road(name, *(expected_files(folder, file, what)[0] for file, what in (
-        (elevation, "the laser profiles"), (places, "their places"))), half) for name, elevation, half, places in _ROADS]
+    return [_laser_road(name, expected_files(folder, elevation, "the laser profiles")[0], half,
+                        expected_files(folder, places, "their places")[0])
+            for name, elevation, half, places in _ROADS]
 
 
-def _laser_road(name: str, elevation: Path, places: Path, half: int) -> LaserRoad:
+def _laser_road(name: str, elevation: Path, half: int, places: Path) -> LaserRoad:
     at_km, elevation_cm = read_arrays(elevation, ("dist", "elevation"))
     if len(at_km) != len(elevation_cm):
         raise BadInput(f"{elevation}: expected dist and elevation of one length, found {len(at_km)} and "
@@ -133,14 +139,17 @@ def _together(road: str, window_m: float, found: list[tuple[str, DrivenWindows]]
     chosen = [one for name, one in found if name == road and one.window_m == window_m]
     if not chosen:
         return None
-    return Compared(road, window_m, *(np.concatenate([getattr(one, name) for one in chosen]) for name in (
-        "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km")))
+    begin_m, iri, std, exact = (np.concatenate([getattr(one, name) for one in chosen]) for name in (
+        "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km"))
+    return Compared(road, window_m, begin_m, iri, std, exact)
 
 
-SET = RoadSet(
-    "zenodo_4386256", "Phones at 100 Hz beside laser profiles, 10 m and 100 m", "Zenodo 4386256, Botshekan et al.",
+_DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
+STUDY = Study(
+    "zenodo_4386256", "Phones at 100 Hz beside laser profiles, 10 m and 100 m", "Three roads",
     "Each trip goes the way of any recording: extract --csv --profile lays it on the laser profile, by the phone's "
     "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
-    "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The real files have not "
-    "been run here; the reader is tested on small files of the same layout.",
-    "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder", run)
+    "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested "
+    "on small files of the same layout.",
+    from_folder("Zenodo 4386256", _DOWNLOAD, run), ("Zenodo 4386256",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")

@@ -1,7 +1,7 @@
 """Files of MATLAB up to version 7: plain arrays by name, and the coordinates of a ``geopoint`` object.
 
-Problem: what MATLAB saves of an object of a class is not documented; readers give its bytes alone. Solution: those bytes
-are a variable of the documented format without a name (MAT-File Format, The MathWorks 2023, "Subsystem data"). Given a
+Problem: what MATLAB saves of an object of a class is not documented; readers give its bytes alone. Solution: those
+bytes are a variable of the documented format without a name (MAT-File Format, The MathWorks, "Subsystem data"). Given a
 name, they are read as any other, and the numbers in it are found by their size.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def _load(path: Path, data: bytes) -> dict[str, Any]:
         read: dict[str, Any] = loadmat(io.BytesIO(data))
     except NotImplementedError:
         raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7") from None
-    except Exception as error:  # whatever a damaged file makes of the reader
+    except (ValueError, TypeError, KeyError, IndexError, OSError, MemoryError, zlib.error, struct.error) as error:
         raise BadInput(f"{path}: expected a .mat file, found {str(error)[:120]}") from None
     return read
 

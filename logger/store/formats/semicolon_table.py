@@ -31,7 +31,7 @@ def read_semicolons(path: Path, names: tuple[str, ...]) -> list[Array]:
     if not rows.strip():
         raise BadInput(f"{path}:2: expected numbers below the header, found nothing")
     try:
-        table = np.genfromtxt(io.StringIO(rows.replace(",", ".")), delimiter=";", comments=None, ndmin=2,
+        table = np.genfromtxt(io.StringIO(rows.replace(",", ".")), delimiter=";", comments="\0", ndmin=2,
                               usecols=[there.index(one) for one in names])
     except ValueError:
         line = next(number for number, row in enumerate(rows.splitlines(), start=2)
