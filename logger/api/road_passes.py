@@ -8,19 +8,21 @@ have left, ``extract --csv`` makes its runs, ``estimate`` its windows; what is l
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
 from logger.api.csv_extraction import Asked, extract_csv
 from logger.api.drives import assessed, read_run, step_of
 from logger.api.extracted_runs import read_measured_profile
 from logger.api.ranges import NOISE_MPS2
 from logger.errors import BadInput
+from logger.extraction.measured_line import MeasuredLine, passes
 from logger.shipped import vehicle_path
 from logger.store.formats.logger_columns import named_columns
 from logger.store.formats.vehicle_file import read_model
@@ -33,6 +35,7 @@ Array = npt.NDArray[np.float64]
 
 WINDOWS_M = (10.0, 100.0)
 """What profilers report, and what roads are judged by."""
+_FIX_S, _SMOOTH_FIXES = 1.0, 21
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +78,6 @@ class DrivenWindows:
     exact_m_per_km: Array
 
 
-def model_named(vehicle: str) -> Model:
-    """A vehicle that comes along, or a file. Raises BadInput."""
-    return read_model(vehicle_path(vehicle))
-
-
 def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
                    profile: Path | None = None) -> list[DrivenWindows]:
     """The windows of a pass, for each length those of all its drives; the sensor's noise is learnt from each drive.
@@ -88,10 +86,36 @@ def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, .
 
     Raises BadInput for a recording of which nothing can be used.
     """
-    found: list[DrivenWindows] = []
+    model = read_model(vehicle_path(vehicle))
+    return [one for run in runs_of(recording, vehicle, profile) for one in windows_of(run, model, windows_m)]
+
+
+def runs_of(recording: Recording, vehicle: str, profile: Path | None = None) -> list[Run]:
+    """The drives of a pass, as ``extract --csv`` makes them. Raises BadInput."""
     with TemporaryDirectory() as scratch:
-        for run in _runs(recording, Path(scratch), vehicle, profile):
-            found += _windows_of(run, model_named(vehicle), windows_m)
+        return _runs(recording, Path(scratch), vehicle, profile)
+
+
+def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
+    """A drive on a line's own distance, less ``from_m``, by its places alone: a run for each pass over the line.
+
+    Where the receiver puts the car along the line is averaged over ``_SMOOTH_FIXES`` fixes: between them the speed
+    tells the way better.
+    """
+    if run.lat_deg is None or run.lon_deg is None:
+        return []
+    every = np.arange(0, len(run.time_s), round(run.rate_hz * _FIX_S))
+    along_m, aside_m = line.passed(run.lat_deg[every], run.lon_deg[every])
+    found = []
+    for one in passes(run.distance_m[every], along_m, aside_m):
+        at = every[one.first: one.last]
+        offset_m = (along_m - run.distance_m[every])[one.first: one.last]
+        smooth_m = uniform_filter1d(offset_m, min(_SMOOTH_FIXES, len(offset_m)), mode="nearest")
+        part = slice(at[0], at[-1] + 1)
+        columns = {name: None if (whole := getattr(run, name)) is None else whole[part] for name in (
+            "time_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg", "usable")}
+        shift_m = np.interp(run.time_s[part], run.time_s[at], smooth_m)
+        found.append(replace(run, **(columns | {"distance_m": run.distance_m[part] + shift_m - from_m})))
     return found
 
 
@@ -115,7 +139,8 @@ def _write(path: Path, header: str, *columns: Array) -> None:
     np.savetxt(path, rows[np.isfinite(rows).all(axis=1)], fmt="%.12g", delimiter=",", header=header, comments="")
 
 
-def _windows_of(run: Run, model: Model, windows_m: tuple[float, ...]) -> list[DrivenWindows]:
+def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
+    """The windows of a drive, for each length; noise is learnt once. Raises BadInput."""
     from logger.estimation.sensor_noise import Sensor
 
     sensor, learns = Sensor(NOISE_MPS2, step_of(run, None)), True
@@ -136,8 +161,7 @@ def _windows_of(run: Run, model: Model, windows_m: tuple[float, ...]) -> list[Dr
 
 def each_pass(passes: list[Recording], windows: Callable[[Recording], list[DrivenWindows]],
               progress: Callable[[int, int], None]) -> tuple[list[tuple[str, DrivenWindows]], list[str]]:
-    """The windows of every pass that can be used, with its name, and a line for each that cannot. Raises BadInput where
-    none can."""
+    """The windows of every pass that can be used, with its name, and a line for each that cannot."""
     found: list[tuple[str, DrivenWindows]] = []
     refused: list[str] = []
     for done, one in enumerate(passes):
@@ -147,6 +171,4 @@ def each_pass(passes: list[Recording], windows: Callable[[Recording], list[Drive
         except BadInput as error:
             refused.append(f"{one.name}: {error}")
     progress(len(passes), len(passes))
-    if not found:
-        raise BadInput(f"expected a pass that can be used, found none among {len(passes)}; {refused[0]}")
     return found, refused

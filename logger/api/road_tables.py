@@ -99,5 +99,5 @@ def verdict_of(parts: list[Compared], refused: list[str], repeat: str) -> str:
         words.append("Too few windows lie on the profiled roads for a figure.")
     words.append(repeat)
     if refused:
-        words.append(f"Left out: {len(refused)} passes; the first, {refused[0]}".rstrip(".") + ".")
+        words.append(f"Left out: {len(refused)}, the first {refused[0]}".rstrip(".") + ".")
     return " ".join(words)

@@ -11,20 +11,22 @@ places. HH and VH are the two carriageways: two roads.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
+from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, each_pass, on_line, runs_of, windows_of
 from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
 from logger.roads.agreement import best_shift_m, mean_between
+from logger.shipped import vehicle_path
 from logger.store.formats.semicolon_table import read_semicolons
+from logger.store.formats.vehicle_file import read_model
 from logger.studies.study import Effort, Result, Study, Table, Word
 from logger.units import KMH_MPS
 
@@ -33,7 +35,6 @@ Array = npt.NDArray[np.float64]
 _CAR = "sedan-2015"
 _CELL_M, _PLACE_EVERY_M = 10.0, 5.0
 _MOST_SHIFT_M = 30.0  # what a second's delay is at 110 km/h
-_LENGTHS_DIFFER = 0.2  # a window that is so much longer or shorter on the line was driven elsewhere
 _EXTRA = "expected the 'hdf5' extra to read {}: pip install 'ridelog[hdf5]' ({})"
 
 
@@ -64,11 +65,15 @@ def run(folder: Path, effort: Effort) -> Result:
     for file in files:
         road = profiled_road(folder, file)
         passes = effort.some(recordings(file), 1)
-        found, left = each_pass(passes, lambda one: driven_windows(one, effort.vehicle or _CAR), effort.progress)
-        refused += left
-        parts += [_placed(road, [one for _, one in found if one.window_m == window_m], window_m, moves)
-                  for window_m in WINDOWS_M for moves in (False, True)]
+        for moves in (False, True):
+            found, left = each_pass(passes, lambda one, road=road, moves=moves: _windows(  # type: ignore[misc]
+                one, effort.vehicle or _CAR, road, moves), effort.progress)
+            refused += left if moves else []
+            parts += [_beside(road, [one for _, one in found if one.window_m == window_m], window_m, moves)
+                      for window_m in WINDOWS_M if found]
         repeats += [row for window_m in WINDOWS_M for row in _repeats(road, window_m)]
+    if not parts:
+        raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
     tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
     tables.append(Table("The profilers beside each other", REPEAT_COLUMNS, tuple(repeats)))
     pictures = tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
@@ -159,20 +164,30 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
 # --- the car, and one profiler beside the other ---
 
 
-def _placed(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, moves: bool) -> Compared:
-    """Windows of all drives by their places on the line; ``moves``: each drive's moved along by what fits best."""
-    columns: list[Array] = []
-    for one in drives:
-        (begin_m, aside_m), (end_m, also_m) = (road.line.passed(*ends.T) for ends in (one.begin_deg, one.end_deg))
-        as_long = np.abs(end_m - begin_m - window_m) <= _LENGTHS_DIFFER * window_m
-        on = (np.maximum(aside_m, also_m) <= ASIDE_M) & as_long
-        begin_m, iri, std = begin_m[on], one.iri_m_per_km[on], one.iri_std_m_per_km[on]
-        end_m = begin_m + window_m
-        shift_m = best_shift_m(road.edges_m, road.iri_m_per_km, begin_m, end_m, iri, _MOST_SHIFT_M) if moves else 0.0
-        theirs = mean_between(road.edges_m, road.iri_m_per_km, begin_m + shift_m, end_m + shift_m)
-        columns.append(np.stack([begin_m, iri, std, theirs]))
-    begin_m, iri, std, theirs = np.concatenate(columns, axis=1) if columns else np.empty((4, 0))
-    return Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moves else "car")
+def _windows(recording: Recording, vehicle: str, road: ProfiledRoad, moves: bool) -> list[DrivenWindows]:
+    """Of each time that the pass goes over the profiled road, with windows where its cells are; ``moves``: then moved
+    along to where cells of 10 m fit best, and estimated again."""
+    model = read_model(vehicle_path(vehicle))
+    found: list[DrivenWindows] = []
+    runs = [one for run in runs_of(recording, vehicle) for one in on_line(run, road.line, float(road.edges_m[0]))]
+    for run in runs:
+        if moves:
+            cells = windows_of(run, model, (_CELL_M,))[0]
+            shift_m = best_shift_m(road.edges_m - road.edges_m[0], road.iri_m_per_km, cells.begin_m, cells.end_m,
+                                   cells.iri_m_per_km, _MOST_SHIFT_M)
+            run = replace(run, distance_m=run.distance_m + shift_m)
+        found += windows_of(run, model)
+    if not found:
+        raise BadInput("expected a pass over the profiled road, found none")
+    return found
+
+
+def _beside(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, moved: bool) -> Compared:
+    begin_m, end_m, iri, std = (np.concatenate([getattr(one, name) for one in drives]) for name in (
+        "begin_m", "end_m", "iri_m_per_km", "iri_std_m_per_km"))
+    edges_m = road.edges_m - road.edges_m[0]
+    theirs = mean_between(edges_m, road.iri_m_per_km, begin_m, end_m)
+    return Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved else "car")
 
 
 def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
@@ -191,8 +206,8 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
 _DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
 STUDY = Study(
     "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "IRI of P79",
-    "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie where the "
-    "receiver says. The cars are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless "
-    "--vehicle names another. The reader is tested on small files of the same layout.",
+    "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie on the "
+    "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
+    "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested on small files of the same layout.",
     from_folder("LiRA-CD", _DOWNLOAD, run), ("LiRA-CD",), Word.NOT_REPRODUCIBLE, NOT_RUN,
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")

@@ -33,6 +33,7 @@ _ROADS = (
     ("Route 2, Concord", "road_elevation_concord.mat", 0, "geopoint_ConcordTurnpike_LongLoop_MIDDLE.mat"),
 )
 _TRIP = ("t", "x", "y", "z", "speedMS", "LAT", "LON")
+_OFF = "of driving on the profile, found none"  # a trip over another of the roads
 _FIX_S = 1.0  # places come at the phone's 100 Hz, of a receiver that has one a second
 _UNEVEN = 0.01
 
@@ -60,24 +61,22 @@ def run(folder: Path, effort: Effort) -> Result:
     trips = [trip(one) for one in expected_files(folder, "*-2019-*.mat", "the phones' trips")]
     found: list[tuple[str, DrivenWindows]] = []
     refused: list[str] = []
+    elsewhere: list[str] = []
     pairs = effort.some([(road, one) for road in roads for one in trips], 1)
     with TemporaryDirectory() as scratch:
         for number, road in enumerate(roads):
             line = Path(scratch) / f"profile-{number}.csv"
             road.write(line)
             mine = [one for each, one in pairs if each is road]
-            try:
-                windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
-                    one, effort.vehicle or _CAR, profile=line), effort.progress)
-            except BadInput as error:
-                refused.append(str(error))
-                continue
+            windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
+                one, effort.vehicle or _CAR, profile=line), effort.progress)
             found += [(road.name, one) for _, one in windows]
-            refused += [one for one in left if "aside of it" not in one and "end to its beginning" not in one]
+            elsewhere += [one for one in left if _OFF in one]
+            refused += [one for one in left if _OFF not in one]
     parts = [part for road in roads for window_m in WINDOWS_M
              if (part := _together(road.name, window_m, found)) is not None]
     if not parts:
-        raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {refused[0]}")
+        raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {(refused + elsewhere)[0]}")
     tables = tuple(compared_table(parts, window_m) for window_m in WINDOWS_M)
     return Result(tables, verdict_of(parts, refused, _ceiling()),
                   tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))

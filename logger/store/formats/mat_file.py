@@ -68,12 +68,13 @@ def read_geopoint(path: Path) -> tuple[Array, Array]:
 
 def _load(path: Path, data: bytes) -> dict[str, Any]:
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         read: dict[str, Any] = loadmat(io.BytesIO(data))
     except NotImplementedError:
         raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7") from None
-    except (ValueError, TypeError, KeyError, IndexError, OSError, MemoryError, zlib.error, struct.error) as error:
+    except (ValueError, TypeError, KeyError, IndexError, OSError, MemoryError, MatReadError, zlib.error) as error:
         raise BadInput(f"{path}: expected a .mat file, found {str(error)[:120]}") from None
     return read
 
