@@ -80,14 +80,44 @@ def mean_between(edges_m: Array, values: Array, begin_m: Array, end_m: Array) ->
 
 def best_shift_m(edges_m: Array, values: Array, begin_m: Array, end_m: Array, mine: Array, most_m: float) -> float:
     """By how much places (n,) are to be moved along, at most so far either way, in steps of 1 m, so that the logarithms
-    of what is ``mine`` (n,) there and of ``mean_between`` correlate best; 0 where too little is known."""
+    of what is ``mine`` (n,) there and of ``mean_between`` correlate best; 0 where too little is known.
+
+    The values should be of pieces much shorter than the places are long: a mean over parts of two long ones is smoother
+    than either, and would correlate better for that alone.
+    """
     best_m, best = 0.0, -np.inf
     for shift_m in np.arange(-np.floor(most_m), np.floor(most_m) + 1):
-        theirs = mean_between(edges_m, values, begin_m + shift_m, end_m + shift_m)
-        known = (mine > 0) & (theirs > 0)
-        if np.count_nonzero(known) < max(3, len(mine) // 2):
-            continue
-        a, b = np.log(mine[known]), np.log(theirs[known])
-        if np.ptp(a) > 0 and np.ptp(b) > 0 and (found := float(np.corrcoef(a, b)[0, 1])) > best + 1e-12:
+        found = _correlation(mine, mean_between(edges_m, values, begin_m + shift_m, end_m + shift_m))
+        if found > best + 1e-12:
             best_m, best = float(shift_m), found
     return best_m
+
+
+def matching_cells(begin_m: Array, mine: Array, other_m: Array, theirs: Array, most: int) -> tuple[Array, int]:
+    """For cells that begin at places (n,) and hold what is ``mine`` (n,), the nearest of those that begin at
+    ``other_m`` (k,), growing, with ``theirs`` (k,): values (n,), NaN where none is within half a cell; and by how many
+    whole cells, at most so many either way, they had to be moved along so that the logarithms correlate best.
+
+    Whole ones, and no means of two: those would be smoother than what was measured.
+    """
+    after = np.clip(np.searchsorted(other_m, begin_m), 1, len(other_m) - 1)
+    nearest = after - (begin_m - other_m[after - 1] < other_m[after] - begin_m)
+    half_m = float(np.median(np.diff(begin_m))) / 2
+    near = np.abs(other_m[nearest] - begin_m) <= half_m * (1 + 1e-9)
+    best, best_cells, best_values = -np.inf, 0, np.full(len(begin_m), np.nan)
+    for cells in sorted(range(-most, most + 1), key=abs):
+        moved = nearest + cells
+        inside = near & (moved >= 0) & (moved < len(theirs))
+        values = np.where(inside, theirs[np.clip(moved, 0, len(theirs) - 1)], np.nan)
+        if (found := _correlation(mine, values)) > best + 1e-12 or not np.isfinite(best_values).any():
+            best, best_cells, best_values = found, cells, values
+    return best_values, best_cells
+
+
+def _correlation(mine: Array, theirs: Array) -> float:
+    """Of the logarithms; minus infinity where fewer than half are known."""
+    known = (mine > 0) & (theirs > 0)
+    if np.count_nonzero(known) < max(3, len(mine) // 2):
+        return -np.inf
+    a, b = np.log(mine[known]), np.log(theirs[known])
+    return float(np.corrcoef(a, b)[0, 1]) if np.ptp(a) > 0 and np.ptp(b) > 0 else -np.inf

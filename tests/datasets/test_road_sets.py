@@ -62,8 +62,7 @@ def test_cars_of_lira_cd_find_the_profilers_iri(lira_cd: Path, capsys: pytest.Ca
             assert row["R2"] > r2
             assert abs(row["bias"]) < 0.03
             assert row["within 2 (95%)"] > 0.8
-    aran = rows(repeats, "ARAN beside P79, 10 m")["CPH1 HH"]
-    assert aran["moved by [m]"] == pytest.approx(4, abs=1.01)  # as it was made
+    assert rows(repeats, "ARAN beside P79, 10 m")["CPH1 HH"]["R2"] > 0.85  # one error of 10 %, halved
     tracks = rows(repeats, "P79, right track beside left, 10 m")["CPH1 HH"]
     assert tracks["MAE [m/km]"] == pytest.approx(0.05 * np.sqrt(2 / np.pi) * 5.1, rel=0.35)
 
@@ -104,11 +103,11 @@ def test_phones_of_zenodo_find_the_lasers_iri(zenodo: Path, capsys: pytest.Captu
 def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = made.lira_map(tmp_path / "set", {"1ccf": (0, 0.1), "85e7": (20, 0.1), "e9ef": (0, 0.2)})
     ten, hundred, _ = told(capsys, "lira-map", folder)["tables"]
-    named = {row[1]: dict(zip(ten["columns"], row, strict=True)) for row in ten["rows"]}
+    named = {(row[0], row[1]): dict(zip(ten["columns"], row, strict=True)) for row in ten["rows"]}
     iri = [one["value"] for one in json.loads((folder / "trip_iri_1ccf.json").read_text())["path"]["data"]]
     # Logarithms off by a and b each: they differ by the root of a^2 + b^2, whatever the road.
     for name, off in (("85e7 beside 1ccf", np.hypot(0.1, 0.1)), ("e9ef beside 1ccf", np.hypot(0.1, 0.2))):
-        assert named[name]["R2 of log IRI"] == pytest.approx(1 - off**2 / np.var(np.log(iri)), abs=0.05)
+        assert named[name, "nearest cells"]["R2 of log IRI"] == pytest.approx(1 - off**2 / np.var(np.log(iri)), abs=0.05)
     assert all(row[3] > other[3] for row, other in zip(hundred["rows"], ten["rows"], strict=True))
 
 

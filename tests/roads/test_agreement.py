@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.roads.agreement import agreement, best_shift_m, factor_to, mean_between
+from logger.roads.agreement import agreement, best_shift_m, factor_to, matching_cells, mean_between
 
 RNG = np.random.default_rng(3)
 TRUE = np.exp(0.5 * RNG.standard_normal(20_000))
@@ -54,3 +54,15 @@ def test_a_shift_is_found(shift_m: float) -> None:
     mine = mean_between(edges, values, begin + shift_m, begin + shift_m + 10)
     assert best_shift_m(edges, values, begin, begin + 10, mine, 10.0) == shift_m
     assert best_shift_m(edges, values, begin[:2], begin[:2] + 10, mine[:2], 10.0) == 0
+
+
+def test_cells_are_matched_whole() -> None:
+    begin, other = np.arange(0.0, 1000.0, 10.0), np.arange(3.0, 990.0, 10.0)
+    mine = np.exp(0.3 * RNG.standard_normal(100))
+    for cells in (-1, 0, 2):
+        theirs = np.roll(mine, cells)[:99]
+        found, moved = matching_cells(begin, mine, other, theirs, 2)
+        assert moved == cells
+        known = np.isfinite(found)
+        assert known.sum() >= 96
+        assert found[known] == pytest.approx(mine[known])

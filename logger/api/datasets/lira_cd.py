@@ -23,7 +23,7 @@ from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
 from logger.extraction.measured_line import ASIDE_M, MeasuredLine
-from logger.roads.agreement import best_shift_m, mean_between
+from logger.roads.agreement import best_shift_m, matching_cells, mean_between
 from logger.shipped import vehicle_path
 from logger.store.formats.semicolon_table import read_semicolons
 from logger.store.formats.vehicle_file import read_model
@@ -34,6 +34,8 @@ Array = npt.NDArray[np.float64]
 
 _CAR = "sedan-2015"
 _CELL_M, _PLACE_EVERY_M = 10.0, 5.0
+_FINE_M = 2.0
+_MOST_CELLS = 2
 _MOST_SHIFT_M = 30.0  # what a second's delay is at 110 km/h
 _EXTRA = "expected the 'hdf5' extra to read {}: pip install 'ridelog[hdf5]' ({})"
 
@@ -172,10 +174,12 @@ def _windows(recording: Recording, vehicle: str, road: ProfiledRoad, moves: bool
     runs = [one for run in runs_of(recording, vehicle) for one in on_line(run, road.line, float(road.edges_m[0]))]
     for run in runs:
         if moves:
-            cells = windows_of(run, model, (_CELL_M,))[0]
-            shift_m = best_shift_m(road.edges_m - road.edges_m[0], road.iri_m_per_km, cells.begin_m, cells.end_m,
-                                   cells.iri_m_per_km, _MOST_SHIFT_M)
-            run = replace(run, distance_m=run.distance_m + shift_m)
+            fine = windows_of(run, model, (_FINE_M,))[0]
+            edges_m = road.edges_m - road.edges_m[0]
+            driven = (edges_m[:-1] >= fine.begin_m[0]) & (edges_m[1:] <= fine.end_m[-1])
+            shift_m = best_shift_m(np.append(fine.begin_m, fine.end_m[-1]), fine.iri_m_per_km, edges_m[:-1][driven],
+                                   edges_m[1:][driven], road.iri_m_per_km[driven], _MOST_SHIFT_M)
+            run = replace(run, distance_m=run.distance_m - shift_m)
         found += windows_of(run, model)
     if not found:
         raise BadInput("expected a pass over the profiled road, found none")
@@ -192,14 +196,15 @@ def _beside(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, mo
 
 def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
-    left, right, both = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
-                         for one in (road.left_m_per_km, road.right_m_per_km, road.iri_m_per_km))
+    left, right = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
+                   for one in (road.left_m_per_km, road.right_m_per_km))
     rows = [repeat_row(road.name, f"P79, right track beside left, {window_m:g} m", right, left)]
     if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
-        edges_m, values = np.append(road.aran_m, road.aran_m[-1] + _CELL_M), road.aran_m_per_km
-        shift_m = best_shift_m(edges_m, values, begin_m, begin_m + window_m, both, _MOST_SHIFT_M)
-        theirs = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
-        rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", theirs, both, shift_m))
+        theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
+                                       _MOST_CELLS)
+        known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
+        both = [mean_between(road.edges_m, one, begin_m, begin_m + window_m) for one in (theirs, known)]
+        rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", *both, _CELL_M * cells))
     return rows
 
 
@@ -208,6 +213,7 @@ STUDY = Study(
     "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "IRI of P79",
     "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie on the "
     "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
-    "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested on small files of the same layout.",
+    "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. "
+    "The reader is tested on small files of the same layout.",
     from_folder("LiRA-CD", _DOWNLOAD, run), ("LiRA-CD",), Word.NOT_REPRODUCIBLE, NOT_RUN,
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")

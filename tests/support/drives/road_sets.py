@@ -94,7 +94,7 @@ def surveyed(seed: int, grade: str = "B", lat_deg: float = 55.7, lon_deg: float 
 # --- LiRA-CD ---
 
 
-def lira_cd(folder: Path, roads: dict[str, SurveyedRoad], aran_m: float = 4.0) -> Path:
+def lira_cd(folder: Path, roads: dict[str, SurveyedRoad], aran_m: float = 7.0) -> Path:
     """``roads`` by carriageway, HH or VH; ARAN's places are so far ahead [m]."""
     import h5py
 
