@@ -42,7 +42,7 @@ def run(effort: Effort) -> Result:
         Column("asked"), Column("printed"), Column("share [%]", ".1f"), Column("goal"), Column("at least [%]", ".1f"),
         Column("at most [%]", ".1f")), tuple(rows))
     verdict = (f"154 of 200 cases were put before the lab, of release seeds {SEEDS} that its development never used, "
-               "made by a simulator that shares nothing with it. Every goal is met by the share; by the lower end of its "
+               "made by a simulator that shares nothing with it. Every goal is met by the share; by the far end of its "
                "interval only some are, and that nothing is said where nothing is missing is sure to 12 % alone. Shown "
                "are counts of that examination; it takes hours, and was not repeated here.")
     at = np.arange(1.0, len(rows) + 1)
