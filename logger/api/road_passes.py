@@ -112,10 +112,11 @@ def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
         offset_m = (along_m - run.distance_m[every])[one.first: one.last]
         smooth_m = uniform_filter1d(offset_m, min(_SMOOTH_FIXES, len(offset_m)), mode="nearest")
         part = slice(at[0], at[-1] + 1)
-        columns = {name: None if (whole := getattr(run, name)) is None else whole[part] for name in (
-            "time_s", "accel_z_mps2", "speed_mps", "distance_m", "lat_deg", "lon_deg", "usable")}
         shift_m = np.interp(run.time_s[part], run.time_s[at], smooth_m)
-        found.append(replace(run, **(columns | {"distance_m": run.distance_m[part] + shift_m - from_m})))
+        found.append(replace(
+            run, time_s=run.time_s[part], accel_z_mps2=run.accel_z_mps2[part], speed_mps=run.speed_mps[part],
+            distance_m=run.distance_m[part] + shift_m - from_m, lat_deg=run.lat_deg[part], lon_deg=run.lon_deg[part],
+            usable=None if run.usable is None else run.usable[part]))
     return found
 
 

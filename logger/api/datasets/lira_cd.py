@@ -203,7 +203,8 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
         theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
                                        _MOST_CELLS)
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
-        both = [mean_between(road.edges_m, one, begin_m, begin_m + window_m) for one in (theirs, known)]
+        both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
+                mean_between(road.edges_m, known, begin_m, begin_m + window_m))
         rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", *both, _CELL_M * cells))
     return rows
 

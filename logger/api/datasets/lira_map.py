@@ -86,7 +86,7 @@ def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tup
     names = f"{other.name} beside {one.name}"
     theirs, cells = matching_cells(one.begin_m, one.iri_m_per_km, at_m, values, _MOST_CELLS)
     mine = np.where(np.isfinite(theirs), one.iri_m_per_km, np.nan)
-    nearest = [mean_between(one.edges_m, each, *ends_m) for each in (theirs, mine)]
+    nearest = (mean_between(one.edges_m, theirs, *ends_m), mean_between(one.edges_m, mine, *ends_m))
     edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
     whole = mean_between(one.edges_m, one.iri_m_per_km, *ends_m)
     shift_m = best_shift_m(edges_m, values, *ends_m, whole, _MOST_CELLS * _CELL_M)

@@ -20,7 +20,8 @@ def run(effort: Effort) -> Result:
     """As ``Study.run``."""
     at_m = _SPACING_M * np.arange(round(_LENGTH_M / _SPACING_M) + 1)
     pulse_m = np.interp(at_m, [0, 1, 3, 5, _LENGTH_M], [0, 0, 0.02, 0, 0])
-    running = 1000 * np.cumsum(rectified_slope(pulse_m, _SPACING_M)) / np.arange(1, len(at_m))
+    slopes = rectified_slope(pulse_m, _SPACING_M)
+    running = np.asarray(1000 * np.cumsum(slopes) / np.arange(1, len(at_m)), dtype=np.float64)
     values = [Value(f"IRI from 0 to {where:g} m [m/km]", printed, float(running[round(where / _SPACING_M) - 1]),
                     _ATTAINED) for where, printed in effort.each(PRINTED)]
     _, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), _SPACING_M / STANDARD_SPEED_MPS)

@@ -44,8 +44,8 @@ def run(effort: Effort) -> Result:
     worst = {name: max(abs(row[4]) for row in rows if row[1] == name) for name in found}
     verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. The weighting is the formula of the "
                "standard itself on the whole record; a plain bilinear transform at 100 Hz is off by more above 8 Hz.")
-    number = np.arange(1.0, len(TEETH) + 1)
-    lines = [Line(f"{name}, {who}", number, np.log10(one), dots=who == "printed") for name in found
+    at = np.arange(1.0, len(TEETH) + 1)
+    lines = [Line(f"{name}, {who}", at, np.log10(one), dots=who == "printed") for name in found
              for who, one in (("ours", np.array(found[name])), ("printed", np.array(PRINTED_MPS2[name])))]
     picture = Curves("Weighted r.m.s. of bursts of 1, 2, 4, 8, 16 teeth and of teeth without end",
                      "number of the signal", "logarithm to base 10 of the r.m.s. [m/s2]", tuple(lines))
