@@ -13,7 +13,8 @@ from pathlib import Path
 from logger.errors import BadInput
 from logger.studies.study import Effort, Result
 
-NOT_RUN = "Only a person can download the set: the real files have not been run here, and nothing is claimed of them."
+NOT_RUN = ("ridelog's developers have not run the real files, which only a person can download: what is shown is of "
+           "the folder that was given.")
 
 
 def from_folder(called: str, download: str, read: Callable[[Path, Effort], Result]) -> Callable[[Effort], Result]:

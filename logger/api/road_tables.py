@@ -73,15 +73,14 @@ def _row(road: str, what: str, found: Agreement | None) -> tuple[Cell, ...]:
 
 
 def along(part: Compared) -> Curves:
-    """The road as the car and as the profiler have it."""
-    order = np.argsort(part.at_m, kind="stable")
-    at_m = part.at_m[order]
+    """The road as the profiler and as the car have it; of several passes over a place, their mean."""
+    at_m, passes = np.unique(np.round(part.at_m, 1), return_inverse=True)
     lines = []
-    for name, values, errors in (("profiler", part.reference_m_per_km, None),
-                                 ("car", part.iri_m_per_km, part.iri_std_m_per_km)):
-        known = np.isfinite(values[order])
-        lines.append(Line(name, at_m[known], values[order][known], None if errors is None else errors[order][known],
-                          dots=errors is None))
+    for name, values in (("profiler", part.reference_m_per_km), ("car", part.iri_m_per_km)):
+        known = np.isfinite(values)
+        count = np.bincount(passes[known], minlength=len(at_m))
+        mean = np.bincount(passes[known], values[known], len(at_m)) / np.maximum(count, 1)
+        lines.append(Line(name, at_m[count > 0], mean[count > 0], dots=name == "profiler"))
     return Curves(f"{part.road}: IRI over {part.window_m:g} m", "along the road [m]", "IRI [m/km]", tuple(lines))
 
 

@@ -25,7 +25,8 @@ def page(study: Study, result: Result) -> Html:
         heading(study.title, f"{study.where} of {study.source}"),
         paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
-        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))])
+        section("How it was made", paragraphs([
+            study.how, f"ridelog study {study.called}{' DIR' if study.data else ''}"]))])
 
 
 def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:

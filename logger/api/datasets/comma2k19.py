@@ -18,7 +18,6 @@ from logger.api.road_sets import expected_files, from_folder
 from logger.chart_data import Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
-from logger.report.summary import IRI_CLASSES
 from logger.roads.iso8608 import iri_class
 from logger.studies.study import Column, Effort, Result, Study, Table, Word
 
@@ -111,8 +110,10 @@ def _map(drives: list[DrivenWindows]) -> Curves:
     north_m, east_m = (EARTH_RADIUS_M * np.radians(places - places[0])).T
     east_m = east_m * np.cos(np.radians(places[0, 0]))
     classes = np.array([iri_class(one) if np.isfinite(one) else "unknown" for one in iri])
+    there = sorted(set(classes.tolist()))
+    # The first two lines of a chart are blue and red: what is smoothest and what is roughest.
     lines = tuple(Line(name, east_m[classes == name], north_m[classes == name], dots=True)
-                  for name in (*IRI_CLASSES, "unknown") if (classes == name).any())
+                  for name in dict.fromkeys((there[0], there[-1], *there)))
     return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines)
 
 

@@ -21,7 +21,7 @@ def run(effort: Effort) -> Result:
     at_m = _SPACING_M * np.arange(round(_LENGTH_M / _SPACING_M) + 1)
     pulse_m = np.interp(at_m, [0, 1, 3, 5, _LENGTH_M], [0, 0, 0.02, 0, 0])
     slopes = rectified_slope(pulse_m, _SPACING_M)
-    running = np.asarray(1000 * np.cumsum(slopes) / np.arange(1, len(at_m)), dtype=np.float64)
+    running = 1000 * np.cumsum(slopes) / np.arange(1.0, len(at_m))
     values = [Value(f"IRI from 0 to {where:g} m [m/km]", printed, float(running[round(where / _SPACING_M) - 1]),
                     _ATTAINED) for where, printed in effort.each(PRINTED)]
     _, *ends = straight_step(*structure(GOLDEN_CAR).state_space(), _SPACING_M / STANDARD_SPEED_MPS)
@@ -34,9 +34,10 @@ def run(effort: Effort) -> Result:
     verdict = ("The running IRI of the pulse agrees to the last printed figure (all 120 values, within 7e-6 m/km). The "
                "first coefficient of the printed input is too small by 1e-7: with it a road of constant slope would "
                "have an IRI above 0, so the exact one is used.")
+    printed_m, printed_iri = np.array(PRINTED, dtype=np.float64).T
     picture = Curves("Running IRI of the pulse", "distance [m]", "IRI from 0 to there [m/km]", (
-        Line("ours", at_m[1:], running),
-        Line("printed", np.array([one for one, _ in PRINTED]), np.array([one for _, one in PRINTED]), dots=True)))
+        Line("ours", np.array(at_m[1:], dtype=np.float64), running),
+        Line("printed", printed_m, printed_iri, dots=True)))
     return Result((table,), verdict, (picture,), tuple(values))
 
 
