@@ -71,7 +71,7 @@ def _one(study: Study, args: argparse.Namespace) -> int:
     from logger.studies.study import Effort
 
     if study.data and args.folder is None:
-        raise BadInput(f"study {study.called}: expected the folder DIR of {study.data}")
+        raise BadInput(f"study {study.called}: expected DIR, {study.data}")
     if not study.data and args.folder is not None:
         raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
     if not study.data and args.vehicle is not None:
@@ -107,7 +107,7 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
     for study, found in carry_out_all(chosen, QUICK_SHARE if args.quick else 1.0):
         carried[study.called] = found
         if found.result is not None:
-            write_text(args.out / f"{study.called}.html", page(study, found.result))
+            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html"))
         print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
               f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
     write_text(args.out / "index.html", index(known, carried))
@@ -170,7 +170,7 @@ def _table_lines(table: Table) -> list[str]:
              for column, width in zip(table.columns, widths, strict=True)]
     deep = max(map(len, heads))
     rows = [*zip(*([""] * (deep - len(head)) + head for head in heads), strict=True), *cells]
-    left = [all(isinstance(row[index], str) for row in table.rows) for index in range(len(widths))]
+    left = [index in table.words for index in range(len(widths))]
     return ["  ".join(f"{cell:<{width}}" if words else f"{cell:>{width}}"
                       for cell, width, words in zip(row, widths, left, strict=True)).rstrip() for row in rows]
 

@@ -9,24 +9,31 @@ from collections.abc import Mapping, Sequence
 
 from logger.report.charts import chart
 from logger.report.document import document, grid, heading, paragraphs, section, tiles
-from logger.report.html import Html, concatenated, html
+from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
 from logger.studies.study import Result, Study, Table, Word
 
+_FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
-_STYLE = "th,td{vertical-align:top}td:nth-child(4),td:nth-child(2){min-width:12em}"
+_STYLE = "td:first-child{white-space:normal}"
+_INDEX_STYLE = _STYLE + (
+    "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(5){white-space:nowrap}"
+    "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
+    "tr{border-bottom:1px solid;padding:8px 0}td,td.n,td:first-child{border:0;text-align:left;padding:1px 0}}")
+"""On a phone each study is a block, as a row of five columns does not fit."""
 
 
-def page(study: Study, result: Result) -> Html:
-    """The study as one HTML document."""
+def page(study: Study, result: Result, contents: str = "") -> Html:
+    """The study as one HTML document; ``contents``: the name of a page beside it that lists all."""
     word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of {study.source}"),
         paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
         section("How it was made", paragraphs([
-            study.how, f"ridelog study {study.called}{' DIR' if study.data else ''}"]))])
+            study.how, f"ridelog study {study.called}{' DIR' if study.data else ''}"])),
+        html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
 
 
 def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
@@ -34,14 +41,14 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
     names, without those that were not run."""
     words = {one.called: _word(one, carried.get(one.called)) for one in known}
     counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
-    rows = [(", ".join(one.covers), _link(one, carried.get(one.called)), words[one.called],
-             _because(one, carried.get(one.called)),
-             f"{carried[one.called].seconds:.1f}" if one.called in carried else "-") for one in known]
+    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers), _link(one, carried.get(one.called)),
+             words[one.called], _because(one, carried.get(one.called)),
+             f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in known]
     sources = sorted({one.source for one in known})
     return document("Studies", [
         heading("Studies: printed results, made again", "; ".join(sources)),
         tiles(tile for tile in counts if tile[1] != "0"),
-        section("Contents", grid(("printed", "study", "word", "because", "time [s]"), rows, range(4)))], style=_STYLE)
+        section("Contents", grid(("printed", "study", "word", "because", "time"), rows, range(4)))], style=_INDEX_STYLE)
 
 
 def _word(study: Study, found: Carried | None) -> str:
@@ -63,7 +70,5 @@ def _link(study: Study, found: Carried | None) -> Html:
 
 
 def _table(table: Table) -> Html:
-    """Columns of words stand left, of numbers right."""
-    words = [index for index in range(len(table.columns)) if all(isinstance(row[index], str) for row in table.rows)]
     rows = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
-    return section(table.title, grid([column.name for column in table.columns], rows, words))
+    return section(table.title, grid([column.name for column in table.columns], rows, table.words))

@@ -7,6 +7,7 @@ over.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -42,7 +43,7 @@ def carry_out_all(chosen: Sequence[Study], share: float) -> Iterator[tuple[Study
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # read by numpy when a process begins
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
-        with ProcessPoolExecutor(max(1, min(cores, len(chosen))), mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(max(1, min(cores, len(chosen))), get_context("spawn"), _ends_when_interrupted) as pool:
             by_future = {pool.submit(carry_out, one.called, share): one for one in chosen}
             for future in as_completed(by_future):
                 error = future.exception()
@@ -53,6 +54,11 @@ def carry_out_all(chosen: Sequence[Study], share: float) -> Iterator[tuple[Study
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def _ends_when_interrupted() -> None:
+    """A process that catches an interrupt would go on with the next study."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _told(error: BaseException) -> str:

@@ -100,6 +100,12 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
+    @property
+    def words(self) -> tuple[int, ...]:
+        """Places of the columns of words, which stand left; numbers stand right."""
+        kinds = (set(map(type, cells)) - {type(None)} for cells in zip(*self.rows, strict=True))
+        return tuple(place for place, kind in enumerate(kinds) if kind == {str})
+
 
 @dataclass(frozen=True)
 class Value:
@@ -117,6 +123,12 @@ class Value:
     ours: float
     tolerance: float
     word: Word = Word.AGREES
+
+    @property
+    def difference(self) -> float:
+        """Ours less the printed; what is below the last bits of the print is nothing."""
+        difference = self.ours - self.printed
+        return 0.0 if abs(difference) < 1e-12 * abs(self.printed) else difference
 
     @property
     def holds(self) -> bool:
@@ -143,10 +155,10 @@ class Result:
 
 
 def _checked(values: Sequence[Value]) -> Table:
-    rows = tuple((one.name, one.printed, one.ours, one.ours - one.printed, one.tolerance,
+    rows = tuple((one.name, one.printed, one.ours, one.difference, one.tolerance,
                   str(one.word) if one.holds else f"expected: {one.word}") for one in values)
-    return Table("Printed and ours", (Column("value"), Column("printed", ".5g"), Column("ours", ".5g"), Column(
-        "difference", "+.3g"), Column("tolerance", ".2g"), Column("word")), rows)
+    return Table("Printed and ours", (Column("value"), Column("printed", ".6g"), Column("ours", ".6g"), Column(
+        "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,9 @@ import pytest
 from logger.commands.main import main
 from logger.commands.study import show_progress
 from logger.errors import BadInput
+from logger.studies.study import studies
+
+STUDIES = studies()
 
 
 def test_the_list(capsys: pytest.CaptureFixture[str]) -> None:
@@ -47,9 +51,38 @@ def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert told["figures"][0]["lines"][0]["name"] == "102 mm"
 
 
+def test_all_with_one_that_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good, away = STUDIES["table-4-1"], replace(STUDIES["table-4-2"], data="a folder of roads")
+    # The processes look studies up by themselves, and find none of this name.
+    bad = replace(good, name="table_9_9", title="Nothing")
+    monkeypatch.setattr("logger.studies.study.studies", lambda _shelf: {one.called: one for one in (bad, good, away)})
+    out = tmp_path / "pages"
+    assert main(["study", "all", "--quick", "--out", str(out), "--json"]) == 1
+    shown = capsys.readouterr()
+    told = json.loads(shown.out)
+    assert [(one["name"], one["failure"]) for one in told["studies"]] == [
+        ("table-9-9", "KeyError: 'table-9-9'"), ("table-4-1", None)]
+    assert shown.err.count("of 2] table-") == 2
+    page = (out / "index.html").read_text()
+    assert sorted(path.name for path in out.iterdir()) == ["index.html", "table-4-1.html"]
+    assert '<a href="table-4-1.html">' in page
+    assert "KeyError: &#x27;table-9-9&#x27;" in page
+    assert "Needs a folder of roads: ridelog study table-4-2 DIR." in page
+    assert not any(word in page for word in ("http:", "https:", "<script"))
+
+
+def test_a_study_that_needs_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    away = replace(STUDIES["table-4-2"], data="a folder of roads")
+    monkeypatch.setattr("logger.studies.study.studies", lambda _shelf: {away.called: away})
+    with pytest.raises(BadInput, match="study table-4-2: expected DIR, a folder of roads"):
+        main(["study", "table-4-2"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
-    [(["table-9-9"], "study 'table-9-9': expected one of fig-2-13"), ([], "expected the NAME of a study, all, or --list"),
+    [(["table-9-9"], "study 'table-9-9': expected one of "), ([], "expected the NAME of a study, all, or --list"),
      (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
      (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
      (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],

@@ -4,10 +4,11 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.roads.wavelength import slope_gain
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
 
 PRINTED_PEAKS_CPM = (0.065, 0.42)
 _BETWEEN_CPM = 0.2
+_NEAR = 0.05  # as near as the top of a broad hump is read off a figure
 
 
 def run(effort: Effort) -> Result:
@@ -27,7 +28,9 @@ def run(effort: Effort) -> Result:
     picture = Curves("Gain of the IRI's car at 80 km/h, slope of the suspension per slope of the road",
                      "logarithm to base 10 of the wave number [cycle/m]", "gain", (
                          Line("gain", np.log10(wave_number), gain),))
-    return Result((table,), verdict, (picture,))
+    values = tuple(Value(f"{words}, peak [cycle/m]", printed, float(wave_number[peak]), _NEAR * printed)
+                   for words, printed, peak in zip(("body", "wheel"), PRINTED_PEAKS_CPM, peaks, strict=True))
+    return Result((table,), verdict, (picture,), values)
 
 
 STUDY = Study("fig_2_13", "What the IRI hears of each wavelength", "Fig 2.13, section 2.2.2.1",

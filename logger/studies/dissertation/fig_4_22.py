@@ -5,7 +5,7 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of
 from logger.studies.fit_methods import MASS, TRUTH, fitted
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
 
 PRINTED_STARTS_KG = tuple(np.linspace(700, 1100, 20).tolist())
 PRINTED_WITHIN_PERCENT = 6.0
@@ -31,7 +31,9 @@ def run(effort: Effort) -> Result:
                "it.")
     picture = Curves("Where a fit of the mass ends", "start [kg]", "end [kg]",
                      (Line("start", starts, starts), Line("end", starts, ends, dots=True)), (TRUTH[MASS], "875 kg"))
-    return Result((table,), verdict, (picture,))
+    values = (Value("largest error of any start [%]", PRINTED_WITHIN_PERCENT,
+                    100 * float(np.abs(ends / TRUTH[MASS] - 1).max()), 0.0, Word.BETTER),)
+    return Result((table,), verdict, (picture,), values)
 
 
 STUDY = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4.22, section 4.4.1.2",

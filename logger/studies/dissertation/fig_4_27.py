@@ -8,11 +8,11 @@ from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, Conditions, bump, record_of, without_profile
 from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, mass_and_bump
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
 
 HEIGHTS_M = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())
 WIDTHS_M = tuple(round(0.3048 * feet, 3) for feet in np.arange(6, 11.01, 0.5).tolist())
-PRINTED_LIMIT_PERCENT = 50.0
+PRINTED_LIMIT_PERCENT, PRINTED_LEAST_MM = 50.0, 72.2
 _BUMP_AT_M, _SECONDS = 8.0, 8.0
 _SHOWN = 2  # every other grid point is in the table, all are in the picture
 _NUMBERS = ((MASS, "mass [kg]", TRUTH[MASS]), ("bump.height_m", "height [m]", BUMP_HEIGHT_M),
@@ -47,7 +47,10 @@ def run(effort: Effort) -> Result:
                     PRINTED_LIMIT_PERCENT)
     return Result((Table("Their way: error of the mass, fitted alone (printed as a picture only)",
                          columns, rows), ours),
-                  verdict, (picture,))
+                  verdict, (picture,), (
+                      Value("least height taken, 3 in [mm]", PRINTED_LEAST_MM, 1000 * HEIGHTS_M[0], 0.5, Word.MISPRINT),
+                      Value("mass with height, width and speed estimated, true 875 [kg]", TRUTH[MASS],
+                            found.parameters[MASS], 3 * found.standard_errors[MASS])))
 
 
 def _error_percent(record: Run, height_m: float, width_m: float) -> float:

@@ -8,7 +8,7 @@ from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, STEP_M, Conditions, bridge, record_of, without_profile
 from logger.studies.fit_methods import MASS, TRUTH, fitted
-from logger.studies.study import Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Column, Effort, Result, Study, Table, Value, Word
 
 HEIGHTS_M = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
 _STEP_AT_M, _SECONDS = 20.0, 6.0
@@ -48,7 +48,11 @@ def run(effort: Effort) -> Result:
         Line("white noise", 1000 * np.array(heights), white),
         Line("innovations form", 1000 * np.array(heights), masses),
         Line("in proportion", 1000 * np.array(heights), in_proportion, dots=True)), (TRUTH[MASS], "875 kg"))
-    return Result((table, ours), verdict, (picture,))
+    exact = float(white[int(np.abs(np.array(heights) - STEP_M).argmin())])
+    values = (Value("mass at the true height, 38.1 mm [kg]", TRUTH[MASS], exact, 0.01 * TRUTH[MASS]),
+              Value("mass with the height estimated [kg]", TRUTH[MASS], both.parameters[MASS],
+                    3 * both.standard_errors[MASS]))
+    return Result((table, ours), verdict, (picture,), values)
 
 
 def _mass(record: Run, height_m: float, ours: bool) -> float:

@@ -1,8 +1,8 @@
 """Table 4.2: the half car, and its natural frequencies (4.3.3)."""
 
-from logger.studies.dissertation.table_4_1 import COLUMNS, quoted
+from logger.studies.dissertation.table_4_1 import COLUMNS, quoted, quoted_values
 from logger.studies.drives import rav4
-from logger.studies.study import Effort, Result, Study, Table, Word
+from logger.studies.study import Effort, Result, Study, Table, Value, Word
 from logger.vehicle.models import structure_of
 
 PRINTED_HZ, PRINTED_DAMPING = (1.1, 11.0), 0.30
@@ -21,7 +21,9 @@ def run(effort: Effort) -> Result:
                f"{by_eq:.0f} kg, not {PRINTED_MASS_KG:.0f}; 875 is taken as the published car. The inertia is in kg "
                "m2, not kg/m2; and the pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are "
                "right.")
-    return Result((Table("Vibrations of the half car", COLUMNS, rows),), verdict)
+    values = (*quoted_values(rows, damping_within=0.015),
+              Value("half of the car with two people, Eq 4.36 [kg]", PRINTED_MASS_KG, by_eq, 1.0, Word.MISPRINT))
+    return Result((Table("Vibrations of the half car", COLUMNS, rows),), verdict, (), values)
 
 
 STUDY = Study("table_4_2", "Natural frequencies of the half car (RAV4)", "Table 4.2, section 4.3.3",
