@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -217,7 +216,7 @@ def test_lira_map_and_comma2k19_say_what_is_wrong(tmp_path: Path) -> None:
 
 
 def test_a_study_of_a_folder_needs_one() -> None:
-    with pytest.raises(BadInput, match="study comma2k19: expected the folder DIR of comma2k19"):
+    with pytest.raises(BadInput, match="study comma2k19: expected DIR, comma2k19 .clone github.com"):
         main(["study", "comma2k19"])
     with pytest.raises(BadInput, match="expected a folder with comma2k19"):
-        replace(COMMA).run(Effort())
+        COMMA.run(Effort())
