@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from logger.errors import BadInput
+from logger.shipped import vehicle_path
+from logger.store.formats.vehicle_file import read_model
 from logger.studies.study import Effort, Result
 
 NOT_RUN = ("ridelog's developers have not run the real files, which only a person can download: what is shown is of "
@@ -26,6 +28,8 @@ def from_folder(called: str, download: str, read: Callable[[Path, Effort], Resul
         if effort.folder is None or not effort.folder.is_dir():
             found = "a file" if effort.folder is not None and effort.folder.exists() else "nothing there"
             raise BadInput(f"{effort.folder}: expected a folder with {called}, found {found}: {download}")
+        if effort.vehicle is not None:
+            read_model(vehicle_path(effort.vehicle))  # refused now, not after an hour
         try:
             return read(effort.folder, effort)
         except FileNotFoundError as error:

@@ -76,6 +76,8 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
     if not study.data and args.vehicle is not None:
         raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
+    if args.out is not None and not args.out.parent.is_dir():
+        raise BadInput(f"--out {args.out}: expected a folder {args.out.parent}, found none")
     tell = show_progress if sys.stderr.isatty() else _say_nothing
     result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell, args.folder, args.vehicle))
     if args.out is not None:

@@ -12,6 +12,7 @@ import pytest
 from scipy.io import loadmat, savemat
 
 from logger.api.datasets.comma2k19 import STUDY as COMMA
+from logger.api.datasets.lira_cd import recordings
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.studies.study import Effort
@@ -169,8 +170,11 @@ def test_lira_cd_says_what_is_wrong(lira_cd: Path, tmp_path: Path) -> None:
         (folder / name).write_text(text, "latin-1")
     cars = tmp_path / "set" / "AutoPi_CAN" / "platoon_CPH1_HH.hdf5"
     with h5py.File(cars, "a") as file:
-        del file["GM/16006/pass_1/spd_veh"]
-    assert "16006-pass_1: expected spd_veh with 2 columns, found nothing" in refused("lira-cd", tmp_path / "set")
+        file.copy("GM/16006/pass_1", "GM/16006/pass_2")
+        del file["GM/16006/pass_2/spd_veh"]
+    found, left = recordings(cars)  # one bad pass among others is left out
+    assert [one.name for one in found] == ["16006-pass_1"]
+    assert left == ["16006-pass_2: expected spd_veh with 2 columns, found nothing"]
     with h5py.File(cars, "w") as file:
         file["else"] = 1
     assert "expected a group GM with the trips, found else" in refused("lira-cd", tmp_path / "set")
@@ -216,7 +220,7 @@ def test_lira_map_and_comma2k19_say_what_is_wrong(tmp_path: Path) -> None:
 
 
 def test_a_study_of_a_folder_needs_one() -> None:
-    with pytest.raises(BadInput, match="study comma2k19: expected DIR, comma2k19 .clone github.com"):
+    with pytest.raises(BadInput, match="study comma2k19: expected DIR, comma2k19"):
         main(["study", "comma2k19"])
     with pytest.raises(BadInput, match="expected a folder with comma2k19"):
         COMMA.run(Effort())

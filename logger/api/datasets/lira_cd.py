@@ -66,7 +66,9 @@ def run(folder: Path, effort: Effort) -> Result:
     repeats: list[Any] = []
     for file in files:
         road = profiled_road(folder, file)
-        passes = effort.some(recordings(file), 1)
+        whole, left = recordings(file)
+        refused += left
+        passes = effort.some(whole, 1) if whole else []
         for moves in (False, True):
             found, left = each_pass(passes, lambda one, road=road, moves=moves: _windows(  # type: ignore[misc]
                 one, effort.vehicle or _CAR, road, moves), effort.progress)
@@ -89,8 +91,9 @@ _CEILING = ("The profilers beside each other are the ceiling: no car can agree b
 # --- files ---
 
 
-def recordings(file: Path) -> list[Recording]:
-    """The passes of a file. Raises BadInput for one that is not of this layout, or where HDF5 cannot be read."""
+def recordings(file: Path) -> tuple[list[Recording], list[str]]:
+    """The passes of a file, and a line for each that lacks a signal. Raises BadInput for a file that is not of this
+    layout, or where HDF5 cannot be read."""
     try:
         import h5py
     except ImportError as error:
@@ -100,18 +103,24 @@ def recordings(file: Path) -> list[Recording]:
             trips = read.get("GM")
             if not isinstance(trips, h5py.Group):
                 raise BadInput(f"{file}: expected a group GM with the trips, found {', '.join(read)[:80] or 'nothing'}")
-            return [_recording(file, f"{trip}-{one}", group) for trip, passes in trips.items()
-                    for one, group in passes.items()]
+            found, lacking = [], []
+            for name, group in [(f"{trip}-{one}", group) for trip, passes in trips.items()
+                                for one, group in passes.items()]:
+                try:
+                    found.append(_recording(name, group))
+                except BadInput as error:
+                    lacking.append(str(error))
+            return found, lacking
     except OSError as error:
         raise BadInput(f"{file}: expected an HDF5 file, found {error}") from None
 
 
-def _recording(file: Path, name: str, group: Any) -> Recording:
+def _recording(name: str, group: Any) -> Recording:
     def signal(key: str, columns: int) -> Array:
         found = np.asarray(group[key][()], dtype=np.float64) if key in group else np.empty(0)
         if found.ndim != 2 or found.shape[1] < columns or len(found) < 2:
             size = " x ".join(map(str, found.shape)) if found.size else "nothing"
-            raise BadInput(f"{file}: {name}: expected {key} with {columns} columns, found {size}")
+            raise BadInput(f"{name}: expected {key} with {columns} columns, found {size}")
         return found[np.argsort(found[:, 0], kind="stable")]
 
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
