@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from logger.store.formats.vehicle_file import Model
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 WINDOWS_M = (10.0, 100.0)
 """What profilers report, and what roads are judged by."""
@@ -160,15 +161,15 @@ def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M)
     return found
 
 
-def each_pass(passes: list[Recording], windows: Callable[[Recording], list[DrivenWindows]],
-              progress: Callable[[int, int], None]) -> tuple[list[tuple[str, DrivenWindows]], list[str]]:
-    """The windows of every pass that can be used, with its name, and a line for each that cannot."""
-    found: list[tuple[str, DrivenWindows]] = []
+def each_pass(passes: list[Recording], windows: Callable[[Recording], list[T]], progress: Callable[[int, int], None]
+              ) -> tuple[list[T], list[str]]:
+    """The windows of every pass that can be used, and a line for each that cannot, with its name."""
+    found: list[T] = []
     refused: list[str] = []
     for done, one in enumerate(passes):
         progress(done, len(passes))
         try:
-            found += [(one.name, each) for each in windows(one)]
+            found += windows(one)
         except BadInput as error:
             refused.append(f"{one.name}: {error}")
     progress(len(passes), len(passes))

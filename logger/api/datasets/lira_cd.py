@@ -69,12 +69,11 @@ def run(folder: Path, effort: Effort) -> Result:
         whole, left = recordings(file)
         refused += left
         passes = effort.some(whole, 1) if whole else []
-        for moves in (False, True):
-            found, left = each_pass(passes, lambda one, road=road, moves=moves: _windows(  # type: ignore[misc]
-                one, effort.vehicle or _CAR, road, moves), effort.progress)
-            refused += left if moves else []
-            parts += [_beside(road, [one for _, one in found if one.window_m == window_m], window_m, moves)
-                      for window_m in WINDOWS_M if found]
+        found, left = each_pass(passes, lambda one, road=road: _windows(  # type: ignore[misc]
+            one, effort.vehicle or _CAR, road), effort.progress)
+        refused += left
+        parts += [_beside(road, [one for moved, one in found if moved == moves and one.window_m == window_m], window_m,
+                          moves) for window_m in WINDOWS_M for moves in (False, True) if found]
         repeats += [row for window_m in WINDOWS_M for row in _repeats(road, window_m)]
     if not parts:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
@@ -175,21 +174,22 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
 # --- the car, and one profiler beside the other ---
 
 
-def _windows(recording: Recording, vehicle: str, road: ProfiledRoad, moves: bool) -> list[DrivenWindows]:
-    """Of each time that the pass goes over the profiled road, with windows where its cells are; ``moves``: then moved
-    along to where cells of 10 m fit best, and estimated again."""
+def _windows(recording: Recording, vehicle: str, road: ProfiledRoad) -> list[tuple[bool, DrivenWindows]]:
+    """Of each time that the pass goes over the profiled road, with windows where its cells are; once more, True beside
+    it, moved along to where cells of 10 m fit best."""
     model = read_model(vehicle_path(vehicle))
-    found: list[DrivenWindows] = []
+    found: list[tuple[bool, DrivenWindows]] = []
     runs = [one for run in runs_of(recording, vehicle) for one in on_line(run, road.line, float(road.edges_m[0]))]
+    edges_m = road.edges_m - road.edges_m[0]
     for run in runs:
-        if moves:
-            fine = windows_of(run, model, (_FINE_M,))[0]
-            edges_m = road.edges_m - road.edges_m[0]
-            driven = (edges_m[:-1] >= fine.begin_m[0]) & (edges_m[1:] <= fine.end_m[-1])
-            shift_m = best_shift_m(np.append(fine.begin_m, fine.end_m[-1]), fine.iri_m_per_km, edges_m[:-1][driven],
-                                   edges_m[1:][driven], road.iri_m_per_km[driven], _MOST_SHIFT_M)
-            run = replace(run, distance_m=run.distance_m - shift_m)
-        found += windows_of(run, model)
+        if not (each := windows_of(run, model, (_FINE_M, *WINDOWS_M))):
+            continue
+        fine, *placed = each
+        driven = (edges_m[:-1] >= fine.begin_m[0]) & (edges_m[1:] <= fine.end_m[-1])
+        shift_m = best_shift_m(np.append(fine.begin_m, fine.end_m[-1]), fine.iri_m_per_km, edges_m[:-1][driven],
+                               edges_m[1:][driven], road.iri_m_per_km[driven], _MOST_SHIFT_M)
+        moved = windows_of(replace(run, distance_m=run.distance_m - shift_m), model)
+        found += [(False, one) for one in placed] + [(True, one) for one in moved]
     if not found:
         raise BadInput("expected a pass over the profiled road, found none")
     return found

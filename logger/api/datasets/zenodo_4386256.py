@@ -70,7 +70,7 @@ def run(folder: Path, effort: Effort) -> Result:
             mine = [one for each, one in pairs if each is road]
             windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
                 one, effort.vehicle or _CAR, profile=line), effort.progress)
-            found += [(road.name, one) for _, one in windows]
+            found += [(road.name, one) for one in windows]
             elsewhere += [one for one in left if _OFF in one]
             refused += [one for one in left if _OFF not in one]
     parts = [part for road in roads for window_m in WINDOWS_M
