@@ -11,14 +11,14 @@ from logger.report.charts import chart
 from logger.report.document import document, grid, heading, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
-from logger.studies.study import Result, Study, Table, Word
+from logger.studies.study import DISSERTATION, Result, Study, Table, Word
 
 _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
-_STYLE = "td:first-child{white-space:normal}"
+_STYLE = "td:first-child{white-space:normal;min-width:9em}"
 _INDEX_STYLE = _STYLE + (
-    "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(5){white-space:nowrap}"
+    "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(3),td:nth-child(5){white-space:nowrap}"
     "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
     "tr{border-bottom:1px solid;padding:8px 0}td,td.n,td:first-child{border:0;text-align:left;padding:1px 0}}")
 """On a phone each study is a block, as a row of five columns does not fit."""
@@ -41,14 +41,20 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
     names, without those that were not run."""
     words = {one.called: _word(one, carried.get(one.called)) for one in known}
     counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
-    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers), _link(one, carried.get(one.called)),
-             words[one.called], _because(one, carried.get(one.called)),
-             f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in known]
-    sources = sorted({one.source for one in known})
+    parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
+    titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
-        heading("Studies: printed results, made again", "; ".join(sources)),
+        heading("Studies: printed results, made again", "Each with one word for how ours stands beside the print."),
         tiles(tile for tile in counts if tile[1] != "0"),
-        section("Contents", grid(("printed", "study", "word", "because", "time"), rows, range(4)))], style=_INDEX_STYLE)
+        *(_contents(title, part, words, carried) for title, part in zip(titles, parts, strict=True) if part)],
+        style=_INDEX_STYLE)
+
+
+def _contents(title: str, part: Sequence[Study], words: Mapping[str, str], carried: Mapping[str, Carried]) -> Html:
+    rows = [(", ".join(item.replace(" ", _FIRM) for item in one.covers) if one.source == DISSERTATION else one.source,
+             _link(one, carried.get(one.called)), words[one.called], _because(one, carried.get(one.called)),
+             f"{carried[one.called].seconds:.1f} s" if one.called in carried else "-") for one in part]
+    return section(title, grid(("printed", "study", "word", "because", "time"), rows, range(4)))
 
 
 def _word(study: Study, found: Carried | None) -> str:

@@ -17,10 +17,12 @@ import numpy.typing as npt
 
 from logger.profiles.track import Track
 from logger.roads.bumps import speed_bump
-from logger.roads.iso8608 import gd_n0_from_iri, generate
+from logger.roads.gd_iri import iri_per_root_gd
+from logger.roads.iso8608 import STANDARD_WAVINESS, gd_n0_from_iri, generate
 from logger.roads.obstacles import step
 from logger.runs import Run
 from logger.shipped import vehicle_file
+from logger.simulation.virtual_drive import SensorErrors, as_sensed
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.models import structure_of
@@ -34,7 +36,7 @@ Shape = Callable[[Array], Array]
 RATE_HZ = 100
 BUMP_MPS, BRIDGE_MPS = 16.1 / 3.6, 48.3 / 3.6
 BUMP_HEIGHT_M, BUMP_WIDTH_M, STEP_M = 0.150, 2.60, 0.0381
-SPACING_M = 0.02
+SPACING_M, ROAD_SPACING_M = 0.02, 0.05
 _BEFORE_M, _BEHIND_M = 80.0, 80.0
 _LEAD_S = 3.0
 
@@ -74,24 +76,42 @@ def bridge(start_m: float, height_m: float = STEP_M) -> Shape:
 
 
 def record_of(
-    obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None
+    obstacle: Shape, speed_mps: float, seconds: float, conditions: Conditions, vehicle: Vehicle | None = None,
+    spacing_m: float = SPACING_M,
 ) -> Run:
     """A drive over an obstacle at a steady speed, with the obstacle as its known profile. None: that of Table 4.2."""
     time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     distance_m = speed_mps * time_s
-    place_m = np.arange(-_BEFORE_M, distance_m[-1] + _BEHIND_M, SPACING_M)
+    place_m = np.arange(-_BEFORE_M, distance_m[-1] + _BEHIND_M, spacing_m)
     known = obstacle(place_m)
     road = known
     if conditions.iri_m_per_km:
-        length_m = SPACING_M * (len(place_m) + 1)
-        road = known + generate(gd_n0_from_iri(conditions.iri_m_per_km), length_m, SPACING_M,
+        length_m = spacing_m * (len(place_m) + 1)
+        road = known + generate(gd_n0_from_iri(conditions.iri_m_per_km), length_m, spacing_m,
                                 conditions.seed)[: len(place_m)]
-    sensed = recorded(vehicle or rav4(), Track(SPACING_M, road, float(place_m[0])), distance_m, conditions.noise_mps2,
-                      conditions.seed)
-    if conditions.step_mps2:
-        sensed = conditions.step_mps2 * np.round(sensed / conditions.step_mps2)
-    track = Track(SPACING_M, known, float(place_m[0]))
+    sensed = _recorded(vehicle, Track(spacing_m, road, float(place_m[0])), distance_m, conditions)
+    track = Track(spacing_m, known, float(place_m[0]))
     return Run("simulated", RATE_HZ, sensed, distance_m, np.full(len(time_s), speed_mps), track, skip_s=0.0)
+
+
+def drive_over(road: Track, speed_mps: float, conditions: Conditions, vehicle: Vehicle | None = None) -> Run:
+    """A drive at a steady speed from 0 m to the end of a road that is known. None: the vehicle of Table 4.2."""
+    distance_m = np.arange(0.0, road.end_m - _BEHIND_M, speed_mps / RATE_HZ)
+    sensed = _recorded(vehicle, road, distance_m, conditions)
+    return Run("simulated", RATE_HZ, sensed, distance_m, np.full(len(distance_m), speed_mps), road, skip_s=0.0)
+
+
+def random_road(iri_m_per_km: float, length_m: float, seed: int, waviness: float = STANDARD_WAVINESS) -> Track:
+    """A random road whose places count from 0 m to its length, with some more before and behind, of this IRI on the
+    average of such roads."""
+    whole_m = _BEFORE_M + length_m + _BEHIND_M
+    gd_n0_cm3 = (iri_m_per_km / iri_per_root_gd(waviness)) ** 2
+    return Track(ROAD_SPACING_M, generate(gd_n0_cm3, whole_m, ROAD_SPACING_M, seed, waviness), -_BEFORE_M)
+
+
+def places_m(road: Track) -> Array:
+    """Where the samples of a road lie (n,) [m]."""
+    return np.asarray(road.start_m + road.spacing_m * np.arange(len(road.elevation_m)), float)
 
 
 def without_profile(record: Run, speed_scale: float = 1.0) -> Run:
@@ -107,11 +127,16 @@ def until(record: Run, distance_m: float) -> Run:
                    distance_m=record.distance_m[kept], speed_mps=record.speed_mps[kept])
 
 
-def recorded(vehicle: Vehicle, track: Track, distance_m: Array, noise_mps2: float, seed: int) -> Array:
+def _recorded(vehicle: Vehicle | None, track: Track, distance_m: Array, conditions: Conditions) -> Array:
+    return recorded(vehicle or rav4(), track, distance_m, conditions.noise_mps2, conditions.seed, conditions.step_mps2)
+
+
+def recorded(vehicle: Vehicle, track: Track, distance_m: Array, noise_mps2: float, seed: int,
+             step_mps2: float = 0.0) -> Array:
     """What the sensor records; the car has come to the start as fast as it goes there."""
     lead = np.arange(-_LEAD_S * RATE_HZ, 0)
     way_m = np.concatenate([distance_m[0] + (distance_m[1] - distance_m[0]) * lead, distance_m])
     structure = structure_of(vehicle)
     sensor = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m)
     clean = drive(structure, [sensor], track, np.arange(len(way_m)) / RATE_HZ, way_m)[len(lead):, 0]
-    return np.asarray(clean + noise_mps2 * np.random.default_rng(seed).standard_normal(len(clean)))
+    return as_sensed(clean, SensorErrors(noise_mps2, step_mps2, seed))

@@ -16,6 +16,7 @@ from logger.identification.unknown_inputs import SPEED_SCALE, RoadInput, free_in
 from logger.runs import Run
 from logger.studies.drives import RATE_HZ, rav4
 from logger.vehicle.named_parameters import free
+from logger.vehicle.vehicle import Vehicle
 
 MASS = "sprung_mass_kg"
 FRONT, REAR = "front.suspension_stiffness_n_per_m", "rear.suspension_stiffness_n_per_m"
@@ -24,15 +25,16 @@ TRUTH = {MASS: 875.0, FRONT: 23_088.0, REAR: 23_088.0}
 
 
 def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput | None = None,
-           low_pass_hz: float | None = None) -> Fit:
-    """The numbers in ``start``, of the car or of ``road``, from one record, starting there.
+           low_pass_hz: float | None = None, vehicle: Vehicle | None = None) -> Fit:
+    """The numbers in ``start``, of the car (None: that of Table 4.2) or of ``road``, from one record, starting there.
 
     NotIdentifiable where the record cannot tell them.
     """
     road = road or RoadInput()
-    numbers = [free_input(road, name, value) if is_input(name) else free(rav4(), name, value)
+    car = vehicle or rav4()
+    numbers = [free_input(road, name, value) if is_input(name) else free(car, name, value)
                for name, value in start.items()]
-    model = VehicleModel(rav4(), numbers, [record], road)
+    model = VehicleModel(car, numbers, [record], road)
     noise: list[Noise] = [White()]
     if ours:
         noise += [Autoregressive(), RoadNoise(model.road_spectra)]

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.identification.obstacle_paths import Bump
 from logger.identification.unknown_inputs import RoadInput
 from logger.studies.drives import BUMP_HEIGHT_M, BUMP_MPS, BUMP_WIDTH_M, PS_2119, bump, record_of, without_profile
 from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, mass_and_bump, standard_error_percent
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Value, Word
 
 PRINTED_KG = ((870.658, 844.053), (927.464, 911.141), (519.555, 660.512), (672.677, 817.204))
 PRINTED_PERCENT = ((0.50, 3.54), (6.00, 4.13), (40.62, 24.51), (23.12, 6.61))
@@ -51,7 +52,18 @@ def run(effort: Effort) -> Result:
                f"{_rms(np.array(PRINTED_PERCENT)):.0f} % printed: much of the printed errors needs no other cause. "
                f"Estimating bump and speed together with the mass leaves {_rms(ours):.1f} %, which is the road's "
                "roughness, and its standard error says so.")
-    return Result((printed, one_by_one, many), verdict)
+    values = tuple(Value(f"error of the printed mass, bump {bump}, trial {trial} [%]", percent,
+                         100 * abs(PRINTED_KG[bump - 1][trial - 1] / TRUTH[MASS] - 1), 0.01)
+                   for bump, pair in enumerate(PRINTED_PERCENT, start=1) for trial, percent in enumerate(pair, start=1))
+    errors = {"printed": np.ravel(PRINTED_PERCENT), "their way": theirs, "ours": ours}
+    scatter = Curves("Errors of the mass, sorted by size. Printed (Fig 6.1): a bump, and the response to it",
+                     "share of the drives [%]", "error of the mass [%]",
+                     tuple(_sorted(name, found) for name, found in errors.items()))
+    return Result((printed, one_by_one, many), verdict, (scatter,), values)
+
+
+def _sorted(name: str, errors: np.ndarray) -> Line:
+    return Line(name, 100 * (np.arange(len(errors)) + 0.5) / len(errors), np.sort(np.abs(errors)))
 
 
 def _both_ways(height: float, width: float, speed: float, iri: float, seed: int) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from logger.chart_data import Curves, Line
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.obstacle_paths import RoadStep
 from logger.identification.prediction_error_fit import Fit
@@ -12,7 +13,7 @@ from logger.identification.unknown_inputs import RoadInput
 from logger.runs import Run
 from logger.studies.drives import BRIDGE_MPS, PS_2119, STEP_M, bridge, record_of, without_profile
 from logger.studies.fit_methods import MASS, TRUTH, error_percent, fitted, standard_error_percent
-from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Word
+from logger.studies.study import Cell, Column, Effort, Result, Study, Table, Value, Word
 
 PRINTED = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
            ("2-1", 576.042, 34.17, 460.687, 47.35), ("2-2", 416.843, 52.36, 496.564, 43.25))
@@ -44,7 +45,19 @@ def run(effort: Effort) -> Result:
                "the road's roughness, and the standard error says how much. A step of half an inch on a rough road "
                "hardly tells the mass, and that is said, too. With a known mass the height is the better thing to "
                "ask for.")
-    return Result((printed, table), verdict)
+    values = tuple(Value(f"error of the printed mass, bump {bump}, trial {trial} [%]", percent,
+                         100 * abs(mass / TRUTH[MASS] - 1), 0.01)
+                   for bump, *found in PRINTED for trial, (mass, percent) in enumerate((found[:2], found[2:]), start=1))
+    grown = Curves("Error of the height that is found for a known mass, by the road. Printed (Fig 6.2): the response "
+                   "to the bridge, hardly above that to the road", "IRI of the road [m/km]", "error of the height [mm]",
+                   tuple(_by_iri(step_m, rows) for step_m in dict(cases)))
+    return Result((printed, table), verdict, (grown,), values)
+
+
+def _by_iri(step_m: float, rows: Sequence[tuple[Cell, ...]]) -> Line:
+    of_step = [row for row in rows if row[0] == 1000 * step_m]
+    iri, error = (np.array([float(str(row[place])) for row in of_step]) for place in (1, 6))
+    return Line(f"step of {1000 * step_m:.1f} mm", iri, error)
 
 
 @dataclass(frozen=True)
