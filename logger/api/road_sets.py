@@ -15,7 +15,7 @@ from logger.shipped import vehicle_path
 from logger.store.formats.vehicle_file import read_model
 from logger.studies.study import Effort, Result
 
-NOT_RUN = "Only a person can download the real files: ridelog's developers have not run them, and claim nothing of them."
+NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and claim nothing of them."
 
 
 def from_folder(called: str, download: str, read: Callable[[Path, Effort], Result]) -> Callable[[Effort], Result]:
