@@ -5,6 +5,7 @@
   ridelog study fig-4-27 --out fig-4-27.html
   ridelog study all --quick --out studies
   ridelog study all --shelf field --out studies
+  ridelog study lira-cd DIR --vehicle mycar.yaml
 
 Each study ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation measured, the
 study simulates under the conditions that its text gives: the records were never published.
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from logger.studies.study import Cell, Result, Study, Table
 
 QUICK_SHARE = 0.1
-SHELF_NAMES = ("dissertation", "field")
+SHELF_NAMES = ("dissertation", "field", "roads")
 _WIDTH = 118
 _BAR = 30
 
@@ -37,10 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", metavar="NAME", help="the study, as --list names it, or all")
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="the data of a study that needs some")
     parser.add_argument("--list", action="store_true", help="list the studies there are")
-    parser.add_argument("--shelf", choices=SHELF_NAMES, help="only this shelf: the dissertation's, or other papers'")
+    parser.add_argument("--shelf", choices=SHELF_NAMES,
+                        help="only this shelf: the dissertation's, other papers', or public records of roads")
     parser.add_argument("--quick", action="store_true", help="a tenth of the draws and grid points")
     parser.add_argument("--out", type=Path, metavar="PLACE",
                         help="also write a page with tables and pictures; for all: a folder of pages with index.html")
+    parser.add_argument("--vehicle", metavar="NAME|FILE", help="the car of a study of records of a road")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
@@ -71,8 +74,12 @@ def _one(study: Study, args: argparse.Namespace) -> int:
         raise BadInput(f"study {study.called}: expected DIR, {study.data}")
     if not study.data and args.folder is not None:
         raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
+    if not study.data and args.vehicle is not None:
+        raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
+    if args.out is not None and not args.out.parent.is_dir():
+        raise BadInput(f"--out {args.out}: expected a folder {args.out.parent}, found none")
     tell = show_progress if sys.stderr.isatty() else _say_nothing
-    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell, args.folder))
+    result = study.run(Effort(QUICK_SHARE if args.quick else 1.0, tell, args.folder, args.vehicle))
     if args.out is not None:
         from logger.report.study_page import page
 

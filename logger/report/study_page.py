@@ -31,7 +31,8 @@ def page(study: Study, result: Result, contents: str = "") -> Html:
         heading(study.title, f"{study.where} of {study.source}"),
         paragraphs([word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
-        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"])),
+        section("How it was made", paragraphs([
+            study.how, f"ridelog study {study.called}{' DIR' if study.data else ''}"])),
         html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
 
 

@@ -26,8 +26,10 @@ T = TypeVar("T")
 Cell = str | float | None
 
 OFFER = "STUDY"
-SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studies.field"}
-"""Folders of studies: of the reference dissertation, and of other papers and data that a reader knows."""
+SHELVES = {"dissertation": "logger.studies.dissertation", "field": "logger.studies.field",
+           "roads": "logger.api.datasets"}
+"""Folders of studies: of the reference dissertation, of other papers that a reader knows, and of public records of
+roads."""
 DISSERTATION = "N. Blum, dissertation, University of Maryland, 2015"
 
 
@@ -51,11 +53,13 @@ class Effort:
     share       of the full number of draws and grid points, above 0, up to 1
     progress    called with how many of how many parts are done
     folder      of the data, for a study that needs some (``Study.data``)
+    vehicle     the car of those data, a name or a file; None: what the study takes
     """
 
     share: float = 1.0
     progress: Callable[[int, int], None] = _silent
     folder: Path | None = None
+    vehicle: str | None = None
 
     def count(self, full: int, least: int = 2) -> int:
         """How many draws to make instead of ``full``."""

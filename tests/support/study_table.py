@@ -7,7 +7,8 @@ from pathlib import Path
 from logger.studies.study import SHELVES, studies
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "studies.md"
-TITLES = {"dissertation": "The dissertation, item by item", "field": "Other papers and data"}
+TITLES = {"dissertation": "The dissertation, item by item", "field": "Other papers",
+          "roads": "Public records of roads"}
 
 
 def tables() -> str:

@@ -1,0 +1,129 @@
+"""comma2k19: a minute on a highway in a Toyota RAV4, device on the windscreen (Schafer et al., arXiv:1812.05752, MIT).
+
+Layout of a segment (README of github.com/commaai/comma2k19): NumPy arrays ``t`` [s] and ``value`` in
+``processed_log/IMU/accelerometer`` (forward, right, down [m/s2], gravity in it),
+``processed_log/GNSS/live_gnss_ublox`` (latitude, longitude [degrees], speed [m/s], ...) and ``processed_log/CAN/speed``
+[m/s]. There is no profiler: what comes out is rows and a map, and the speeds beside each other.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.road_passes import DrivenWindows, Recording, driven_windows
+from logger.api.road_sets import expected_files, from_folder
+from logger.chart_data import Curves, Line
+from logger.errors import BadInput
+from logger.geodesy import EARTH_RADIUS_M
+from logger.roads.iso8608 import iri_class
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
+
+Array = npt.NDArray[np.float64]
+
+_CAR = "rav4-2009"
+_WINDOW_M = 25.0
+_LAGS_S = np.arange(-0.5, 0.51, 0.01)
+
+
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    log = expected_files(folder, "processed_log/IMU/accelerometer/value", "a segment's IMU")[0].parents[2]
+    recording = segment(log)
+    drives = driven_windows(recording, effort.vehicle or _CAR, (_WINDOW_M,))
+    rows = tuple(row for one in drives for row in _rows(one))
+    known = np.array([row[6] for row in rows if row[6] is not None], dtype=np.float64)
+    if not len(known):
+        raise BadInput(f"{log}: expected a drive of 100 m or more at a steady speed, found no window that can be known")
+    tables = [Table(f"Rows of {_WINDOW_M:g} m", (
+        Column("from [m]", ".0f"), Column("to [m]", ".0f"), Column("latitude [deg]", ".6f"),
+        Column("longitude [deg]", ".6f"), Column("speed [m/s]", ".1f"), Column("class"), Column("IRI [m/km]", ".2f"),
+        Column("std. error [m/km]", ".2f")), rows)]
+    words = (f"{len(known)} of {len(rows)} rows of {_WINDOW_M:g} m have an IRI, {known.mean():.2f} m/km on the mean, "
+             f"{known.min():.2f} to {known.max():.2f}. Nobody measured this road with a profiler here, so that is not "
+             "shown to be right.")
+    speed = _speeds(log, recording)
+    if speed is not None:
+        tables.append(Table("The receiver's speed beside the car's", (
+            Column("figure"), Column("read before", ".3g"), Column("ours", ".3g")), speed))
+    return Result(tuple(tables), words, (_map(drives),))
+
+
+def segment(log: Path) -> Recording:
+    """The record of a ``processed_log``. Raises BadInput."""
+    time_s, accel = _signal(log / "IMU" / "accelerometer", 3)
+    fix_s, fixes = _signal(log / "GNSS" / "live_gnss_ublox", 3)
+    return Recording(log.parent.name, time_s, accel[:, :3], "m/s2", fix_s, fixes[:, 2], fixes[:, 0], fixes[:, 1])
+
+
+def _signal(folder: Path, columns: int) -> tuple[Array, Array]:
+    """Times (n,) from the first sample of the device's clock on, and values (n, c), c at least ``columns``."""
+    time_s, value = (_array(folder / name) for name in ("t", "value"))
+    value = value.reshape(len(value), -1)
+    if time_s.ndim != 1 or len(value) != len(time_s) or value.shape[1] < columns:
+        raise BadInput(f"{folder}: expected t (n,) and value (n, {columns} or more), found {time_s.shape} and "
+                       f"{value.shape}")
+    return time_s, value
+
+
+def _array(path: Path) -> Array:
+    try:
+        return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path}: expected an array of the segment, found nothing there") from None
+    except (ValueError, OSError, EOFError) as error:
+        raise BadInput(f"{path}: expected an array of NumPy, found {str(error)[:80]}") from None
+
+
+def _rows(one: DrivenWindows) -> list[tuple[str | float | None, ...]]:
+    middle = (one.begin_deg + one.end_deg) / 2
+    rows: list[tuple[str | float | None, ...]] = []
+    for begin_m, end_m, place, speed_mps, iri, std in zip(one.begin_m, one.end_m, middle, one.speed_mps,
+                                                           one.iri_m_per_km, one.iri_std_m_per_km, strict=True):
+        known = bool(np.isfinite(iri))
+        rows.append((float(begin_m), float(end_m), *map(float, place), float(speed_mps),
+                     iri_class(float(iri)) if known else "-", float(iri) if known else None,
+                     float(std) if known else None))
+    return rows
+
+
+def _speeds(log: Path, recording: Recording) -> tuple[tuple[str, float, float], ...] | None:
+    """How much faster and later the receiver's speed is; None where the car's was not recorded."""
+    if not (log / "CAN" / "speed" / "value").exists():
+        return None
+    car_s, car = _signal(log / "CAN" / "speed", 1)
+    inside = (recording.fix_s > car_s[0] + 0.6) & (recording.fix_s < car_s[-1] - 0.6)
+    fix_s, theirs = recording.fix_s[inside], recording.speed_mps[inside]
+    off = [theirs - np.interp(fix_s - lag_s, car_s, car[:, 0]) for lag_s in _LAGS_S]
+    best = int(np.argmin([one.std() for one in off]))
+    # Read before: a hand-made comparison of the same minute, not printed in the paper.
+    return (("later by [s]", 0.20, float(_LAGS_S[best])), ("faster by [m/s]", 0.15, float(off[best].mean())),
+            ("spread [m/s]", 0.08, float(off[best].std())))
+
+
+def _map(drives: list[DrivenWindows]) -> Curves:
+    """Each row a dot of its class, east and north of the first."""
+    places = np.concatenate([(one.begin_deg + one.end_deg) / 2 for one in drives])
+    iri = np.concatenate([one.iri_m_per_km for one in drives])
+    north_m, east_m = (EARTH_RADIUS_M * np.radians(places - places[0])).T
+    east_m = east_m * np.cos(np.radians(places[0, 0]))
+    classes = np.array([iri_class(one) if np.isfinite(one) else "unknown" for one in iri])
+    there = sorted(set(classes.tolist()))
+    # The first two lines of a chart are blue and red: what is smoothest and what is roughest.
+    lines = tuple(Line(name, east_m[classes == name], north_m[classes == name], dots=True)
+                  for name in dict.fromkeys((there[0], there[-1], *there)))
+    return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines)
+
+
+_DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"
+STUDY = Study(
+    "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
+    "The segment goes the way of any recording: extract --csv with the receiver's places and speed, then estimate with "
+    "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
+    "middle, unless --vehicle names another car. This was run on the real minute.",
+    from_folder("comma2k19", _DOWNLOAD, run), ("comma2k19",), Word.AGREES,
+    "The receiver's speed is as much later and faster than the car's as was read before; of its IRI there is no "
+    "print.",
+    source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

@@ -1,0 +1,116 @@
+"""Passes of a reference profiler over one road, IRI per 10 m: how well a profiler repeats itself.
+
+Layout of github.com/peacefulotter/LiRA-Map (MIT), ``server/backup/trip_iri_*.json``, compressed or not: ``path.data``
+is a list of ``{"pos": {"lat", "lng"}, "timestamp": metres from the start, "value": IRI [m/km]}``. What the files are is
+not said there; it is inferred from names and content.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import zlib
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.road_sets import expected_files, from_folder
+from logger.api.road_tables import REPEAT_COLUMNS, repeat_row
+from logger.chart_data import Curves, Line
+from logger.errors import BadInput
+from logger.extraction.measured_line import ASIDE_M, MeasuredLine
+from logger.files import read_bounded
+from logger.roads.agreement import best_shift_m, matching_cells, mean_between
+from logger.studies.study import Column, Effort, Result, Study, Table, Word
+
+Array = npt.NDArray[np.float64]
+
+PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
+_WINDOWS_M = (10.0, 100.0)
+_CELL_M, _MOST_CELLS = 10.0, 1
+_MOST_BYTES = 64 << 20
+
+
+class ProfilerPass:
+    """Cells (k,) of 10 m with their IRI [m/km], and the places at which they begin."""
+
+    def __init__(self, path: Path) -> None:
+        data = read_bounded(path, _MOST_BYTES)
+        try:
+            points = json.loads(gzip.decompress(data) if path.suffix == ".gz" else data)["path"]["data"]
+            rows = np.array([(float(one["timestamp"]), one["value"], one["pos"]["lat"], one["pos"]["lng"])
+                             for one in points], dtype=np.float64)
+            at_m, self.iri_m_per_km, lat_deg, lon_deg = rows.T
+            self.line = MeasuredLine.of(at_m, lat_deg, lon_deg)
+        except (KeyError, TypeError, ValueError, OSError, EOFError, zlib.error) as error:
+            raise BadInput(f"{path}: expected path.data with pos, timestamp (metres, growing) and value, found "
+                           f"{type(error).__name__}: {str(error)[:80]}") from None
+        self.name = path.name.split(".")[0].removeprefix("trip_iri_")
+        self.begin_m, self.lat_deg, self.lon_deg = at_m, lat_deg, lon_deg
+        self.edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
+
+
+def run(folder: Path, effort: Effort) -> Result:
+    """As ``from_folder`` calls it."""
+    passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0])
+              for name in PASSES]
+    pairs = list(effort.each(list(combinations(passes, 2))))
+    tables: list[Table] = []
+    ours: list[list[float]] = []
+    off_m_per_km: list[float] = []
+    for window_m in _WINDOWS_M:
+        rows = [row for one, other in pairs for row in _beside(one, other, window_m)]
+        tables.append(Table(f"Windows of {window_m:g} m", REPEAT_COLUMNS, tuple(rows)))
+        ours.append([row[3] for row in rows if isinstance(row[3], float)])
+        off_m_per_km.append(max(row[8] for row in rows if isinstance(row[8], float)))
+    columns = (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f"))
+    length = Table("The passes", columns, tuple(
+        (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
+    spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]
+    verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m, the lower "
+               "ones where its cells lie up to 5 m apart; two passes differ by up to "
+               f"{off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than "
+               "that against one pass: it is the ceiling of every comparison on real roads.")
+    return Result((*tables, length), verdict, (_picture(passes),))
+
+
+def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tuple[str | float | None, ...]]:
+    """The other pass on the distance of the one, in two ways that hold the truth between them."""
+    at_m, aside_m = one.line.passed(other.lat_deg, other.lon_deg)
+    on = (aside_m <= ASIDE_M) & np.append(True, np.diff(np.maximum.accumulate(at_m)) > 0)
+    at_m, values = at_m[on], other.iri_m_per_km[on]
+    begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - window_m + 1, window_m)
+    ends_m = (begin_m, begin_m + window_m)
+    names = f"{other.name} beside {one.name}"
+    theirs, cells = matching_cells(one.begin_m, one.iri_m_per_km, at_m, values, _MOST_CELLS)
+    mine = np.where(np.isfinite(theirs), one.iri_m_per_km, np.nan)
+    nearest = (mean_between(one.edges_m, theirs, *ends_m), mean_between(one.edges_m, mine, *ends_m))
+    edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
+    whole = mean_between(one.edges_m, one.iri_m_per_km, *ends_m)
+    shift_m = best_shift_m(edges_m, values, *ends_m, whole, _MOST_CELLS * _CELL_M)
+    moved = mean_between(edges_m, values, begin_m + shift_m, begin_m + window_m + shift_m)
+    return [repeat_row(names, "nearest cells", *nearest, _CELL_M * cells),
+            repeat_row(names, "laid over", moved, whole, shift_m)]
+
+
+def _picture(passes: list[ProfilerPass]) -> Curves:
+    lines = []
+    for one in passes:
+        begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - 99, 100.0)
+        values = mean_between(one.edges_m, one.iri_m_per_km, begin_m, begin_m + 100.0)
+        lines.append(Line(one.name, begin_m / 1000, values))
+    return Curves("Three passes, IRI over 100 m", "along the road [km]", "IRI [m/km]", tuple(lines))
+
+
+_DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read"
+STUDY = Study(
+    "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
+    "Three passes over some 26 km of Danish road, by their places. Their cells of 10 m begin at different places. "
+    "Nearest: each beside the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
+    "over: means of two cells' parts, smoother than what was measured, which makes them more alike. The truth lies "
+    "between. This was run on the real files.",
+    from_folder("LiRA-Map", _DOWNLOAD, run), ("LiRA-Map",), Word.AGREES,
+    "Run on the real files, it gives the ceiling that is printed beside every other set; no paper prints it.",
+    source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

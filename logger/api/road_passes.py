@@ -1,0 +1,176 @@
+"""A pass of a public record of roads, through the same path as any recording: CSV, extraction, estimate.
+
+Problem: a figure of a data set says something of the program only if the program's own path was gone: a reader that
+filters, levels and aligns by itself measures itself. Solution: a pass is written as the CSV files that a phone would
+have left, ``extract --csv`` makes its runs, ``estimate`` its windows; what is left here is where each window lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from logger.api.csv_extraction import Asked, extract_csv
+from logger.api.drives import assessed, read_run, step_of
+from logger.api.extracted_runs import read_measured_profile
+from logger.api.ranges import NOISE_MPS2
+from logger.errors import BadInput
+from logger.extraction.measured_line import MeasuredLine, passes
+from logger.shipped import vehicle_path
+from logger.store.formats.logger_columns import named_columns
+from logger.store.formats.vehicle_file import read_model
+
+if TYPE_CHECKING:
+    from logger.api.drives import Run
+    from logger.store.formats.vehicle_file import Model
+
+Array = npt.NDArray[np.float64]
+T = TypeVar("T")
+
+WINDOWS_M = (10.0, 100.0)
+"""What profilers report, and what roads are judged by."""
+_FIX_S, _SMOOTH_FIXES = 1.0, 21
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a device in a car wrote, each signal by one clock [s].
+
+    name        of the pass
+    time_s      (n,) of the accelerations; accel (n, 3), along the device's own axes, gravity in it
+    unit        of the accelerations, as ``extract --columns`` names it
+    fix_s       (k,) of speed [m/s] and place [degrees], (k,) each
+    """
+
+    name: str
+    time_s: Array
+    accel: Array
+    unit: str
+    fix_s: Array
+    speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenWindows:
+    """Windows (w,) of one drive.
+
+    begin_m, end_m      of the drive's distance, or of the line's where the pass was laid on one
+    begin_deg, end_deg  (w, 2) latitude and longitude of the ends
+    exact_m_per_km      IRI of the line's own profile there; NaN where none is known
+    """
+
+    window_m: float
+    begin_m: Array
+    end_m: Array
+    begin_deg: Array
+    end_deg: Array
+    speed_mps: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    exact_m_per_km: Array
+
+
+def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
+                   profile: Path | None = None) -> list[DrivenWindows]:
+    """The windows of a pass, for each length those of all its drives; the sensor's noise is learnt from each drive.
+
+    profile    the measured line, with places, on which the pass is laid
+
+    Raises BadInput for a recording of which nothing can be used.
+    """
+    model = read_model(vehicle_path(vehicle))
+    return [one for run in runs_of(recording, vehicle, profile) for one in windows_of(run, model, windows_m)]
+
+
+def runs_of(recording: Recording, vehicle: str, profile: Path | None = None) -> list[Run]:
+    """The drives of a pass, as ``extract --csv`` makes them. Raises BadInput."""
+    with TemporaryDirectory() as scratch:
+        return _runs(recording, Path(scratch), vehicle, profile)
+
+
+def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
+    """A drive on a line's own distance, less ``from_m``, by its places alone: a run for each pass over the line.
+
+    Where the receiver puts the car along the line is averaged over ``_SMOOTH_FIXES`` fixes: between them the speed
+    tells the way better.
+    """
+    if run.lat_deg is None or run.lon_deg is None:
+        return []
+    every = np.arange(0, len(run.time_s), round(run.rate_hz * _FIX_S))
+    along_m, aside_m = line.passed(run.lat_deg[every], run.lon_deg[every])
+    found = []
+    for one in passes(run.distance_m[every], along_m, aside_m):
+        at = every[one.first: one.last]
+        offset_m = (along_m - run.distance_m[every])[one.first: one.last]
+        smooth_m = uniform_filter1d(offset_m, min(_SMOOTH_FIXES, len(offset_m)), mode="nearest")
+        part = slice(at[0], at[-1] + 1)
+        shift_m = np.interp(run.time_s[part], run.time_s[at], smooth_m)
+        found.append(replace(
+            run, time_s=run.time_s[part], accel_z_mps2=run.accel_z_mps2[part], speed_mps=run.speed_mps[part],
+            distance_m=run.distance_m[part] + shift_m - from_m, lat_deg=run.lat_deg[part], lon_deg=run.lon_deg[part],
+            usable=None if run.usable is None else run.usable[part]))
+    return found
+
+
+def _runs(recording: Recording, scratch: Path, vehicle: str, profile: Path | None) -> list[Run]:
+    feeling, fixes = scratch / f"{recording.name}.csv", scratch / "fixes.csv"
+    _write(feeling, "t_s,x,y,z", recording.time_s, *recording.accel.T)
+    _write(fixes, "t_s,lat_deg,lon_deg,speed", recording.fix_s, recording.lat_deg, recording.lon_deg,
+           recording.speed_mps)
+    axes = ",".join(f"{axis}={axis}:{recording.unit}" for axis in "xyz")
+    asked = Asked(named_columns(f"t=t_s:s,{axes},lat=lat_deg,lon=lon_deg,speed=speed:m/s"), fixes, vehicle=vehicle)
+    measured = None if profile is None else read_measured_profile(profile)
+    try:
+        done = extract_csv(feeling, scratch / "runs", asked, measured=measured)
+    except BadInput as error:  # in a folder that is gone when the line is read
+        raise BadInput(str(error).replace(str(scratch) + "/", "")) from None
+    return [read_run(one.run) for one in done.runs]
+
+
+def _write(path: Path, header: str, *columns: Array) -> None:
+    rows = np.column_stack(columns)
+    np.savetxt(path, rows[np.isfinite(rows).all(axis=1)], fmt="%.12g", delimiter=",", header=header, comments="")
+
+
+def windows_of(run: Run, model: Model, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
+    """The windows of a drive, for each length; noise is learnt once. Raises BadInput."""
+    from logger.estimation.sensor_noise import Sensor
+
+    sensor, learns = Sensor(NOISE_MPS2, step_of(run, None)), True
+    found = []
+    for window_m in windows_m:
+        one = assessed(run, model, sensor, window_m, learns, anyway=True)
+        sensor, learns = one.sensor, False  # learnt once
+        edges_m = one.windows.edges_m
+        if len(edges_m) < 2:
+            continue
+        at_s = np.interp(edges_m, run.distance_m, run.time_s)
+        places = np.column_stack([np.interp(at_s, run.time_s, axis) for axis in (run.lat_deg, run.lon_deg)
+                                  if axis is not None])
+        found.append(DrivenWindows(window_m, edges_m[:-1], edges_m[1:], places[:-1], places[1:], one.windows.speed_mps,
+                                   one.windows.iri_m_per_km, one.windows.iri_std_m_per_km, one.exact_m_per_km))
+    return found
+
+
+def each_pass(passes: list[Recording], windows: Callable[[Recording], list[T]], progress: Callable[[int, int], None]
+              ) -> tuple[list[T], list[str]]:
+    """The windows of every pass that can be used, and a line for each that cannot, with its name."""
+    found: list[T] = []
+    refused: list[str] = []
+    for done, one in enumerate(passes):
+        progress(done, len(passes))
+        try:
+            found += windows(one)
+        except BadInput as error:
+            refused.append(f"{one.name}: {error}")
+    progress(len(passes), len(passes))
+    return found, refused
