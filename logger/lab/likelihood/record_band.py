@@ -254,7 +254,7 @@ class _Fits:
 def _fits(run: Run, prediction: Array) -> _Fits:
     (measured, silent), (model, still) = (_spectrum(run, one) for one in (run.measured_mps2, prediction))
     telling = ~(silent & still)
-    middles = _LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5)
+    middles = np.asarray(_LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5), float)
     behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
     gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
     through = np.append(0.0, np.geomspace(behind, np.median(measured[telling]), _NOISES))
