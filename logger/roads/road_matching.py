@@ -53,12 +53,12 @@ class Receiver:
     correlation_s     time after which it is another one by 1 - 1/e [s]
     aside_m           what windows scatter aside beyond that: lanes, the car in its lane, fast errors [m]
 
-    A receiver in the open has 2 to 3 m (its data sheets say 2.5 m CEP, 2.1 m in each component), between houses more.
+    A receiver in the open has 2 to 3 m (data sheets: 2.5 m CEP, which is 2.1 m in each component), between houses 4 m.
     """
 
-    std_m: float = 3.0
+    std_m: float = 3.5
     correlation_s: float = 120.0
-    aside_m: float = 1.0
+    aside_m: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
