@@ -56,7 +56,7 @@ class Receiver:
     A receiver in the open has 2 to 3 m (data sheets: 2.5 m CEP, which is 2.1 m in each component), between houses 4 m.
     """
 
-    std_m: float = 3.5
+    std_m: float = 3.0
     correlation_s: float = 120.0
     aside_m: float = 2.0
 

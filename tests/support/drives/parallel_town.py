@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.road_network import Trace
+from logger.roads.road_matching import Matched
+from logger.roads.road_network import RoadNetwork, Trace
 
 WINDOW_M = 7.62
 LANE_M = 1.75
@@ -21,12 +24,15 @@ class TownDrive:
     trace               as it is matched
     east_m, north_m     true places of the middles [m]
     heading_rad         true direction
+    said_east_m, said_north_m    places as the receiver says
     """
 
     trace: Trace
     east_m: np.ndarray
     north_m: np.ndarray
     heading_rad: np.ndarray
+    said_east_m: np.ndarray
+    said_north_m: np.ndarray
 
 
 def street_places(streets: int, rng: np.random.Generator) -> np.ndarray:
@@ -61,7 +67,7 @@ def _drive(rng: np.random.Generator, windows: int, easts: np.ndarray, norths: np
     lon = lon_deg + np.degrees(said_e / EARTH_RADIUS_M) / np.cos(np.radians(lat_deg))
     lon = (lon + 180.0) % 360.0 - 180.0
     distance_m = WINDOW_M * (np.arange(windows) + 0.5) * (1 + rng.normal(0.0, 0.001))
-    return TownDrive(Trace(lat, lon, distance_m, t_s), east, north, heading)
+    return TownDrive(Trace(lat, lon, distance_m, t_s), east, north, heading, said_e, said_n)
 
 
 def _corners(rng: np.random.Generator, length_m: float, easts: np.ndarray, norths: np.ndarray) -> np.ndarray:
@@ -100,3 +106,65 @@ def _sampled(corners: np.ndarray, windows: int) -> tuple[np.ndarray, np.ndarray,
     middle = np.arange(windows) * 8 + 4
     east, north = rounded[0][middle], rounded[1][middle]
     return east, north, np.arctan2(np.gradient(east), np.gradient(north))
+
+
+# --- roughness of the town, and what is matched of it ---
+
+
+def road_values(east_m: np.ndarray, north_m: np.ndarray, heading_rad: np.ndarray, length_m: float, seed: int = 9
+                ) -> np.ndarray:
+    """True mean IRI over a length about places [m/km]: a field over the town, another one for each direction, that
+    varies within 25 m upwards: 3 m/km with a deviation of some 45 %."""
+    rng = np.random.default_rng(seed)
+    quarter = np.round(heading_rad / (np.pi / 2)).astype(int) % 4
+    found = np.zeros(len(quarter))
+    waves, parts = 60, np.linspace(-0.5, 0.5, 2 * int(np.ceil(length_m / 4)) + 1)
+    lengths, turns, phases = np.geomspace(25.0, 400.0, waves), rng.uniform(0, 2 * np.pi, waves), rng.uniform(
+        0, 2 * np.pi, (4, waves))
+    for part in (parts[1:] + parts[:-1]) / 2:
+        east = east_m + part * length_m * np.sin(heading_rad)
+        north = north_m + part * length_m * np.cos(heading_rad)
+        angle = 2 * np.pi / lengths * (east[:, None] * np.cos(turns) + north[:, None] * np.sin(turns)) + phases[quarter]
+        found += np.exp(0.43 * np.sqrt(2 / waves) * np.sin(angle).sum(axis=1)) / (len(parts) - 1)
+    return 3.0 * found
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Windows of all drives that were laid on a way (m,): where that way's founder truly was, beside where they were.
+
+    wrong      on another street, against the direction, or more than 25 m along it
+    slip_m     how far along the road the measure lies wrong, of those that are not wrong
+    """
+
+    wrong: np.ndarray
+    slip_m: np.ndarray
+    repeats: int
+    missed: int
+
+
+def judged(drives: Sequence[TownDrive], found: Sequence[Matched], network: RoadNetwork) -> Judged:
+    """Compare with the truth. Missed is a repeat of a place within 4 m that became a way of its own."""
+    truth = np.full((len(network.point), 3), np.nan)
+    wrong, slips, missed, repeats = [], [], 0, 0
+    seen = np.zeros((0, 3))
+    for number, (drive, matched) in enumerate(zip(drives, found, strict=True)):
+        here = np.column_stack([drive.east_m, drive.north_m, drive.heading_rad])
+        point = matched.point
+        founds = (point >= 0) & (matched.aside_m == 0.0) & (network.founder[np.maximum(point, 0)] == number)
+        truth[point[founds]] = here[founds]
+        if len(seen):
+            distance, near = cKDTree(seen[:, :2]).query(here[founds, :2], 6, distance_upper_bound=4.0)
+            heading = np.append(seen[:, 2], np.nan)[near]
+            missed += int(((np.cos(heading - here[founds, 2][:, None]) > 0.9) & np.isfinite(distance)).any(axis=1).sum())
+        laid = (point >= 0) & ~founds
+        was, now = truth[point[laid]], here[laid]
+        east, north = (now - was)[:, :2].T
+        aside = east * np.cos(now[:, 2]) - north * np.sin(now[:, 2])
+        along = east * np.sin(now[:, 2]) + north * np.cos(now[:, 2])
+        bad = (np.abs(aside) > 10) | (np.abs(along) > 25) | (np.cos(now[:, 2] - was[:, 2]) < 0.5)
+        wrong.append(bad)
+        slips.append((along + network.along_m[point[laid]] - matched.along_m[laid])[~bad])
+        seen = np.concatenate([seen, here])
+        repeats += int(laid.sum())
+    return Judged(np.concatenate(wrong), np.concatenate(slips), repeats + missed, missed)
