@@ -64,11 +64,13 @@ FLAG_MEANINGS: Mapping[str, str] = {
 }
 
 
-def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "") -> Html:
+def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "",
+         first: Sequence[str] = ()) -> Html:
     """The page of some log files, in order of their writing, as one HTML document.
 
     base          roads that are drawn beneath, out of a file named ``base_name``
     tiles_from    address of street pictures, with {z}, {x} and {y} in it; empty: none, and no request is made
+    first         sections above the map
     """
     records = [record for file in files for record in file.records]
     summary = summarise(records)
@@ -77,6 +79,7 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
     return document(f"Road roughness, {date_words(summary)}", [
         _head(summary, files),
         _tiles(summary),
+        *first,
         track_views(records, summary, _sources(base_name, host)),
         _shares_section(summary),
         _places_section(records, summary.roughest),

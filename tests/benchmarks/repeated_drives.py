@@ -28,7 +28,7 @@ def main() -> int:
     wrong = laid = repeats = missed = windows = 0
     slips = []
     took_s = 0.0
-    for seed in range(1, 2):
+    for seed in range(1, 6):
         drives = town_drives(10, 700, seed=seed)
         network = RoadNetwork()
         began = time.perf_counter()
