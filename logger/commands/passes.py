@@ -18,7 +18,7 @@ from pathlib import Path
 
 from logger.api.outputs import check_out
 from logger.api.passes import ROUGH_M_PER_KM, USUAL
-from logger.commands.numbers import positive
+from logger.commands.numbers import add_number
 from logger.commands.pictures import PAGE, parted, write_picture
 from logger.errors import EXIT_DONE
 
@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--since", metavar="DAY", help="rows from this day on (UTC), such as 2026-04-30")
     parser.add_argument("--until", metavar="DAY", help="rows before this day (UTC)")
     parser.add_argument("--split", metavar="DAY", help="what changed between the drives before this day and from it on?")
-    parser.add_argument("--above", metavar="M_PER_KM", type=positive, default=ROUGH_M_PER_KM,
-                        help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490)")
+    add_number(parser, "--above", 0.01, 100.0, "m/km", metavar="M_PER_KM", default=ROUGH_M_PER_KM,
+               help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490.313)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
                         help="write the means as .csv .geojson .gpkg .gpx .kml .parquet, or a page with map and curves "
                              "(.html) or picture (.png .svg .pdf); once for each")

@@ -41,6 +41,7 @@ class LaidDrives:
     passes, scatter       of the IRI, drive by drive
     iri                   means [m/km]
     a_w_mps2, a_w_std_mps2    mean of the passes, NaN: not known
+    speed_mps             mean of the passes, NaN: not known
     lat_deg, lon_deg      where the middle of the passes lay
     heading_deg           in which direction they went, clockwise from north
     change                between two periods, where a date between them was given
@@ -57,6 +58,7 @@ class LaidDrives:
     iri: Means
     a_w_mps2: Array
     a_w_std_mps2: Array
+    speed_mps: Array
     lat_deg: Array
     lon_deg: Array
     heading_deg: Array
@@ -96,9 +98,12 @@ def laid_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km
                  _column(rows, lambda one: one.a_w_std_mps2 or 0.0))
     comfort = means(felt, scatter_of(felt))
     a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
+    driven = cells(_column(rows, lambda one: one.speed_mps), np.zeros(len(rows)))
+    speed = means(driven, scatter_of(driven))
     place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(std), 0.0, np.nan), cells, mean)
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
-    return LaidDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std, *place,
+    return LaidDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std,
+                      _at(mean.key, speed.key, speed.iri_m_per_km), *place,
                       None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter), visits)
 
 

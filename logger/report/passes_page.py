@@ -26,7 +26,7 @@ def passes_page(found: LaidDrives) -> Html:
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], first=(
         section("Drives laid over each other", paragraphs(lines(found)[:4]) + hint(
             "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the last "
-            "drive, and there is no speed.")), section("Places to visit", _visits(found))))
+            "drive, its speed their mean.")), section("Places to visit", _visits(found))))
 
 
 def _visits(found: LaidDrives) -> Html:
@@ -55,10 +55,12 @@ def _rows(found: LaidDrives) -> Iterator[WindowRecord]:
             a_w = found.a_w_mps2[cell]
             known = bool(np.isfinite(a_w))
             last_s = found.iri.last_s[cell]
-            iri = float(found.iri.iri_m_per_km[cell])
+            iri, speed_mps = float(found.iri.iri_m_per_km[cell]), float(found.speed_mps[cell])
+            drives = speed_mps > 0
             yield WindowRecord(
-                segment, 1, segment * US_PER_S, round(last_s * US_PER_S) if np.isfinite(last_s) else None, 0.0, at_m,
-                at_m + length_m, float(found.lat_deg[cell]), float(found.lon_deg[cell]), None, iri,
+                segment, 1, segment * US_PER_S, round(last_s * US_PER_S) if np.isfinite(last_s) else None,
+                length_m / speed_mps if drives else 0.0, at_m, at_m + length_m, float(found.lat_deg[cell]),
+                float(found.lon_deg[cell]), speed_mps if drives else None, iri,
                 float(found.iri.iri_std_m_per_km[cell]), None, float(a_w) if known else None, None, None, None,
                 comfort_word(float(a_w)) if known else "", iri_class(iri), None, 0, 0, (),
                 float(found.a_w_std_mps2[cell]) if known else None)
