@@ -9,6 +9,7 @@ import numpy as np
 
 from logger.chart_data import Array
 from logger.records import WindowRecord
+from logger.report.placed_rows import column, placed, trace_of
 from logger.report.summary import counts
 from logger.roads.places_to_visit import Place, places_to_visit
 from logger.roads.repeated_drives import (
@@ -25,12 +26,9 @@ from logger.roads.repeated_drives import (
     way_and_cell,
 )
 from logger.roads.road_matching import lay
-from logger.roads.road_network import RoadNetwork, Trace, directions, east_and_north, on_sphere
+from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
 from logger.store.log.log_reader import split_drives
 from logger.units import US_PER_S
-
-_NOT_PLACED = "gps_lost"
-
 
 @dataclass(frozen=True, eq=False)
 class LaidDrives:
@@ -75,52 +73,36 @@ def laid_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km
     above_m_per_km    from which IRI a place is rough
     split_s           an instant between two periods to compare [s since 1970]
     """
-    drives = [[one for one in drive if _placed(one)] for drive in split_drives(records)]
+    drives = [[one for one in drive if placed(one)] for drive in split_drives(records)]
     drives = [drive for drive in drives if len(drive) > 1]
     rows = [one for drive in drives for one in drive]
     number = np.repeat(np.arange(len(drives)), [len(drive) for drive in drives])
-    found = lay(RoadNetwork(), [_trace(drive) for drive in drives])
+    found = lay(RoadNetwork(), [trace_of(drive) for drive in drives])
     way, middle_m = (np.concatenate([getattr(one, name) for one in found] or [np.zeros(0)])
                      for name in ("way", "along_m"))
-    half_m = _column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
+    half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
 
     def cells(values: Array, errors: Array) -> Passes:
         return passes_of(way.astype(np.intp), middle_m - half_m, middle_m + half_m, number, time_s, values, errors,
                          length_m)
 
-    time_s = _column(rows, lambda one: None if one.utc_us is None else one.utc_us / US_PER_S)
-    iri = _column(rows, lambda one: one.iri_m_per_km if counts(one) else None)
-    std = _column(rows, lambda one: one.iri_std_m_per_km)
+    time_s = column(rows, lambda one: None if one.utc_us is None else one.utc_us / US_PER_S)
+    iri = column(rows, lambda one: one.iri_m_per_km if counts(one) else None)
+    std = column(rows, lambda one: one.iri_std_m_per_km)
     passes = cells(iri, std)
     scatter = scatter_of(passes)
     mean = means(passes, scatter)
-    felt = cells(_column(rows, lambda one: one.a_w_mps2 if counts(one) else None),
-                 _column(rows, lambda one: one.a_w_std_mps2 or 0.0))
+    felt = cells(column(rows, lambda one: one.a_w_mps2 if counts(one) else None),
+                 column(rows, lambda one: one.a_w_std_mps2 or 0.0))
     comfort = means(felt, scatter_of(felt))
     a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
-    driven = cells(_column(rows, lambda one: one.speed_mps), np.zeros(len(rows)))
+    driven = cells(column(rows, lambda one: one.speed_mps), np.zeros(len(rows)))
     speed = means(driven, scatter_of(driven))
     place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(std), 0.0, np.nan), cells, mean)
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
     return LaidDrives(len(drives), len(records), len(rows), length_m, passes, scatter, mean, a_w, a_w_std,
                       _at(mean.key, speed.key, speed.iri_m_per_km), *place,
                       None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter), visits)
-
-
-def _placed(one: WindowRecord) -> bool:
-    return (one.lat_deg is not None and one.lon_deg is not None and one.distance_start_m is not None
-            and one.distance_end_m is not None and one.distance_end_m > one.distance_start_m
-            and _NOT_PLACED not in one.flags)
-
-
-def _trace(drive: Sequence[WindowRecord]) -> Trace:
-    return Trace(_column(drive, lambda one: one.lat_deg), _column(drive, lambda one: one.lon_deg),
-                 _column(drive, lambda one: ((one.distance_start_m or 0.0) + (one.distance_end_m or 0.0)) / 2),
-                 _column(drive, lambda one: one.t_us / US_PER_S))
-
-
-def _column(rows: Sequence[WindowRecord], of: Callable[[WindowRecord], float | None]) -> Array:
-    return np.array([np.nan if (value := of(one)) is None else value for one in rows], dtype=np.float64)
 
 
 def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
@@ -136,7 +118,7 @@ def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
 def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord]], usable: Array,
             cells: Callable[[Array, Array], Passes], mean: Means) -> tuple[Array, Array, Array]:
     """Latitudes, longitudes and headings of cells, as means of points of the sphere and of directions."""
-    traces = [_trace(drive) for drive in drives]
+    traces = [trace_of(drive) for drive in drives]
     points = [on_sphere(one.lat_deg, one.lon_deg) for one in traces]
     heads = [np.nan_to_num(directions(point, one.distance_m)) for point, one in zip(points, traces, strict=True)]
     _, cell = np.unique(cells(usable, usable).key, return_inverse=True)
