@@ -56,7 +56,7 @@ class RepeatedDrives(CommandResult):
         longest = max(chains(self._found), key=len, default=None)
         if longest is None:
             return []
-        at_m = self._found.length_m * (np.arange(len(longest)) + 0.5)
+        at_m: Array = self._found.length_m * (np.arange(len(longest), dtype=np.float64) + 0.5)
         return [Curves("Mean of the drives over the longest way", "distance [m]", "IRI [m/km]", (
             Line("IRI", at_m, self.iri_m_per_km[longest], self.iri_std_m_per_km[longest]),))]
 
@@ -89,7 +89,8 @@ def day_of(text: str, option: str) -> float:
 
 
 def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL, since: str | None = None,
-           until: str | None = None, split: str | None = None, above_m_per_km: float = ROUGH_M_PER_KM) -> RepeatedDrives:
+           until: str | None = None, split: str | None = None, above_m_per_km: float = ROUGH_M_PER_KM
+           ) -> RepeatedDrives:
     """Lay the drives of segment logs over each other, by place and direction.
 
     logs              folders at any depth, or files, of segment logs; open ones too
@@ -98,8 +99,8 @@ def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL,
     split             a day: what changed between the drives before and those from it on?
     above_m_per_km    from which IRI a place is to be visited; by default where 23 CFR 490.313 says poor
 
-    Raises BadInput for no log, none with an intact row that counts, lengths from under 25 ft or beyond 100 km, and dates
-    that are none.
+    Raises BadInput for no log, none with an intact row that counts, lengths from under 25 ft or beyond 100 km, and
+    dates that are none.
 
     >>> found = passes(folder / "logs")
     >>> bool((found.drives >= 1).all())

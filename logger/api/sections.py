@@ -87,14 +87,14 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     logs      folders at any depth, or files, of segment logs; open ones too
     length    of a section, with its unit (``0.1mi``: 23 CFR 490), or in metres
     units     of the text: si or us
-    route     GeoJSON of one LineString, with ``begin_km`` and ``end_km`` or points with ``km`` beside it: sections then are
-              of its measures, for each pass over it, along or against it
+    route     GeoJSON of one LineString, with ``begin_km`` and ``end_km`` or points with ``km`` beside it: sections then
+              are of its measures, for each pass over it, along or against it
 
     The standard error of a section is that of independent windows. It holds nothing of what all windows of a car share:
     a vehicle file that is wrong. Rows flagged ``unsettled`` stand in no mean.
 
-    Raises BadInput for no log, none with an intact row, and lengths from under 25 ft or beyond 100 km, and a file that is no
-    route.
+    Raises BadInput for no log, none with an intact row, lengths from under 25 ft or beyond 100 km, and a file that is
+    no route.
 
     >>> found = sections(folder / "logs", "0.1mi")
     >>> bool((found.known_m <= found.length_m + 1e-6).all())

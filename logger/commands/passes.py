@@ -4,10 +4,10 @@ places that somebody should go and see.
   ridelog passes /media/RIDELOG --out means.html --visit places.gpx
   ridelog passes spring/ autumn/ --split 2026-07-01 --out changes.geojson
 
-A drive is laid on those before it as a whole: by its places, its direction, and the receiver's error, which changes over
-minutes. Streets from some 15 m apart are kept apart, lanes of one direction are not. The standard error of a mean holds
-what is common to a drive (the car, its tires, its load) as it shows between drives. What is common to all drives, such as
-a wrong vehicle file, it cannot hold.
+A drive is laid on those before it as a whole: by its places, its direction, and the receiver's error, which changes
+over minutes. Streets from some 15 m apart are kept apart, lanes of one direction are not. The standard error of a mean
+holds what is common to a drive (the car, its tires, its load) as it shows between drives. What is common to all
+drives, such as a wrong vehicle file, it cannot hold.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"of a cell of road with its unit, such as 25ft, 50m, 0.1mi (default: {USUAL})")
     parser.add_argument("--since", metavar="DAY", help="rows from this day on (UTC), such as 2026-04-30")
     parser.add_argument("--until", metavar="DAY", help="rows before this day (UTC)")
-    parser.add_argument("--split", metavar="DAY", help="what changed between the drives before this day and from it on?")
+    parser.add_argument("--split", metavar="DAY",
+                        help="what changed between the drives before this day and those from it on")
     add_number(parser, "--above", 0.01, 100.0, "m/km", metavar="M_PER_KM", default=ROUGH_M_PER_KM,
                help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490.313)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",

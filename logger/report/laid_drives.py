@@ -30,6 +30,7 @@ from logger.roads.road_network import RoadNetwork, directions, east_and_north, o
 from logger.store.log.log_reader import split_drives
 from logger.units import US_PER_S
 
+
 @dataclass(frozen=True, eq=False)
 class LaidDrives:
     """What the drives of some logs say together, in cells (k,) by way and measure.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from logger.exchange.geometry import cut, half_way
 from logger.exchange.layer import Feature, Field, Kind, Layer
@@ -34,7 +35,7 @@ def _cells(found: LaidDrives) -> Iterator[Feature]:
     ways, _ = way_and_cell(found.iri.key)
     for chain in chains(found):
         places = [(float(found.lon_deg[cell]), float(found.lat_deg[cell])) for cell in chain]
-        ends = [half_way(one, other) for one, other in zip(places, places[1:], strict=False)]
+        ends = [half_way(one, other) for one, other in pairwise(places)]
         for index, cell in enumerate(chain.tolist()):
             values = cell_values(found, cell)
             geometry = cut((*ends[max(index - 1, 0):index], places[index], *ends[index:index + 1]))

@@ -38,8 +38,8 @@ def _visits(found: LaidDrives) -> Html:
         lat, lon = (f"{values[name]:.6f}" for name in ("lat_deg", "lon_deg"))
         a_w = values["a_w_mps2"]
         rows.append((str(number), one.kind, html(
-            '<a href="geo:{0},{1}">{0}, {1}</a> (<a href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}"'
-            ' rel="noreferrer">web map</a>)', lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
+            '<a href="geo:{0},{1}">{0}, {1}</a> (<a '
+            'href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}" rel="noreferrer">web map</a>)', lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
             f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
     return grid(("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",

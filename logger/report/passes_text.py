@@ -33,16 +33,16 @@ def _summary(found: LaidDrives) -> Iterator[str]:
     several = int((drives > 1).sum())
     yield (f"{_count(found.drives, 'drive')}, {found.placed:,} of {_count(found.windows, 'window')} with a place, in "
            f"{_count(cells, 'cell')} of {found.length_m:g} m by place and direction")
-    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells, by {np.median(drives):g} drives in the "
-           f"middle, {drives.max()} at most")
+    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells, median {np.median(drives):g} drives, "
+           f"{drives.max()} at most")
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
     yield f"IRI of the cells {mean:.2f} m/km on the mean, standard error of one cell {std:.2f}"
     if isfinite(found.scatter.drive):
-        yield (f"Between drives {found.scatter.drive:.1%} of the IRI is common to a whole drive, and {found.scatter.passes:.1%} "
-               "to one pass: both are in the standard errors")
+        yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
+               f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
     else:
-        yield ("No cell was passed by two drives: what is common to a drive (the car, its tires, its load) is not known, "
-               "and not in the standard errors")
+        yield ("No cell was passed by two drives: what is common to a drive (the car, its tires, its load) is not "
+               "known, and not in the standard errors")
 
 
 def _visits(found: LaidDrives) -> Iterator[str]:

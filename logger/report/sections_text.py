@@ -111,7 +111,8 @@ def _count(number: int, what: str) -> str:
 def as_json(drives: Sequence[DriveSections], length_m: float) -> dict[str, Any]:
     """Drives with their sections; null where nothing is known."""
     return {"length_m": length_m, "drives": [
-        {"log": one.log, "drive": one.number, "direction": one.direction or None, "sections": list(section_values(one))} for one in drives]}
+        {"log": one.log, "drive": one.number, "direction": one.direction or None,
+         "sections": list(section_values(one))} for one in drives]}
 
 
 def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:

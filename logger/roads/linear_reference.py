@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.roads.road_matching import Receiver, match
+from logger.roads.road_matching import USUAL, Receiver, match
 from logger.roads.road_network import Array, Ints, RoadNetwork, Trace, on_sphere
 
 ALONG, AGAINST = 1, -1
@@ -15,8 +15,8 @@ _SHORTEST_M = 1.0  # between posts
 
 @dataclass(frozen=True, eq=False)
 class OnRoute:
-    """Windows (n,): direction ALONG or AGAINST growing measures, 0 where they lie on another road; measure of the middle
-    [m], NaN there."""
+    """Windows (n,): direction ALONG or AGAINST growing measures, 0 where they lie on another road; measure of the
+    middle [m], NaN there."""
 
     direction: Ints
     measure_m: Array
@@ -68,7 +68,7 @@ def route_network(lat_deg: Array, lon_deg: Array, measure_m: Array) -> RoadNetwo
     return network
 
 
-def on_route(network: RoadNetwork, trace: Trace, receiver: Receiver = Receiver()) -> OnRoute:
+def on_route(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL) -> OnRoute:
     """Lay a drive on a route's two ways."""
     found, _ = match(network, trace, receiver)
     direction = np.array([ALONG, AGAINST, 0])[found.way]

@@ -54,7 +54,7 @@ def places_to_visit(mean: Means, a_w_mps2: Array, a_w_std_mps2: Array, length_m:
     rough = _confidence(mean.iri_m_per_km, mean.iri_std_m_per_km, above_m_per_km)
     felt = _confidence(a_w_mps2, a_w_std_mps2, UNCOMFORTABLE_MPS2)
     is_rough = rough >= LEAST_CONFIDENCE
-    rows = _rows(mean, is_rough) + [row for row in _rows(mean, (felt >= LEAST_CONFIDENCE) & ~is_rough)]
+    rows = _rows(mean, is_rough) + _rows(mean, (felt >= LEAST_CONFIDENCE) & ~is_rough)
     found = []
     for row in rows:
         comfort = not is_rough[row[0]]

@@ -61,6 +61,9 @@ class Receiver:
     aside_m: float = 2.0
 
 
+USUAL = Receiver()
+
+
 @dataclass(frozen=True, eq=False)
 class Matched:
     """Where the windows of a trace lie (n,).
@@ -102,7 +105,7 @@ class _Chain(NamedTuple):
     parent: int
 
 
-def match(network: RoadNetwork, trace: Trace, receiver: Receiver = Receiver(), start: _State | None = None
+def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start: _State | None = None
           ) -> tuple[Matched, _State]:
     """Lay a trace on the ways of a network, or on none where none is likely.
 
@@ -158,7 +161,8 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
         if not here:
             new = [chain._replace(candidate=NO_WAY, known=False, parent=number) for number, chain in ahead]
         best = max(map(_score, new))
-        chains = sorted((chain for chain in new if chain.score > best - _WORST), key=_score, reverse=True)[:_MOST_CHAINS]
+        likely = (chain for chain in new if chain.score > best - _WORST)
+        chains = sorted(likely, key=_score, reverse=True)[:_MOST_CHAINS]
         history.append(chains)
         before = here
     return _traced_back(history)
@@ -225,7 +229,8 @@ def _clear_of(lists: _Lists, one: int, error: _State, fast: float) -> float:
     left_e, left_n = lists.left_e[one], lists.left_n[one]
     spread = 2 * (ee * left_e**2 + 2 * en * left_e * left_n + nn * left_n**2 + fast)
     aside_m = abs(lists.aside_m[one] - error_e * left_e - error_n * left_n)
-    return log(0.5 * (erfc((_STREETS_M - aside_m) / sqrt(spread)) + erfc((_STREETS_M + aside_m) / sqrt(spread))) + _LEAST)
+    reach = sqrt(spread)
+    return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + _LEAST)
 
 
 def _drift_m2(step_s: float, receiver: Receiver) -> float:
@@ -307,7 +312,7 @@ class _Lists:
 # --- many drives ---
 
 
-def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = Receiver()) -> list[Matched]:
+def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUAL) -> list[Matched]:
     """Lay drives over each other, one after the other: where no way is known a drive makes one, and ``network`` grows.
 
     A drive that passes a place again is laid over itself.

@@ -1,7 +1,8 @@
 """Repeated drives in a town whose parallel streets lie 15 to 30 m apart, by receivers that err by 2 to 4 m in each
 component for minutes: how many windows are laid on a wrong street, and how good the means of 1, 3 and 10 passes are.
 
-The truth of a cell is that of the road where its passes were, on the mean. Values have an error of their own (15 %), and one that is common to a drive (5 %).
+Truth is known for each window; that of a cell is the truth of the road where its passes were, on the mean. Values have
+an error of their own (15 %), and one that is common to a drive (5 %).
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def _means(figures: Figures) -> None:
     for seed in (11, 12, 13):
         passes, place = town_passes(seed)
         scatter = scatter_of(passes)
-        print(f"seed {seed}: scatter between drives {scatter.drive:.3f} (true {COMMON}), of a pass {scatter.passes:.3f}")
+        print(f"seed {seed}: scatter of drives {scatter.drive:.3f} (true {COMMON}), of passes {scatter.passes:.3f}")
         rng = np.random.default_rng(seed)
         order = rng.permutation(len(passes.key))
         rank = _rank(passes.key[order])[np.argsort(order)]
@@ -64,7 +65,8 @@ def _means(figures: Figures) -> None:
             chosen = enough & (rank < number)
             mean = means(_some(passes, chosen), scatter)
             weight = np.unique(passes.key[chosen], return_inverse=True)[1]
-            east, north, sin, cos, slip_m = (np.bincount(weight, column) / np.bincount(weight) for column in place[chosen].T)
+            east, north, sin, cos, slip_m = (np.bincount(weight, column) / np.bincount(weight)
+                                             for column in place[chosen].T)
             true = road_values(east, north, np.arctan2(sin, cos), LENGTH_M)
             found.append((mean.iri_m_per_km, mean.iri_std_m_per_km, true, slip_m))
     for number, goal in ((1, 0.7), (3, 0.85), (10, 0.93)):

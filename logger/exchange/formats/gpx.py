@@ -1,5 +1,5 @@
-"""GPX 1.1: a track a drive, a segment a stretch without a gap, a point a row, with its values as extensions; places to go
-to are waypoints.
+"""GPX 1.1: a track a drive, a segment a stretch without a gap, a point a row, with its values as extensions; places to
+go to are waypoints.
 
 A point's time is that of the row's middle, where the point lies.
 """

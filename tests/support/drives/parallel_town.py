@@ -156,7 +156,8 @@ def judged(drives: Sequence[TownDrive], found: Sequence[Matched], network: RoadN
         if len(seen):
             distance, near = cKDTree(seen[:, :2]).query(here[founds, :2], 6, distance_upper_bound=4.0)
             heading = np.append(seen[:, 2], np.nan)[near]
-            missed += int(((np.cos(heading - here[founds, 2][:, None]) > 0.9) & np.isfinite(distance)).any(axis=1).sum())
+            alike = np.cos(heading - here[founds, 2][:, None]) > 0.9
+            missed += int((alike & np.isfinite(distance)).any(axis=1).sum())
         laid = (point >= 0) & ~founds
         was, now = truth[point[laid]], here[laid]
         east, north = (now - was)[:, :2].T
