@@ -15,18 +15,29 @@ from logger.report.page import page
 from logger.report.passes_text import compass, lines, visit_values
 from logger.report.terminal import comfort_words
 from logger.roads.iso8608 import iri_class
-from logger.store.log.log_reader import LoggedFile
+from logger.store.log.log_reader import LoggedFile, utc
 from logger.units import US_PER_S
 
 _GAP_M = 1.0
+_LINKS = ('<a href="geo:{0},{1}">{0}, {1}</a> '
+          '(<a href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}" rel="noreferrer">web '
+          "map</a>)")
 
 
 def passes_page(found: LaidDrives) -> Html:
     """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
-    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], first=(
+    title = f"Road roughness, mean of {found.drives} drives", _days(found)
+    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, first=(
         section("Drives laid over each other", paragraphs(lines(found)[:4]) + hint(
-            "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the last "
-            "drive, its speed their mean.")), section("Places to visit", _visits(found))))
+            "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
+            "last drive, its speed their mean.")), section("Places to visit", _visits(found))))
+
+
+def _days(found: LaidDrives) -> str:
+    if not np.isfinite(found.iri.first_s).any():
+        return "dates not known"
+    first, last = (utc(round(one * US_PER_S)) for one in (np.nanmin(found.iri.first_s), np.nanmax(found.iri.last_s)))
+    return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
 
 
 def _visits(found: LaidDrives) -> Html:
@@ -37,9 +48,8 @@ def _visits(found: LaidDrives) -> Html:
         values = visit_values(found, one)
         lat, lon = (f"{values[name]:.6f}" for name in ("lat_deg", "lon_deg"))
         a_w = values["a_w_mps2"]
-        rows.append((str(number), one.kind, html(
-            '<a href="geo:{0},{1}">{0}, {1}</a> (<a '
-            'href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}" rel="noreferrer">web map</a>)', lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
+        rows.append((
+            str(number), one.kind, html(_LINKS, lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
             f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
     return grid(("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
