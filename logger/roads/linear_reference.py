@@ -71,5 +71,5 @@ def route_network(lat_deg: Array, lon_deg: Array, measure_m: Array) -> RoadNetwo
 def on_route(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL) -> OnRoute:
     """Lay a drive on a route's two ways."""
     found, _ = match(network, trace, receiver)
-    direction = np.array([ALONG, AGAINST, 0])[found.way]
+    direction = np.where(found.way < 0, 0, np.where(found.way == 0, ALONG, AGAINST))
     return OnRoute(direction, direction * found.along_m)

@@ -18,6 +18,7 @@ from math import erfc, exp, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.roads.road_network import (
     MOST_TURN_DEG,
@@ -32,6 +33,8 @@ from logger.roads.road_network import (
 )
 
 NO_WAY = -1
+DOUBTFUL = -2
+_BELIEVED = 2.0  # standard deviations that a stretch may lie aside of its way
 _STREETS_M = 10.0  # no two streets of one direction lie nearer to each other
 _NEW_SHARE = 0.3  # how likely a street is one that is not known yet, where one is known within reach
 _KNOWN = log(1 - _NEW_SHARE)
@@ -68,7 +71,7 @@ USUAL = Receiver()
 class Matched:
     """Where the windows of a trace lie (n,).
 
-    way        number of the way, NO_WAY: on none
+    way        number of the way, NO_WAY: on none, DOUBTFUL: on one of several, and none is to be believed
     along_m    measure there of the window's middle [m]; NaN: on none
     point      nearest point of the network, -1: none
     aside_m    how far left of that point the fix lay [m]
@@ -126,9 +129,21 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     at = np.maximum(point, 0)
     along = (rel_e - smooth[:, 0]) * u_east[at] + (rel_n - smooth[:, 1]) * u_north[at]
     end_e, end_n, end_ee, end_en, end_nn = states[-1].tolist()
-    return Matched(np.where(on, network.way[at], NO_WAY), np.where(on, network.along_m[at] + along, np.nan), point,
-                   np.where(on, rel_n * u_east[at] - rel_e * u_north[at], np.nan)), (
+    way = np.where(on, network.way[at], NO_WAY)
+    aside_m = rel_n * u_east[at] - rel_e * u_north[at]
+    doubtful = on & _too_far(way, aside_m, receiver)
+    on &= ~doubtful
+    way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
+    return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
+                   np.where(on, aside_m, np.nan)), (
                        end_e, end_n, end_ee, end_en, end_nn)
+
+
+def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> npt.NDArray[np.bool_]:
+    """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
+    stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
+    mean_m = np.bincount(stretch, np.nan_to_num(aside_m)) / np.bincount(stretch)
+    return np.asarray(np.abs(mean_m[stretch]) > _BELIEVED * 2**0.5 * receiver.std_m)
 
 
 def _nowhere(count: int) -> Matched:
@@ -332,7 +347,7 @@ def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUA
 
 def _learned(network: RoadNetwork, lap: Trace, matched: Matched, founder: int) -> Matched:
     """What was matched moves its ways; what was not becomes ways of its own."""
-    on = np.flatnonzero(matched.way != NO_WAY)
+    on = np.flatnonzero(matched.way >= 0)
     network.move(matched.point[on], matched.aside_m[on])
     way, along_m, point = matched.way.copy(), matched.along_m.copy(), matched.point.copy()
     off = matched.way == NO_WAY

@@ -29,7 +29,7 @@ def main() -> int:
     wrong = laid = repeats = missed = windows = 0
     slips = []
     took_s = 0.0
-    for seed in range(101, 117):  # seeds 1 to 5 chose the settings of the matching
+    for seed in range(201, 217):  # seeds 1 to 5 chose the settings of the matching
         drives = town_drives(10, 700, seed=seed)
         network = RoadNetwork()
         began = time.perf_counter()

@@ -144,7 +144,8 @@ class Judged:
 
 
 def judged(drives: Sequence[TownDrive], found: Sequence[Matched], network: RoadNetwork) -> Judged:
-    """Compare with the truth. Missed is a repeat of a place within 4 m that became a way of its own."""
+    """Compare with the truth. Missed is a repeat of a place within 4 m that became a way of its own. What was
+    left out as doubtful is neither."""
     truth = np.full((len(network.point), 3), np.nan)
     wrong, slips, missed, repeats = [], [], 0, 0
     seen = np.zeros((0, 3))
