@@ -56,7 +56,7 @@ def _drive(rng: np.random.Generator, windows: int, easts: np.ndarray, norths: np
     corners = _corners(rng, windows * WINDOW_M + 50.0, easts, norths)
     east, north, heading = _sampled(corners, windows)
     speed = rng.uniform(8.0, 13.0)
-    t_s = np.arange(windows) * WINDOW_M / speed + rng.uniform(0, 1e5)
+    t_s: np.ndarray = np.arange(windows) * WINDOW_M / speed + rng.uniform(0, 1e5)
     std_m, correlation_s = rng.uniform(*error_m), rng.uniform(60.0, 300.0)
     keeps = np.exp(-WINDOW_M / speed / correlation_s)
     slow = rng.normal(0.0, std_m, (2, windows))
@@ -66,7 +66,7 @@ def _drive(rng: np.random.Generator, windows: int, easts: np.ndarray, norths: np
     lat = lat_deg + np.degrees(said_n / EARTH_RADIUS_M)
     lon = lon_deg + np.degrees(said_e / EARTH_RADIUS_M) / np.cos(np.radians(lat_deg))
     lon = (lon + 180.0) % 360.0 - 180.0
-    distance_m = WINDOW_M * (np.arange(windows) + 0.5) * (1 + rng.normal(0.0, 0.001))
+    distance_m: np.ndarray = WINDOW_M * (np.arange(windows) + 0.5) * (1 + rng.normal(0.0, 0.001))
     return TownDrive(Trace(lat, lon, distance_m, t_s), east, north, heading, said_e, said_n)
 
 
