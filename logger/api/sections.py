@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
     from logger.exchange.layer import Layer
     from logger.report.drive_sections import DriveSections
+    from logger.store.log.log_reader import LoggedFile
 
 Array = npt.NDArray[np.float64]
 USUAL_M = 100.0
@@ -33,7 +34,7 @@ class Sections(CommandResult):
 
     length_m                      of a section; the last one of a drive is cut short [m]
     drive                         (k,) number of the drive, in the order read, from 0
-    start_m, end_m                (k,) along the drive [m]
+    start_m, end_m                (k,) along the drive, or measures of the route [m]
     known_m                       (k,) how much of each has an IRI [m]
     iri_m_per_km, iri_std_m_per_km    (k,) mean over that, and its standard error
     a_w_mps2                      (k,) weighted r.m.s. acceleration (ISO 2631-1)
@@ -79,17 +80,21 @@ def length_of(text: str) -> float:
     return length_m
 
 
-def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUAL_M, units: str = "si") -> Sections:
+def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUAL_M, units: str = "si",
+             route: Path | str | None = None) -> Sections:
     """The drives of segment logs in sections of one length, each from its own beginning.
 
     logs      folders at any depth, or files, of segment logs; open ones too
     length    of a section, with its unit (``0.1mi``: 23 CFR 490), or in metres
     units     of the text: si or us
+    route     GeoJSON of one LineString, with ``begin_km`` and ``end_km`` or points with ``km`` beside it: sections then
+              are of its measures, for each pass over it, along or against it
 
     The standard error of a section is that of independent windows. It holds nothing of what all windows of a car share:
     a vehicle file that is wrong. Rows flagged ``unsettled`` stand in no mean.
 
-    Raises BadInput for no log, none with an intact row, and lengths from under 25 ft or beyond 100 km.
+    Raises BadInput for no log, none with an intact row, lengths from under 25 ft or beyond 100 km, and a file that is
+    no route.
 
     >>> found = sections(folder / "logs", "0.1mi")
     >>> bool((found.known_m <= found.length_m + 1e-6).all())
@@ -106,7 +111,7 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
     files = read_found(find_logs_in(places))
     if not any(one.records for one in files):
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
-    drives = tuple(drive_sections(files, length_m))
+    drives = tuple(drive_sections(files, length_m) if route is None else _on_route(files, route, length_m))
     figures = [one.figures for one in drives]
     known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
         "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
@@ -115,6 +120,21 @@ def sections(logs: Path | str | Sequence[Path | str], length: str | float = USUA
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
         speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)
+
+
+def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
+    from logger.report.drive_sections import route_sections
+    from logger.roads.linear_reference import measures, route_network
+    from logger.store.formats.route_file import read_route
+
+    route = read_route(path)
+    try:
+        measure_m = measures(route.lat_deg, route.lon_deg, route.begin_m, route.end_m,
+                             np.column_stack([route.post_lat_deg, route.post_lon_deg]), route.post_m)
+        network = route_network(route.lat_deg, route.lon_deg, measure_m)
+    except ValueError as error:
+        raise BadInput(f"{path}: {error}") from None
+    return route_sections(files, network, float(measure_m[0]), length_m)
 
 
 def _joined(arrays: Sequence[Array]) -> Array:

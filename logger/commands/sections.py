@@ -2,10 +2,14 @@
 
   ridelog sections /media/RIDELOG --length 0.1mi --units us
   ridelog sections drive-logs/ --length 100m --out sections.geojson
+  ridelog sections drive-logs/ --length 100m --route route.geojson
 
 Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its windows
 by length, over as much of it as has an IRI, which is said beside it. Its standard error is that of independent windows.
 It does not hold what all windows of a car share, such as a vehicle file that is wrong.
+
+With --route they count by the measures of a line, for each pass over it and in either direction. The line may say
+begin_km and end_km; points with a number km are its kilometre posts.
 """
 
 from __future__ import annotations
@@ -28,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="folder of segment logs, exported stick, or log file")
     parser.add_argument("--length", default=_USUAL, metavar="LENGTH",
                         help=f"of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: {_USUAL})")
+    parser.add_argument("--route", metavar="LINE.geojson", type=Path,
+                        help="count by the measures of this line, along and against it")
     parser.add_argument("--units", choices=SYSTEMS, default=SYSTEMS[0], help="of what is printed (default: si)")
     parser.add_argument("--out", metavar="FILE", type=Path, action="append",
                         help="write the sections as .csv .geojson .gpkg .gpx .kml .parquet (in SI units), or a page or "
@@ -47,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     for path in (picture, table):
         if path is not None:
             check_out(path, (), [log for log, _ in find_logs_in(args.logs)])
-    found = sections(args.logs, args.length, args.units)
+    found = sections(args.logs, args.length, args.units, args.route)
     if table is not None:
         write_layer(found.layer(), table)
     of = ", ".join(map(str, args.logs))

@@ -54,11 +54,13 @@ class Feature:
 
 @dataclass(frozen=True)
 class Layer:
-    """A table of rows with places; rows of a group follow each other, in the order driven."""
+    """A table of rows with places; rows of a group follow each other, in the order driven. ``points``: each is a place
+    to go to, and does not belong to a way."""
 
     name: str
     fields: tuple[Field, ...]
     features: tuple[Feature, ...]
+    points: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

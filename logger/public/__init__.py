@@ -20,6 +20,7 @@ from logger.api.lab_loop import LabStory, lab
 from logger.api.learning import LearnedLaw, learn
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
 from logger.api.modal import Channels, Modes, make_channels, modes, read_channels
+from logger.api.passes import RepeatedDrives, passes
 from logger.api.plan import NextDrive, Plan, plan
 from logger.api.rides import Comfort, Record, comfort, read_record
 from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road, read_profile, write_profile
@@ -55,6 +56,7 @@ __all__ = [
     "Plan",
     "Profile",
     "Record",
+    "RepeatedDrives",
     "RoadClass",
     "Run",
     "SameRoadDiagnosis",
@@ -79,6 +81,7 @@ __all__ = [
     "make_channels",
     "make_run",
     "modes",
+    "passes",
     "plan",
     "random_road",
     "read_channels",

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from math import isfinite
 
 import numpy as np
 
 from logger.chart_data import Array
 from logger.records import WindowRecord
+from logger.report.placed_rows import placed, trace_of
 from logger.report.summary import counts, expected_square
+from logger.roads.linear_reference import ALONG, on_route
+from logger.roads.road_network import RoadNetwork
 from logger.roads.roughness_words import federal_condition
 from logger.roads.sections import Sections, Windows, even_edges, sections
 from logger.store.log.log_reader import LoggedFile, split_drives
 
+_GAP_M = 1000.0  # between neighbours on a route: beyond it they are two passes
+_REACH = 1.2  # of a window against its length: measures are places, and scatter by less
 _NONE = float("nan")
 
 
@@ -24,19 +29,21 @@ class DriveSections:
 
     log, number    the file, and which drive of it, from 1
     records        its rows with a distance
-    origin_m       the distance of the first of them: sections begin there
+    middle_m       (n,) of their middles, counted as the sections are [m]
     figures        of the k sections
     condition      by the federal limits; empty: not known
     ends_m         (k,) of the sections, the last one where the drive ends [m]
+    direction      ``along`` a route or ``against`` it; empty: sections count from the beginning of the drive
     """
 
     log: str
     number: int
     records: tuple[WindowRecord, ...]
-    origin_m: float
+    middle_m: Array
     figures: Sections
     condition: tuple[str, ...]
     ends_m: Array
+    direction: str = ""
 
 
 def drive_sections(files: Sequence[LoggedFile], length_m: float) -> Iterator[DriveSections]:
@@ -50,8 +57,50 @@ def drive_sections(files: Sequence[LoggedFile], length_m: float) -> Iterator[Dri
                 yield _of_drive(file.name, number, records, length_m)
 
 
-def windows_of(records: Sequence[WindowRecord]) -> tuple[Windows, float]:
-    """Rows with a distance as arrays, from the first one's beginning on, and that [m]."""
+def route_sections(files: Sequence[LoggedFile], route: RoadNetwork, first_m: float, length_m: float
+                   ) -> Iterator[DriveSections]:
+    """Each pass of a drive over a route in sections of the route's measures, from ``first_m`` on."""
+    for file in files:
+        for number, drive in enumerate(split_drives(file.records), start=1):
+            records = [one for one in drive if placed(one)]
+            if not records:
+                continue
+            found = on_route(route, trace_of(records))
+            breaks = np.flatnonzero((np.diff(found.direction) != 0)
+                                    | ~(np.abs(np.diff(found.measure_m)) < _GAP_M)) + 1
+            for part in np.split(np.arange(len(records)), breaks):
+                if found.direction[part[0]]:
+                    yield from _of_pass(file.name, number, [records[row] for row in part], found.measure_m[part],
+                                        int(found.direction[part[0]]), first_m, length_m)
+
+
+def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: Array, direction: int, first_m: float,
+             length_m: float) -> Iterator[DriveSections]:
+    order = np.argsort(measure_m, kind="stable")
+    measure_m, records = measure_m[order], tuple(records[row] for row in order.tolist())
+    windows = windows_of(records)
+    half_m = (windows.end_m - windows.start_m) / 2
+    # Neighbours share a limit, so that no road counts twice; a hole stays one.
+    limits_m = (measure_m[1:] + measure_m[:-1]) / 2
+    start_m = np.concatenate([measure_m[:1] - half_m[:1], np.maximum(limits_m, (measure_m - _REACH * half_m)[1:])])
+    end_m = np.concatenate([np.minimum(limits_m, (measure_m + _REACH * half_m)[:-1]), measure_m[-1:] + half_m[-1:]])
+    start_m = np.maximum(start_m, first_m)
+    windows = replace(windows, start_m=start_m, end_m=end_m)
+    kept = end_m > start_m
+    windows = Windows(*(getattr(windows, one.name)[kept] for one in fields(windows)))
+    if not kept.any():
+        return
+    first = int(np.floor((windows.start_m[0] - first_m) / length_m))
+    edges_m = first_m + length_m * first + even_edges(
+        float(windows.end_m[-1] - first_m - length_m * first), length_m)
+    found = sections(windows, edges_m)
+    condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
+    yield DriveSections(log, number, records, measure_m, found, condition,
+                        np.minimum(edges_m[1:], windows.end_m[-1]), "along" if direction == ALONG else "against")
+
+
+def windows_of(records: Sequence[WindowRecord]) -> Windows:
+    """Rows with a distance as arrays, from the first one's beginning on."""
     origin_m = records[0].distance_start_m or 0.0
 
     def column(of: Callable[[WindowRecord], float | None]) -> Array:
@@ -61,13 +110,13 @@ def windows_of(records: Sequence[WindowRecord]) -> tuple[Windows, float]:
         column(lambda one: one.distance_start_m) - origin_m, column(lambda one: one.distance_end_m) - origin_m,
         column(lambda one: one.duration_s), column(lambda one: one.iri_m_per_km if counts(one) else None),
         column(lambda one: one.iri_std_m_per_km),
-        column(lambda one: expected_square(one) if counts(one) else None)), origin_m
+        column(lambda one: expected_square(one) if counts(one) else None))
 
 
 def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m: float) -> DriveSections:
-    windows, origin_m = windows_of(records)
+    windows = windows_of(records)
     edges_m = even_edges(float(windows.end_m[-1]), length_m)
     found = sections(windows, edges_m)
     condition = tuple(federal_condition(value) if isfinite(value) else "" for value in found.iri_m_per_km.tolist())
-    return DriveSections(log, number, records, origin_m, found, condition,
+    return DriveSections(log, number, records, (windows.start_m + windows.end_m) / 2, found, condition,
                          np.minimum(edges_m[1:], windows.end_m[-1]))

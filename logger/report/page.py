@@ -64,19 +64,23 @@ FLAG_MEANINGS: Mapping[str, str] = {
 }
 
 
-def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "") -> Html:
+def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str = "", tiles_from: str = "",
+         first: Sequence[str] = (), title: tuple[str, str] | None = None) -> Html:
     """The page of some log files, in order of their writing, as one HTML document.
 
     base          roads that are drawn beneath, out of a file named ``base_name``
     tiles_from    address of street pictures, with {z}, {x} and {y} in it; empty: none, and no request is made
+    first         sections above the map
+    title         and a line under it; None: of drives, and their dates
     """
     records = [record for file in files for record in file.records]
     summary = summarise(records)
     drives = split_drives(records)
     host = "{0.scheme}://{0.netloc}".format(urlsplit(tiles_from)) if tiles_from else ""
-    return document(f"Road roughness, {date_words(summary)}", [
-        _head(summary, files),
+    return document(title[0] if title else f"Road roughness, {date_words(summary)}", [
+        heading(*title) if title else _head(summary, files),
         _tiles(summary),
+        *first,
         track_views(records, summary, _sources(base_name, host)),
         _shares_section(summary),
         _places_section(records, summary.roughest),

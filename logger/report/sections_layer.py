@@ -18,6 +18,7 @@ _KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known
           "speed_mps": Kind.NUMBER, "worst_m_per_km": Kind.NUMBER, "worst_at_m": Kind.NUMBER,
           "condition": Kind.WORDS, "iri_class": Kind.WORDS, "comfort": Kind.WORDS}
 FIELDS = (Field("log", Kind.WORDS), Field("drive", Kind.COUNT), Field("t_utc", Kind.TIME),
+          Field("direction", Kind.WORDS),
           *(Field(name, kind) for name, kind in _KINDS.items()))
 
 
@@ -28,8 +29,7 @@ def sections_layer(drives: Sequence[DriveSections]) -> Layer:
 
 def _features(drive: DriveSections) -> Iterator[Feature]:
     lines = geometries(drive.records)
-    middle_m = np.array([(one.distance_start_m or 0.0) + (one.distance_end_m or 0.0) for one in drive.records]) / 2
-    section = np.searchsorted(drive.figures.edges_m, middle_m - drive.origin_m, side="right") - 1
+    section = np.searchsorted(drive.figures.edges_m, drive.middle_m, side="right") - 1
     for index, values in enumerate(section_values(drive)):
         inside = np.flatnonzero(section == index).tolist()
         geometry = chained([lines[row][0] for row in inside])
@@ -37,6 +37,6 @@ def _features(drive: DriveSections) -> Iterator[Feature]:
         places = [place for line in geometry for place in line]
         yield Feature(
             group_name(drive.log, drive.number), iri_title(values["iri_m_per_km"]),
-            (drive.log, drive.number, began, *(values[name] for name in _KINDS)), geometry,
+            (drive.log, drive.number, began, drive.direction or None, *(values[name] for name in _KINDS)), geometry,
             places[len(places) // 2] if places else None, began,
             bool(inside) and index > 0 and lines[inside[0]][1], values["iri_class"] or "")

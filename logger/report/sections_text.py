@@ -38,16 +38,20 @@ _SYSTEMS = {
 def lines(drives: Sequence[DriveSections], length_m: float, system: str) -> list[str]:
     """For a person."""
     if not drives:
-        return ["No row has a distance, so there are no sections."]
+        return ["No row has a distance, or lies on the route: there are no sections."]
     units = _SYSTEMS[system]
     said = list(_summary(drives, length_m, units))
     head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
             f"{'std. error':>10}  {'condition':9} class  {'a_w m/s2':>8} {units.speed[0]:>6}")
     for one in drives:
-        said += ["", f"{one.log}, drive {one.number}", head, *_rows(one, units)]
+        said += ["", _title(one), head, *_rows(one, units)]
     return [*said, "",
             "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313. Class: ISO 8608.",
             "One sensor in the middle of the car: the IRI is that of a half car on both wheel tracks (HRI)."]
+
+
+def _title(one: DriveSections) -> str:
+    return f"{one.log}, drive {one.number}" + (f", {one.direction} the route" if one.direction else "")
 
 
 def _summary(drives: Sequence[DriveSections], length_m: float, units: _Units) -> Iterator[str]:
@@ -107,7 +111,8 @@ def _count(number: int, what: str) -> str:
 def as_json(drives: Sequence[DriveSections], length_m: float) -> dict[str, Any]:
     """Drives with their sections; null where nothing is known."""
     return {"length_m": length_m, "drives": [
-        {"log": one.log, "drive": one.number, "sections": list(section_values(one))} for one in drives]}
+        {"log": one.log, "drive": one.number, "direction": one.direction or None,
+         "sections": list(section_values(one))} for one in drives]}
 
 
 def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
@@ -134,6 +139,6 @@ def charts(drives: Sequence[DriveSections]) -> list[Chart]:
         known = np.isfinite(one.figures.iri_m_per_km)
         if known.any():
             middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
-            found.append(Curves(f"{one.log}, drive {one.number}", "distance [m]", "IRI [m/km]", (
+            found.append(Curves(_title(one), "distance [m]", "IRI [m/km]", (
                 Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
     return found

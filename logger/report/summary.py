@@ -109,7 +109,7 @@ def summarise(records: Sequence[WindowRecord]) -> DriveSummary:
         distance_m=distance_m,
         duration_s=duration_s,
         blind_s=blind_s,
-        mean_speed_mps=distance_m / (duration_s - blind_s) if distance_m > 0 else None,
+        mean_speed_mps=distance_m / (duration_s - blind_s) if distance_m > 0 and duration_s > blind_s else None,
         mean_iri_m_per_km=mean_iri,
         a_w_mps2=None if mean_square is None else mean_square**0.5,
         iri_classes=_shares(records, lengths_m, tuple(IRI_CLASSES), lambda record: record.iri_class),

@@ -1,4 +1,5 @@
-"""GPX 1.1: a track a drive, a segment a stretch without a gap, a point a row, with its values as extensions.
+"""GPX 1.1: a track a drive, a segment a stretch without a gap, a point a row, with its values as extensions; places to
+go to are waypoints.
 
 A point's time is that of the row's middle, where the point lies.
 """
@@ -27,7 +28,9 @@ class Gpx(Format):
         with path.open("w", encoding="utf-8") as file:
             file.write('<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="ridelog" '
                        f'xmlns="http://www.topografix.com/GPX/1/1" xmlns:ridelog="{_SPACE}">\n')
-            for group, rows in groupby(layer.features, lambda row: row.group):
+            if layer.points:
+                file.writelines(_waypoint(row, row.middle, layer.names) for row in layer.features if row.middle)
+            for group, rows in () if layer.points else groupby(layer.features, lambda row: row.group):
                 file.write(f"<trk><name>{escape(group)}</name>\n")
                 file.writelines(_segments(rows, layer.names))
                 file.write("</trk>\n")
@@ -46,13 +49,26 @@ def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:
         yield "</trkseg>\n"
 
 
+def _waypoint(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
+    lon_deg, lat_deg = middle
+    return (f'<wpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{_time(row)}<name>{escape(row.title)}</name>'
+            f"{_extensions(row, names)}</wpt>\n")
+
+
 def _point(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
-    time = "" if row.time_utc is None else f"<time>{row.time_utc}</time>"
+    lon_deg, lat_deg = middle
+    return f'<trkpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{_time(row)}{_extensions(row, names)}</trkpt>\n'
+
+
+def _time(row: Feature) -> str:
+    return "" if row.time_utc is None else f"<time>{row.time_utc}</time>"
+
+
+def _extensions(row: Feature, names: tuple[str, ...]) -> str:
     values = "".join(f"<ridelog:{name}>{escape(str(value))}</ridelog:{name}>"
                      for name, value in zip(names, row.values, strict=True)
                      if name not in _IN_THE_POINT and value not in (None, ""))
-    lon_deg, lat_deg = middle
-    return f'<trkpt lat="{lat_deg:.7f}" lon="{lon_deg:.7f}">{time}<extensions>{values}</extensions></trkpt>\n'
+    return f"<extensions>{values}</extensions>"
 
 
 FORMAT = Gpx()

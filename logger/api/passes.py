@@ -1,0 +1,129 @@
+"""Repeated drives of logs laid over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.api.sections import length_of
+from logger.api.shown import CommandResult
+from logger.errors import BadInput
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
+
+if TYPE_CHECKING:
+    from logger.chart_data import Chart
+    from logger.exchange.layer import Layer
+    from logger.report.html import Html
+    from logger.report.laid_drives import LaidDrives
+
+Array = npt.NDArray[np.float64]
+USUAL = "25m"
+ROUGH_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RepeatedDrives(CommandResult):
+    """Cells of road (k,), one for each place and direction, with the mean of all drives over them; NaN: not known.
+
+    drives                            (k,) how many passed each
+    iri_m_per_km, iri_std_m_per_km    (k,) mean weighted by the passes' errors, and its standard error, with what is
+                                      common to a drive
+    a_w_mps2                          (k,) weighted r.m.s. acceleration, mean of the passes (ISO 2631-1)
+    lat_deg, lon_deg, heading_deg     (k,) where, and in which direction, clockwise from north
+    """
+
+    drives: npt.NDArray[np.intp]
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    a_w_mps2: Array
+    lat_deg: Array
+    lon_deg: Array
+    heading_deg: Array
+    _found: LaidDrives
+
+    def charts(self) -> Sequence[Chart]:
+        """The IRI of the way that most cells lie on."""
+        from logger.chart_data import Curves, Line
+        from logger.report.laid_drives import chains
+
+        longest = max(chains(self._found), key=len, default=None)
+        if longest is None:
+            return []
+        at_m: Array = self._found.length_m * (np.arange(len(longest), dtype=np.float64) + 0.5)
+        return [Curves("Mean of the drives over the longest way", "distance [m]", "IRI [m/km]", (
+            Line("IRI", at_m, self.iri_m_per_km[longest], self.iri_std_m_per_km[longest]),))]
+
+    def layer(self) -> Layer:
+        """Cells as lines, for the formats of ``convert``."""
+        from logger.report.passes_layer import cells_layer
+
+        return cells_layer(self._found)
+
+    def visits(self) -> Layer:
+        """Places to visit as points, the most urgent first, for the formats of ``convert``; waypoints in GPX."""
+        from logger.report.passes_layer import visits_layer
+
+        return visits_layer(self._found)
+
+    def page(self) -> Html:
+        """Map, curves and tables as one page."""
+        from logger.report.passes_page import passes_page
+
+        return passes_page(self._found)
+
+
+def day_of(text: str, option: str) -> float:
+    """The beginning of a day such as 2026-04-30 in UTC [s since 1970]. BadInput for anything else."""
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        raise BadInput(f"{option} {text}: expected a date such as 2026-04-30") from None
+    return datetime(day.year, day.month, day.day, tzinfo=UTC).timestamp()
+
+
+def passes(logs: Path | str | Sequence[Path | str], length: str | float = USUAL, since: str | None = None,
+           until: str | None = None, split: str | None = None, above_m_per_km: float = ROUGH_M_PER_KM
+           ) -> RepeatedDrives:
+    """Lay the drives of segment logs over each other, by place and direction.
+
+    logs              folders at any depth, or files, of segment logs; open ones too
+    length            of a cell of road, with its unit, or in metres
+    since, until      first day, and first day no more, of the rows that count (UTC): rows without a date then do not
+    split             a day: what changed between the drives before and those from it on?
+    above_m_per_km    from which IRI a place is to be visited; by default where 23 CFR 490.313 says poor
+
+    Raises BadInput for no log, none with an intact row that counts, lengths from under 25 ft or beyond 100 km, and
+    dates that are none.
+
+    >>> found = passes(folder / "logs")
+    >>> bool((found.drives >= 1).all())
+    True
+    """
+    from logger.report.laid_drives import laid_drives
+    from logger.report.passes_text import as_json, lines
+    from logger.store.log.log_reader import find_logs_in, read_found
+
+    length_m = length_of(length if isinstance(length, str) else f"{length:f}m")
+    if not (np.isfinite(above_m_per_km) and above_m_per_km > 0):
+        raise BadInput(f"above {above_m_per_km:g} m/km: expected an IRI above 0")
+    first_s = -np.inf if since is None else day_of(since, "--since")
+    end_s = np.inf if until is None else day_of(until, "--until")
+    split_s = None if split is None else day_of(split, "--split")
+    places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
+    records = [one for file in read_found(find_logs_in(places)) for one in file.records]
+    if since is not None or until is not None:
+        records = [one for one in records if one.utc_us is not None and first_s <= one.utc_us / US_PER_S < end_s]
+    if not records:
+        raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row"
+                       + (" of these days" if since or until else ""))
+    found = laid_drives(records, length_m, above_m_per_km, split_s)
+    return RepeatedDrives(
+        "\n".join(lines(found)), as_json(found), found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
+        found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)

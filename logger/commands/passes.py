@@ -1,0 +1,71 @@
+"""Drives laid over each other by place and direction: the mean of all passes with its standard error, what changed, and
+places that somebody should go and see.
+
+  ridelog passes /media/RIDELOG --out means.html --visit places.gpx
+  ridelog passes spring/ autumn/ --split 2026-07-01 --out changes.geojson
+
+A drive is laid on those before it as a whole: by its places, its direction, and the receiver's error, which changes
+over minutes. Streets from some 15 m apart are kept apart, lanes of one direction are not. The standard error of a mean
+holds what is common to a drive (the car, its tires, its load) as it shows between drives. What is common to all
+drives, such as a wrong vehicle file, it cannot hold.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from logger.api.outputs import check_out
+from logger.api.passes import ROUGH_M_PER_KM, USUAL
+from logger.commands.numbers import add_number
+from logger.commands.pictures import PAGE, parted, write_picture
+from logger.errors import EXIT_DONE
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``ridelog passes``."""
+    parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
+                        help="folder of segment logs, exported stick, or log file")
+    parser.add_argument("--length", default=USUAL, metavar="LENGTH",
+                        help=f"of a cell of road with its unit, such as 25ft, 50m, 0.1mi (default: {USUAL})")
+    parser.add_argument("--since", metavar="DAY", help="rows from this day on (UTC), such as 2026-04-30")
+    parser.add_argument("--until", metavar="DAY", help="rows before this day (UTC)")
+    parser.add_argument("--split", metavar="DAY",
+                        help="what changed between the drives before this day and those from it on")
+    add_number(parser, "--above", 0.01, 100.0, "m/km", metavar="M_PER_KM", default=ROUGH_M_PER_KM,
+               help=f"from which IRI a place is to be visited (default: {ROUGH_M_PER_KM:.2f}, poor by 23 CFR 490.313)")
+    parser.add_argument("--out", metavar="FILE", type=Path, action="append",
+                        help="write the means as .csv .geojson .gpkg .gpx .kml .parquet, or a page with map and curves "
+                             "(.html) or picture (.png .svg .pdf); once for each")
+    parser.add_argument("--visit", metavar="FILE", type=Path,
+                        help="write the places to visit: waypoints (.gpx), table (.csv), map (.geojson .kml .gpkg)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out ``ridelog passes``."""
+    from logger.api.passes import passes
+    from logger.exchange.format import format_of, write_layer
+    from logger.files import write_text
+    from logger.store.log.log_reader import find_logs_in
+
+    picture, table = parted(args.out)
+    for path in (table, args.visit):
+        if path is not None:
+            format_of(path)
+    logs = [log for log, _ in find_logs_in(args.logs)]
+    for path, option in ((picture, "--out"), (table, "--out"), (args.visit, "--visit")):
+        if path is not None:
+            check_out(path, (), logs, option)
+    found = passes(args.logs, args.length, args.since, args.until, args.split, args.above)
+    if table is not None:
+        write_layer(found.layer(), table)
+    if args.visit is not None:
+        write_layer(found.visits(), args.visit)
+    if picture is not None and picture.suffix.lower() == PAGE:
+        write_text(picture, found.page())
+    else:
+        write_picture(picture, "Passes", ", ".join(map(str, args.logs)), found.text, found.charts)
+    print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
+    return EXIT_DONE

@@ -1,0 +1,78 @@
+"""Repeated drives as a page: the report's map and curves of the means, and the places to visit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from logger.comfort.iso2631 import comfort_word
+from logger.records import WindowRecord
+from logger.report.document import grid, hint, paragraphs, section
+from logger.report.html import Html, html
+from logger.report.laid_drives import LaidDrives, chains
+from logger.report.page import page
+from logger.report.passes_text import compass, lines, visit_values
+from logger.report.terminal import comfort_words
+from logger.roads.iso8608 import iri_class
+from logger.store.log.log_reader import LoggedFile, utc
+from logger.units import US_PER_S
+
+_GAP_M = 1.0
+_LINKS = ('<a href="geo:{0},{1}">{0}, {1}</a> '
+          '(<a href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}" rel="noreferrer">web '
+          "map</a>)")
+
+
+def passes_page(found: LaidDrives) -> Html:
+    """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
+    title = f"Road roughness, mean of {found.drives} drives", _days(found)
+    return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, first=(
+        section("Drives laid over each other", paragraphs(lines(found)[:4]) + hint(
+            "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "
+            "last drive, its speed their mean.")), section("Places to visit", _visits(found))))
+
+
+def _days(found: LaidDrives) -> str:
+    if not np.isfinite(found.iri.first_s).any():
+        return "dates not known"
+    first, last = (utc(round(one * US_PER_S)) for one in (np.nanmin(found.iri.first_s), np.nanmax(found.iri.last_s)))
+    return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
+
+
+def _visits(found: LaidDrives) -> Html:
+    if not found.visits:
+        return paragraphs(["No place lies above a limit with enough confidence."])
+    rows = []
+    for number, one in enumerate(found.visits, start=1):
+        values = visit_values(found, one)
+        lat, lon = (f"{values[name]:.6f}" for name in ("lat_deg", "lon_deg"))
+        a_w = values["a_w_mps2"]
+        rows.append((
+            str(number), one.kind, html(_LINKS, lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
+            f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
+            "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
+    return grid(("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+                 "Perception", "Sure", "Drives"), rows, words=(0, 1, 2, 3, 7))
+
+
+def _rows(found: LaidDrives) -> Iterator[WindowRecord]:
+    """Cells as rows of a log, for the views that show those."""
+    length_m, at_m, segment = found.length_m, 0.0, 0
+    for chain in chains(found):
+        for cell in chain.tolist():
+            segment += 1
+            a_w = found.a_w_mps2[cell]
+            known = bool(np.isfinite(a_w))
+            last_s = found.iri.last_s[cell]
+            iri, speed_mps = float(found.iri.iri_m_per_km[cell]), float(found.speed_mps[cell])
+            drives = speed_mps > 0
+            yield WindowRecord(
+                segment, 1, segment * US_PER_S, round(last_s * US_PER_S) if np.isfinite(last_s) else None,
+                length_m / speed_mps if drives else 0.0, at_m, at_m + length_m, float(found.lat_deg[cell]),
+                float(found.lon_deg[cell]), speed_mps if drives else None, iri,
+                float(found.iri.iri_std_m_per_km[cell]), None, float(a_w) if known else None, None, None, None,
+                comfort_word(float(a_w)) if known else "", iri_class(iri), None, 0, 0, (),
+                float(found.a_w_std_mps2[cell]) if known else None)
+            at_m += length_m
+        at_m += _GAP_M

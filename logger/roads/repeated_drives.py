@@ -1,0 +1,250 @@
+"""What several passes over one place say together: a mean, its standard error, and what changed.
+
+The model of a value y of pass i over cell k of the road: y_ik = mu_k (1 + d_i + e_ik) + s_ik. s is the estimate's own
+error, whose standard error stands in the log. d is common to a drive: calibration, tire pressure, load, temperature. e
+is of the pass alone: its lane, and the metres by which it was laid wrong. The last two are not known beforehand; their
+variances are estimated from all cells that were passed more than once (moments of the random-effects model; DerSimonian
+& Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986), and stand in each standard error. The
+variance of d does not fall with the passes of one drive over a place, nor with the length of a stretch: it falls with
+the number of drives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+_CELLS = 1 << 20
+_BITS = 24
+
+
+def place_key(way: Ints, along_m: Array, length_m: float) -> npt.NDArray[np.int64]:
+    """One whole number for the cell of a way that a place lies in (n,): cells of a length from the measure 0 on. -1
+    where the way or the measure is not known."""
+    known = (way >= 0) & np.isfinite(along_m)
+    cell = np.floor(np.where(known, along_m, 0.0) / length_m).astype(np.int64)
+    return np.where(known, (np.asarray(way, np.int64) << _BITS) | (cell + _CELLS), -1)
+
+
+def way_and_cell(key: npt.NDArray[np.int64]) -> tuple[Ints, Ints]:
+    """Ways and numbers of cells along them (n,), which may be negative."""
+    return (key >> _BITS).astype(np.intp), (key & ((1 << _BITS) - 1)).astype(np.intp) - _CELLS
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """Passes of drives over cells (p,), sorted by cell: one row for each drive and cell.
+
+    key           of the cell
+    drive         number of the drive
+    time_s        when, seconds since 1970; NaN: not known
+    iri_m_per_km  mean over the windows of the drive in the cell, by length, with the standard error of that
+    known_m       how much of the road that is: twice the cell where the drive came twice [m]
+    """
+
+    key: npt.NDArray[np.int64]
+    drive: Ints
+    time_s: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    known_m: Array
+
+
+def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Array, iri: Array, iri_std: Array,
+              length_m: float) -> Passes:
+    """Windows (n,) from and to measures of ways, in cells of a length; a window across a limit counts in each cell by
+    its part. NaN in ``iri`` or its error, and negative ways, are left out."""
+    known = (way >= 0) & np.isfinite(iri) & np.isfinite(iri_std) & (end_m > start_m)
+    first = np.floor(np.where(known, start_m, 0.0) / length_m).astype(np.int64)
+    count = np.where(known, np.ceil(np.where(known, end_m, 0.0) / length_m - 1e-9).astype(np.int64) - first, 0)
+    window = np.repeat(np.arange(len(way)), count)
+    cell = first[window] + np.arange(len(window)) - np.repeat(np.cumsum(count) - count, count)
+    piece_m = np.minimum(end_m[window], (cell + 1) * length_m) - np.maximum(start_m[window], cell * length_m)
+    window, cell, piece_m = (one[piece_m > 0] for one in (window, cell, piece_m))
+    key = place_key(way[window], (cell + 0.5) * length_m, length_m)
+    order = np.lexsort((drive[window], key))
+    window, key, piece_m = window[order], key[order], piece_m[order]
+    begins = np.flatnonzero(np.diff(key, prepend=-2).astype(bool) | np.diff(drive[window], prepend=-1).astype(bool))
+    if not len(begins):
+        none = np.zeros(0)
+        return Passes(np.zeros(0, np.int64), np.zeros(0, np.intp), none, none, none, none)
+
+    def total(values: Array) -> Array:
+        return np.asarray(np.add.reduceat(values, begins), dtype=np.float64)
+
+    known_m = total(piece_m)
+    return Passes(key[begins], drive[window][begins], total(time_s[window] * piece_m) / known_m,
+                  total(iri[window] * piece_m) / known_m,
+                  np.sqrt(total((iri_std[window] * piece_m)**2)) / known_m, known_m)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What scatters between passes beyond their own standard errors, each a share of the IRI; NaN: no cell was passed
+    twice, so it is not known.
+
+    drive    standard deviation of what is common to a drive
+    passes   of what is of each pass alone
+    """
+
+    drive: float
+    passes: float
+
+
+def scatter_of(passes: Passes) -> Scatter:
+    """Both variances out of all cells that several drives passed, by their moments; never negative."""
+    key, cell = np.unique(passes.key, return_inverse=True)
+    count = np.bincount(cell, minlength=len(key))
+    several = count[cell] > 1
+    if not several.any():
+        return Scatter(float("nan"), float("nan"))
+    mean = np.bincount(cell, passes.iri_m_per_km) / np.maximum(count, 1)
+    several &= mean[cell] > 0
+    ratio = passes.iri_m_per_km[several] / mean[cell][several] - 1.0
+    own = (passes.iri_std_m_per_km[several] / mean[cell][several])**2
+    # Residuals against a mean of c passes have (c - 1) / c of the variance.
+    share = 1.0 - 1.0 / count[cell][several]
+    all_of_it = max(float(np.sum(ratio**2 - share * own) / np.sum(share)), 0.0)
+    drive = passes.drive[several]
+    number = np.bincount(drive)
+    sums = np.bincount(drive, ratio)
+    within = np.bincount(drive, share * (own + all_of_it))
+    use = number > 1
+    # The sum over m cells of one drive: m^2 share^2 of the drive's own, and the sum of the rest.
+    level = sums[use]**2 - within[use]
+    weight = np.bincount(drive, share)[use]**2 - np.bincount(drive, share)[use]
+    common = max(float(level.sum() / weight.sum()), 0.0) if len(weight) and weight.sum() > 0 else 0.0
+    common = min(common, all_of_it)
+    return Scatter(float(np.sqrt(common)), float(np.sqrt(all_of_it - common)))
+
+
+@dataclass(frozen=True, eq=False)
+class Means:
+    """Cells (k,) by growing key.
+
+    drives              how many passed each
+    iri_m_per_km        mean, weighted by the variances of the passes, with its standard error
+    first_s, last_s     of the passes [s since 1970]; NaN: not known
+    """
+
+    key: npt.NDArray[np.int64]
+    drives: Ints
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    first_s: Array
+    last_s: Array
+
+
+def variances(passes: Passes, scatter: Scatter) -> Array:
+    """Of each pass (p,): its own, and what the scatter adds at the level of its cell [(m/km)2]."""
+    _, cell = np.unique(passes.key, return_inverse=True)
+    level = (np.bincount(cell, passes.iri_m_per_km) / np.maximum(np.bincount(cell), 1))[cell]
+    return np.asarray(passes.iri_std_m_per_km**2
+                      + (np.nan_to_num(scatter.drive)**2 + np.nan_to_num(scatter.passes)**2) * level**2)
+
+
+def means(passes: Passes, scatter: Scatter) -> Means:
+    """The mean of the passes over each cell."""
+    key, cell = np.unique(passes.key, return_inverse=True)
+    weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
+    total = np.bincount(cell, weight, len(key))
+    first, last = np.full(len(key), np.inf), np.full(len(key), -np.inf)
+    np.fmin.at(first, cell, passes.time_s)
+    np.fmax.at(last, cell, passes.time_s)
+    return Means(key, np.bincount(cell, minlength=len(key)).astype(np.intp),
+                 np.bincount(cell, weight * passes.iri_m_per_km, len(key)) / total, np.sqrt(1.0 / total),
+                 np.where(np.isfinite(first), first, np.nan), np.where(np.isfinite(last), last, np.nan))
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """What changed in cells (k,), by growing key.
+
+    before, after              drives in either period
+    change_m_per_km            mean after less mean before, with its standard error
+    p_value                    of a change so large either way where there is none (normal distribution)
+    false_share                share of false finds among all cells whose value is not above this one's (Benjamini &
+                               Hochberg, J. R. Stat. Soc. B 57, 1995): 0.05 here means that of the cells listed up to
+                               this one 5 % did not change
+    """
+
+    key: npt.NDArray[np.int64]
+    before: Ints
+    after: Ints
+    change_m_per_km: Array
+    change_std_m_per_km: Array
+    p_value: Array
+    false_share: Array
+
+
+def changes(passes: Passes, scatter: Scatter, split_s: float) -> Changes:
+    """The difference of two periods, before an instant and from it on, in the cells that were passed in both."""
+    early = passes.time_s < split_s
+    late = passes.time_s >= split_s
+    one, other = means(_some(passes, early), scatter), means(_some(passes, late), scatter)
+    key, here, there = np.intersect1d(one.key, other.key, return_indices=True)
+    change = other.iri_m_per_km[there] - one.iri_m_per_km[here]
+    std = np.hypot(other.iri_std_m_per_km[there], one.iri_std_m_per_km[here])
+    p_value = _two_sided(change / std)
+    return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value))
+
+
+@dataclass(frozen=True, eq=False)
+class Trends:
+    """How fast cells (k,) change, those with passes at two times at least.
+
+    per_year_m_per_km     slope of a weighted straight line, with its standard error
+    p_value, false_share  as of ``Changes``
+    """
+
+    key: npt.NDArray[np.int64]
+    drives: Ints
+    per_year_m_per_km: Array
+    per_year_std_m_per_km: Array
+    p_value: Array
+    false_share: Array
+
+
+YEAR_S = 365.25 * 86_400.0
+
+
+def trends(passes: Passes, scatter: Scatter) -> Trends:
+    """A straight line through the passes over each cell."""
+    dated = _some(passes, np.isfinite(passes.time_s))
+    key, cell = np.unique(dated.key, return_inverse=True)
+    weight = 1.0 / np.maximum(variances(dated, scatter), 1e-12)
+    total = np.bincount(cell, weight, len(key))
+    year = dated.time_s / YEAR_S
+    aside = year - (np.bincount(cell, weight * year, len(key)) / total)[cell]
+    spread = np.bincount(cell, weight * aside**2, len(key))
+    days = spread / np.maximum(total, 1e-300) > (1.0 / 365.25)**2
+    slope = np.bincount(cell, weight * aside * dated.iri_m_per_km, len(key))[days] / spread[days]
+    std = 1.0 / np.sqrt(spread[days])
+    p_value = _two_sided(slope / std)
+    drives = np.bincount(cell, minlength=len(key)).astype(np.intp)
+    return Trends(key[days], drives[days], slope, std, p_value, false_discovery(p_value))
+
+
+def false_discovery(p_value: Array) -> Array:
+    """Share of false finds (m,) among all tests whose p value is not above each one's (Benjamini & Hochberg 1995)."""
+    order = np.argsort(p_value)
+    share = p_value[order] * len(p_value) / np.arange(1, len(p_value) + 1)
+    found = np.empty_like(p_value)
+    found[order] = np.minimum(np.minimum.accumulate(share[::-1])[::-1], 1.0)
+    return found
+
+
+def _two_sided(z: Array) -> Array:
+    from scipy.special import ndtr
+
+    return np.asarray(2.0 * ndtr(-np.abs(z)), dtype=np.float64)
+
+
+def _some(passes: Passes, which: npt.NDArray[np.bool_]) -> Passes:
+    return Passes(*(getattr(passes, name)[which] for name in (
+        "key", "drive", "time_s", "iri_m_per_km", "iri_std_m_per_km", "known_m")))

@@ -1,0 +1,382 @@
+"""Which way each window of a drive lies on, decided by the whole drive.
+
+Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not tell a street
+from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error against
+the network is a state: two components, a first-order Gauss-Markov process each. Every chain of ways that a drive may
+have followed carries its own estimate of it (a Kalman filter of the distances aside), and the most likely chain is
+kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through noise and sparseness", ACM GIS 2009, with the error
+that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely within
+seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street before
+hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import erfc, exp, log, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.roads.road_network import (
+    MOST_TURN_DEG,
+    SEARCH_M,
+    Array,
+    Candidates,
+    Ints,
+    RoadNetwork,
+    Trace,
+    directions,
+    on_sphere,
+)
+
+NO_WAY = -1
+DOUBTFUL = -2
+_BELIEVED = 2.0  # standard deviations that a stretch may lie aside of its way
+_STREETS_M = 10.0  # no two streets of one direction lie nearer to each other
+_NEW_SHARE = 0.3  # how likely a street is one that is not known yet, where one is known within reach
+_KNOWN = log(1 - _NEW_SHARE)
+_UNKNOWN = log(_NEW_SHARE / (2 * (SEARCH_M - _STREETS_M)))  # anywhere within reach, but not there
+_LEAST = 1e-6  # a likelihood that anything has: the model may be wrong
+_CHANGE = log(0.1)  # to leave a street that goes on beside
+_WORST = 25.0  # how much less likely than the best a chain may be and still be followed
+_MOST_CHAINS = 16
+_GAP_M = 50.0  # between windows: what lay beside before says nothing after
+_STREET_M, _STRAIGHT = 5.0, 0.9  # aside, and cosine: so near the next way continues the one before
+_APART_M = 100.0  # from which distance on a drive that comes back drives again
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """What is believed of the positions.
+
+    std_m             of the slow error to the east, and to the north [m]
+    correlation_s     time after which it is another one by 1 - 1/e [s]
+    aside_m           what windows scatter aside beyond that: lanes, the car in its lane, fast errors [m]
+
+    A receiver in the open has 2 to 3 m (data sheets: 2.5 m CEP, which is 2.1 m in each component), between houses 4 m.
+    """
+
+    std_m: float = 3.0
+    correlation_s: float = 120.0
+    aside_m: float = 2.0
+
+
+USUAL = Receiver()
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Where the windows of a trace lie (n,).
+
+    way        number of the way, NO_WAY: on none, DOUBTFUL: on one of several, and none is to be believed
+    along_m    measure there of the window's middle [m]; NaN: on none
+    point      nearest point of the network, -1: none
+    aside_m    how far left of that point the fix lay [m]
+    """
+
+    way: Ints
+    along_m: Array
+    point: Ints
+    aside_m: Array
+
+
+_State = tuple[float, float, float, float, float]
+"""Error to the east and north [m], and its covariance (ee, en, nn) [m2]."""
+
+
+class _Chain(NamedTuple):
+    """What a drive may have followed up to a window.
+
+    score            logarithm of the likelihood
+    candidate        that it lies on or beside, NO_WAY: none is near
+    known            it lies on that; else on a street that nobody knows, beside it
+    reference        the last point that it lay on, or NO_WAY
+    error            of the receiver against that
+    beside_m         how far left of the candidate an unknown street lies, with its variance
+    parent           number of the chain of the window before that it goes on
+    """
+
+    score: float
+    candidate: int
+    known: bool
+    reference: int
+    error: _State
+    beside_m: tuple[float, float]
+    parent: int
+
+
+def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start: _State | None = None
+          ) -> tuple[Matched, _State]:
+    """Lay a trace on the ways of a network, or on none where none is likely.
+
+    start    error to the east and north at the beginning and its covariance (ee, en, nn), as this function gives it for
+             the end; None: not known
+    """
+    count = len(trace.t_s)
+    found = network.candidates(trace)
+    if not len(found.window):
+        spread = 2 * receiver.std_m**2
+        return _nowhere(count), (0.0, 0.0, spread, 0.0, spread)
+    path, states = _best_chain(network, trace, receiver, start, found)
+    on = path >= 0
+    point = np.where(on, found.point[np.maximum(path, 0)], NO_WAY)
+    smooth = _smoothed(trace, receiver, states)
+    u_east, u_north = network.plane_heading()
+    rel_e, rel_n = found.east_m[np.maximum(path, 0)], found.north_m[np.maximum(path, 0)]
+    at = np.maximum(point, 0)
+    along = (rel_e - smooth[:, 0]) * u_east[at] + (rel_n - smooth[:, 1]) * u_north[at]
+    end_e, end_n, end_ee, end_en, end_nn = states[-1].tolist()
+    way = np.where(on, network.way[at], NO_WAY)
+    aside_m = rel_n * u_east[at] - rel_e * u_north[at]
+    doubtful = on & _too_far(way, aside_m, receiver)
+    on &= ~doubtful
+    way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
+    return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
+                   np.where(on, aside_m, np.nan)), (
+                       end_e, end_n, end_ee, end_en, end_nn)
+
+
+def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> npt.NDArray[np.bool_]:
+    """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
+    stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
+    mean_m = np.bincount(stretch, np.nan_to_num(aside_m)) / np.bincount(stretch)
+    return np.asarray(np.abs(mean_m[stretch]) > _BELIEVED * 2**0.5 * receiver.std_m)
+
+
+def _nowhere(count: int) -> Matched:
+    none = np.full(count, NO_WAY, np.intp)
+    return Matched(none, np.full(count, np.nan), none, np.full(count, np.nan))
+
+
+def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _State | None, found: Candidates
+                ) -> tuple[Ints, Array]:
+    """Candidate of each window (n,), NO_WAY for none, and the filtered errors (n, 5) along that chain."""
+    count = len(trace.t_s)
+    lists = _Lists.of(network, found, count)
+    spread = 2 * receiver.std_m**2
+    chains = [_Chain(0.0, NO_WAY, False, NO_WAY, start or (0.0, 0.0, spread, 0.0, spread), (0.0, 0.0), -1)]
+    steps_s, steps_m = np.diff(trace.t_s, prepend=trace.t_s[:1]), np.diff(trace.distance_m, prepend=0.0)
+    history: list[list[_Chain]] = []
+    before = range(0)
+    for window, (step_s, step_m) in enumerate(zip(steps_s.tolist(), steps_m.tolist(), strict=True)):
+        here = range(lists.begins[window], lists.begins[window + 1])
+        if step_m > _GAP_M:
+            before = range(0)
+            chains = [chain._replace(candidate=NO_WAY, known=False) for chain in chains]
+        ahead = [(number, chain._replace(error=_drifted(chain.error, step_s, receiver, spread)))
+                 for number, chain in enumerate(chains)]
+        drift = _drift_m2(step_s, receiver)
+        new = [max((_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead),
+                   key=_score) for one in here]
+        new += [max((_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead),
+                    key=_score) for one in here]
+        if not here:
+            new = [chain._replace(candidate=NO_WAY, known=False, parent=number) for number, chain in ahead]
+        best = max(map(_score, new))
+        likely = (chain for chain in new if chain.score > best - _WORST)
+        chains = sorted(likely, key=_score, reverse=True)[:_MOST_CHAINS]
+        history.append(chains)
+        before = here
+    return _traced_back(history)
+
+
+def _score(chain: _Chain) -> float:
+    return chain.score
+
+
+def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range,
+        receiver: Receiver) -> _Chain:
+    """A chain that goes on, or begins, on a known street."""
+    score, last, known, reference, (error_e, error_n, ee, en, nn), _, _ = chain
+    point = lists.point[one]
+    if not (known and lists.same(last, one)):
+        # A street begins: to go over to the one beside is less likely than to turn into it.
+        score += _CHANGE if lists.goes_on(here, last) or lists.goes_on(before, one) else _KNOWN
+    if reference != NO_WAY and lists.way_of[reference] != lists.way[one] and (
+            lists.founder[reference] != lists.founder[point]):
+        # The error was against a way as wrong as its drives were; what it says of the receiver's own holds on.
+        passes = lists.passes[reference]
+        keeps = passes / (passes + 1)
+        own = receiver.std_m**2 * (1 / (passes + 1) + 1 / lists.passes[point])
+        error_e, error_n = keeps * error_e, keeps * error_n
+        ee, en, nn = keeps * keeps * ee + own, keeps * keeps * en, keeps * keeps * nn + own
+    left_e, left_n = lists.left_e[one], lists.left_n[one]
+    gain_e, gain_n = ee * left_e + en * left_n, en * left_e + nn * left_n
+    variance = gain_e * left_e + gain_n * left_n + receiver.aside_m**2
+    off = lists.aside_m[one] - error_e * left_e - error_n * left_n
+    score -= 0.5 * (off * off / variance + log(2 * pi * variance))
+    gain_e, gain_n = gain_e / variance, gain_n / variance
+    error = (error_e + gain_e * off, error_n + gain_n * off, ee - gain_e * gain_e * variance,
+             en - gain_e * gain_n * variance, nn - gain_n * gain_n * variance)
+    return _Chain(score, one, True, point, error, (0.0, 0.0), parent)
+
+
+def _beside(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, drift: float,
+            receiver: Receiver) -> _Chain:
+    """A chain that goes on, or begins, on an unknown street beside a known one: so far aside as it was, or anywhere."""
+    score, last, known, reference, error, beside, _ = chain
+    fast, aside_m = receiver.aside_m**2, lists.aside_m[one]
+    begins = known or last == NO_WAY
+    if begins:
+        score += _CHANGE if known and lists.goes_on(here, last) else 0.0
+        beside = (0.0, 0.0)
+    elif not lists.same(last, one) or lists.way[last] != lists.way[one]:
+        was = next((other for other in before if lists.same(other, one)), NO_WAY)
+        apart = 0.0 if was == NO_WAY or lists.way[was] == lists.way[one] else receiver.std_m**2
+        beside = (0.0, 0.0) if was == NO_WAY else (lists.aside_m[was], fast + apart)
+    score += min((_clear_of(lists, other, error, fast) for other in here
+                  if begins or not lists.goes_on(before, other)), default=0.0)
+    if beside[1] == 0.0:
+        return _Chain(score + _UNKNOWN, one, False, reference, error, (aside_m, fast), parent)
+    ahead = beside[1] + drift
+    variance, off = ahead + fast, aside_m - beside[0]
+    score -= 0.5 * (off * off / variance + log(2 * pi * variance))
+    gain = ahead / variance
+    return _Chain(score, one, False, reference, error, (beside[0] + gain * off, (1 - gain) * ahead), parent)
+
+
+def _clear_of(lists: _Lists, one: int, error: _State, fast: float) -> float:
+    """How likely it is that an unknown street keeps its distance from a known one, where this fix lies."""
+    error_e, error_n, ee, en, nn = error
+    left_e, left_n = lists.left_e[one], lists.left_n[one]
+    spread = 2 * (ee * left_e**2 + 2 * en * left_e * left_n + nn * left_n**2 + fast)
+    aside_m = abs(lists.aside_m[one] - error_e * left_e - error_n * left_n)
+    reach = sqrt(spread)
+    return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + _LEAST)
+
+
+def _drift_m2(step_s: float, receiver: Receiver) -> float:
+    """Variance that the difference of two errors gains in some time [m2]."""
+    return 2 * receiver.std_m**2 * (1 - exp(-2 * max(step_s, 0.0) / receiver.correlation_s))
+
+
+def _drifted(state: _State, step_s: float, receiver: Receiver, spread: float) -> _State:
+    keeps = exp(-max(step_s, 0.0) / receiver.correlation_s)
+    error_e, error_n, ee, en, nn = state
+    square = keeps * keeps
+    new = (1 - square) * spread
+    return keeps * error_e, keeps * error_n, square * ee + new, square * en, square * nn + new
+
+
+def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Ints, Array]:
+    path, states, number = np.full(len(history), NO_WAY, np.intp), np.zeros((len(history), 5)), 0
+    for window in range(len(history) - 1, -1, -1):
+        chain = history[window][number]
+        if chain.known:
+            path[window] = chain.candidate
+        states[window], number = chain.error, chain.parent
+    return path, states
+
+
+def _smoothed(trace: Trace, receiver: Receiver, states: Array) -> Array:
+    """Errors to the east and north (n, 2) as the whole drive tells them."""
+    keeps = np.exp(-np.diff(trace.t_s).clip(0.0) / receiver.correlation_s)
+    covariance = states[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
+    drifted = keeps[:, None, None]**2 * covariance[:-1] + (
+        (1 - keeps**2) * 2 * receiver.std_m**2)[:, None, None] * np.eye(2)
+    gain = np.einsum("nij,njk->nik", keeps[:, None, None] * covariance[:-1], np.linalg.inv(drifted))
+    offset = states[:-1, :2] - np.einsum("nij,nj->ni", gain, keeps[:, None] * states[:-1, :2])
+    found = np.array(states[:, :2])
+    for window in range(len(found) - 2, -1, -1):
+        found[window] = offset[window] + gain[window] @ found[window + 1]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Lists:
+    """Candidates as lists, which a loop reads faster than arrays; ``begins`` of those of each window."""
+
+    begins: list[int]
+    way: list[int]
+    point: list[int]
+    along_m: list[float]
+    aside_m: list[float]
+    left_e: list[float]
+    left_n: list[float]
+    way_of: Ints
+    founder: Ints
+    passes: Array
+
+    def goes_on(self, among: range, one: int) -> bool:
+        """Whether a candidate's street is among those of a neighbouring window too, perhaps as another way."""
+        return one != NO_WAY and any(self.same(one, other) for other in among)
+
+    def same(self, one: int, other: int) -> bool:
+        """Whether candidates of neighbouring windows are of one street: the same way, or one that continues it."""
+        if self.way[one] == self.way[other] and abs(self.along_m[one] - self.along_m[other]) > 2 * SEARCH_M:
+            return False
+        if self.left_e[one] * self.left_e[other] + self.left_n[one] * self.left_n[other] < _STRAIGHT:
+            return self.way[one] == self.way[other]
+        return abs(self.aside_m[one] - self.aside_m[other]) < _STREET_M
+
+    @classmethod
+    def of(cls, network: RoadNetwork, found: Candidates, count: int) -> _Lists:
+        """Those of so many windows."""
+        u_east, u_north = network.plane_heading()
+        e, n = u_east[found.point], u_north[found.point]
+        return cls(
+            np.searchsorted(found.window, np.arange(count + 1)).tolist(), network.way[found.point].tolist(),
+            found.point.tolist(), (network.along_m[found.point] + found.east_m * e + found.north_m * n).tolist(),
+            (found.north_m * e - found.east_m * n).tolist(), (-n).tolist(), e.tolist(), network.way, network.founder,
+            network.passes)
+
+
+# --- many drives ---
+
+
+def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUAL) -> list[Matched]:
+    """Lay drives over each other, one after the other: where no way is known a drive makes one, and ``network`` grows.
+
+    A drive that passes a place again is laid over itself.
+    """
+    found = []
+    for founder, trace in enumerate(traces, start=network.traces):
+        parts: list[Matched] = []
+        state: _State | None = None
+        for start, end in _laps(trace):
+            lap = trace.part(start, end)
+            matched, state = match(network, lap, receiver, state)
+            parts.append(_learned(network, lap, matched, founder))
+        found.append(_joined(parts))
+        network.traces = founder + 1
+    return found
+
+
+def _learned(network: RoadNetwork, lap: Trace, matched: Matched, founder: int) -> Matched:
+    """What was matched moves its ways; what was not becomes ways of its own."""
+    on = np.flatnonzero(matched.way >= 0)
+    network.move(matched.point[on], matched.aside_m[on])
+    way, along_m, point = matched.way.copy(), matched.along_m.copy(), matched.point.copy()
+    off = matched.way == NO_WAY
+    breaks = np.flatnonzero((off[1:] != off[:-1]) | (np.diff(lap.distance_m) > _GAP_M)) + 1
+    for start, end in zip([0, *breaks], [*breaks, len(off)], strict=True):
+        if end > start and off[start]:
+            way[start:end], along_m[start:end], point[start:end] = network.add(lap, start, end, founder)
+    return Matched(way, along_m, point, np.where(off, 0.0, matched.aside_m))
+
+
+def _laps(trace: Trace) -> list[tuple[int, int]]:
+    """Parts of a trace of which none comes back to where it has been, in its direction."""
+    from scipy.spatial import cKDTree
+
+    points = on_sphere(trace.lat_deg, trace.lon_deg)
+    heading = directions(points, trace.distance_m)
+    pairs = cKDTree(points).query_pairs(SEARCH_M, output_type="ndarray") if len(points) else np.zeros((0, 2), np.intp)
+    early, late = pairs.min(axis=1), pairs.max(axis=1)
+    alike = np.einsum("ij,ij->i", heading[early], heading[late]) > np.cos(np.radians(MOST_TURN_DEG))
+    again = alike & (trace.distance_m[late] - trace.distance_m[early] > _APART_M)
+    last = np.full(len(points), -1)
+    np.maximum.at(last, late[again], early[again])
+    cuts = [0]
+    for window in np.flatnonzero(last >= 0).tolist():
+        if last[window] >= cuts[-1]:
+            cuts.append(window)
+    return [(start, end) for start, end in zip(cuts, [*cuts[1:], len(points)], strict=True) if end > start]
+
+
+def _joined(parts: Sequence[Matched]) -> Matched:
+    return Matched(*(np.concatenate([getattr(one, name) for one in parts] or [np.zeros(0)])
+                     for name in ("way", "along_m", "point", "aside_m")))
