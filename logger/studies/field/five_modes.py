@@ -16,6 +16,9 @@ PEERS = (("numpy ERA, 60 x 400", 0.0, 0.14, 80.0), ("python-control 0.10.2, ERA 
 own output on one record, order 24; the nearest mode within 5 % was taken for each."""
 FREQUENCY, DAMPING = 0.09, 25.0
 """The best of those that miss none [%]."""
+_ONE_RECORD = 0.13
+"""By how much the frequency of the worst mode differs from record to record (standard deviation of ours) [%]: packages
+were tried on one."""
 _RECORDS, _RATE_HZ, _LENGTH_S, _DECIBEL, _NEAR = 20, 100.0, 20.0, 20.0, 0.05
 _LOWEST_HZ, _RATIO = 2.48, 0.01
 
@@ -39,7 +42,7 @@ def run(effort: Effort) -> Result:
     errors = 100 * np.array(off)
     hz_off, damping_off = (float(one) for one in np.median(np.nanmax(errors, axis=1), axis=0))
     values = (Value("modes missed", 0.0, float(missed), 0.0), Value("modes that are not there", 0.0, float(extra), 0.0),
-              Value("frequency, worst mode [%]", FREQUENCY, hz_off, 0.0, Word.BETTER),
+              Value("frequency, worst mode [%]", FREQUENCY, hz_off, _ONE_RECORD),
               Value("damping, worst mode [%]", DAMPING, damping_off, 0.0, Word.BETTER))
     ours = (f"ridelog, ERA, median of {len(off)} records", missed / len(off), hz_off, damping_off)
     table = Table("Packages, as printed by them, and ours", (
