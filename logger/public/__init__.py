@@ -14,6 +14,7 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 from logger.api.calibration import Calibration, Slopes, calibrate
 from logger.api.conversion import Conversion, convert
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
+from logger.api.fleet import FleetSummary, Ingested, fleet_ingest, fleet_summarise
 from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
 from logger.api.lab_loop import LabStory, lab
@@ -43,7 +44,9 @@ __all__ = [
     "EffectInfo",
     "Effects",
     "Estimate",
+    "FleetSummary",
     "Identification",
+    "Ingested",
     "Iri",
     "LabStory",
     "LearnedLaw",
@@ -72,6 +75,8 @@ __all__ = [
     "diagnose_same_road",
     "effects",
     "estimate",
+    "fleet_ingest",
+    "fleet_summarise",
     "identify",
     "iri",
     "lab",
