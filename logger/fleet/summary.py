@@ -107,8 +107,8 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     windows = int(of_roads["windows"].sum())
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
-    return FleetFigures(grouped(segments, by, pieces), cars, np.asarray(np.bincount(car, passes), np.float64), biases, windows,
-                        int((~published).sum()))
+    of_cars = np.asarray(np.bincount(car, passes), dtype=np.float64)
+    return FleetFigures(grouped(segments, by, pieces), cars, of_cars, biases, windows, int((~published).sum()))
 
 
 def gains_table(cars: Keys, biases: CarBiases) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import signal
 import subprocess
 import sys
@@ -91,26 +90,53 @@ def test_starts_and_ends_of_drives_are_cut(logs: Path, tmp_path: Path) -> None:
 
 
 KILLED = """
-import os, signal, sys
-import logger.fleet.ingest as ingest
+import json, os, shutil, signal, sys
+from pathlib import Path
+import numpy, pyarrow.csv
+from pyarrow import parquet
 from logger.commands.main import main
-point, left = int(sys.argv[1]), [int(sys.argv[1])]
-real = {}
-def counted(name):
-    def call(*args, **kwargs):
+import logger.api.fleet, logger.fleet.ingest as ingest
+
+logs, out = sys.argv[1:]
+ingest.ingest_sessions.__kwdefaults__["batch_rows"] = 60
+left = [10**9]
+
+def counted(real):
+    def step(*args, **kwargs):
         left[0] -= 1
         if left[0] < 0:
             os.kill(os.getpid(), signal.SIGKILL)
-        return real[name](*args, **kwargs)
-    return call
-from pathlib import Path
-from pyarrow import parquet
-real = {"fsync": os.fsync, "replace": Path.replace, "write": parquet.write_table}
-os.fsync, Path.replace, parquet.write_table = counted("fsync"), counted("replace"), counted("write")
-ingest.ingest_sessions.__kwdefaults__["batch_rows"] = 60
-main(["fleet", "ingest", sys.argv[2], "--to", sys.argv[3], "--car", "a"])
+        return real(*args, **kwargs)
+    return step
+
+os.fsync, Path.replace, Path.unlink = counted(os.fsync), counted(Path.replace), counted(Path.unlink)
+parquet.write_table = counted(parquet.write_table)
+
+def in_a_process(steps, dataset):
+    child = os.fork()
+    if not child:
+        left[0] = steps
+        sys.stdout = open(os.devnull, "w")
+        main(["fleet", "ingest", logs, "--to", dataset, "--car", "a"])
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+ends = []
+for point in range(10_000):
+    killed = f"{out}/{point}-killed"
+    ends.append(in_a_process(point, killed))
+    again = f"{out}/{point}-again"
+    if os.path.exists(killed):
+        shutil.copytree(killed, again)
+        if os.path.exists(killed + ".key"):
+            shutil.copy(killed + ".key", again + ".key")
+    in_a_process(point // 2, again)
+    assert in_a_process(10**9, again) == 0
+    if ends[-1] == 0:
+        break
+print(json.dumps(ends))
 """
-"""An ingest in commits of a few rows that kills itself before one of its steps on the disk."""
+"""Ingests in commits of a few rows, killed before the n-th step on the disk; again, killed sooner; and whole."""
 
 
 @pytest.mark.slow
@@ -120,22 +146,20 @@ def test_an_ingest_that_is_killed_anywhere_loses_no_row_and_takes_none_twice(log
     expected = [row[1:] for row in rows_of(whole)]
     script = tmp_path / "killed.py"
     script.write_text(KILLED)
-    ends = []
-    for point in range(0, 10_000, 2):
-        dataset = tmp_path / f"killed{point}"
-        done = subprocess.run([sys.executable, str(script), str(point), str(logs / "car000"), str(dataset)],
-                              capture_output=True, check=False)
-        ends.append(done.returncode)
-        if dataset.exists():
-            there = [row[1:] for row in rows_of(dataset)] if Dataset(dataset).manifest.rows else []
-            assert len(there) == len(set(there)) and set(there) <= set(expected)
-        assert main(["fleet", "ingest", str(logs / "car000"), "--to", str(dataset), "--car", "a"]) == 0
-        assert [row[1:] for row in rows_of(dataset)] == expected
-        shutil.rmtree(dataset)
-        if done.returncode == 0:
-            break
+    done = subprocess.run([sys.executable, str(script), str(logs / "car000"), str(tmp_path)], capture_output=True,
+                          text=True, check=True)
+    ends = json.loads(done.stdout)
     assert set(ends[:-1]) == {-signal.SIGKILL} and ends[-1] == 0
-    assert len(ends) > 25
+    assert len(ends) > 50
+    for point in range(len(ends)):
+        killed, again = tmp_path / f"{point}-killed", tmp_path / f"{point}-again"
+        if killed.exists() and Dataset(killed).manifest.rows:
+            there = [row[1:] for row in rows_of(killed)]
+            assert len(there) == len(set(there)) and set(there) <= set(expected)
+        assert [row[1:] for row in rows_of(again)] == expected
+        assert {path.name for path in again.rglob("*.parquet")} == {
+            Path(one.path).name for commit in Dataset(again).manifest.commits for one in commit.files} | {
+            Path(commit.ledger).name for commit in Dataset(again).manifest.commits}
 
 
 def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]
