@@ -18,6 +18,7 @@ from logger.fleet.dataset import EXTRA, Dataset, existing
 if TYPE_CHECKING:
     from logger.exchange.layer import Layer
     from logger.fleet.drive_rows import Keyed
+    from logger.fleet.engine import Engine
     from logger.fleet.road_map import Pieces
     from logger.fleet.summary import FleetFigures
 
@@ -106,27 +107,72 @@ def fleet_summarise(dataset: Path | str, *, by: str = "segment", since: str | No
     >>> bool((summary.found.roads.iri_m_per_km > 0).all())
     True
     """
+    from logger.fleet.words import figures_json, figures_words
+
+    with _summarised(Path(dataset), by, since, until, engine, min_cars) as (figures, _, _):
+        return FleetSummary(figures_words(figures), figures_json(figures), figures)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FleetReport(CommandResult):
+    """What a report wrote: ``page``, and how many ``tiles``."""
+
+    page: Path
+    tiles: int
+
+
+def fleet_report(dataset: Path | str, out: Path | str, *, since: str | None = None, until: str | None = None,
+                 engine: str = "duckdb", min_cars: int = 1) -> FleetReport:
+    """Write a folder that opens without a server: ``index.html``, the tiles of its map, ``segments.parquet`` and
+    sections of 0.1 mi as ``sections.parquet`` and ``sections.csv``. It is there whole, in place of an older one, or
+    not at all.
+
+    out       a folder that is not there, or that a report has made; the rest as for ``fleet_summarise``
+
+    Raises BadInput as ``fleet_summarise``, for a folder with other files, and where too few cars leave no segment.
+
+    >>> fleet_report(folder / "fleet", folder / "map").page.stat().st_size < 200_000
+    True
+    """
+    from logger.fleet.report import INDEX, check_folder, history_of, write_report
+
+    place = Path(out)
+    check_folder(place)
+    with _summarised(Path(dataset), "segment", since, until, engine, min_cars) as (figures, running, pieces):
+        if not len(figures.roads.key):
+            raise BadInput(f"{dataset}: expected a segment that {min_cars} cars have driven, found none")
+        steps = history_of(running, figures, day_us(since, "--since"), day_us(until, "--until"))
+    tiles = write_report(figures, steps, pieces, place)
+    page = place / INDEX
+    text = f"Report: {page} ({len(figures.roads.key):,} segments, {tiles:,} tiles)"
+    return FleetReport(text, {"page": str(page), "tiles": tiles, "segments": len(figures.roads.key)}, page, tiles)
+
+
+@contextmanager
+def _summarised(folder: Path, by: str, since: str | None, until: str | None, engine: str, min_cars: int
+                ) -> Iterator[tuple[FleetFigures, Engine, Pieces | None]]:
+    """Figures, the engine that made them, and the map of the dataset."""
     from logger.fleet.engine import opened
     from logger.fleet.summary import summarise
-    from logger.fleet.words import figures_json, figures_words
 
     _needs_arrow()
     CARS.check("--min-cars", min_cars)
     if by not in BY:
         raise BadInput(f"--by {by}: expected one of {', '.join(BY)}")
     since_us, until_us = day_us(since, "--since"), day_us(until, "--until")
-    found = existing(Path(dataset))
-    if by == "route" and not found.manifest.roads:
+    dataset = existing(folder)
+    if by == "route" and not dataset.manifest.roads:
         raise BadInput("--by route: expected a dataset that was begun with --roads")
-    files = found.files(since_us, None if until_us is None else until_us - 1)
-    empty = BadInput(f"{dataset}: expected at least one pass with an IRI in that time")
+    empty = BadInput(f"{folder}: expected at least one pass with an IRI in that time")
+    files = dataset.files(since_us, None if until_us is None else until_us - 1)
     if not files:
         raise empty
+    pieces = _pieces(dataset)
     with opened(files, engine) as running:
-        figures = summarise(running, by, since_us, until_us, min_cars, pieces_of_dataset(found))
-    if figures is None:
-        raise empty
-    return FleetSummary(figures_words(figures), figures_json(figures), figures)
+        figures = summarise(running, by, since_us, until_us, min_cars, pieces)
+        if figures is None:
+            raise empty
+        yield figures, running, pieces
 
 
 def day_us(text: str | None, option: str) -> int | None:
@@ -140,7 +186,7 @@ def day_us(text: str | None, option: str) -> int | None:
     return (datetime(day.year, day.month, day.day, tzinfo=UTC) - _EPOCH) // timedelta(microseconds=1)
 
 
-def pieces_of_dataset(dataset: Dataset) -> Pieces | None:
+def _pieces(dataset: Dataset) -> Pieces | None:
     """The pieces of the map that a dataset was made with."""
     from logger.fleet.road_map import pieces_of
     from logger.store.formats.road_lines import read_road_lines

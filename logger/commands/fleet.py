@@ -21,7 +21,7 @@ from logger.errors import EXIT_DONE
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the verbs."""
-    verbs = parser.add_subparsers(dest="fleet_verb", required=True, metavar="ingest|summarise")
+    verbs = parser.add_subparsers(dest="fleet_verb", required=True, metavar="ingest|summarise|report")
     take = verbs.add_parser("ingest", help="add logs to a dataset", allow_abbrev=False, description=(
         "Add the intact rows of logs to a dataset of Parquet files. What is there already is passed over; an ingest "
         "that was cut off goes on where it was when it is started again."))
@@ -42,7 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                       help="segment (66 ft, one direction), section (0.1 mi), cell (0.8 mi), route (default: segment)")
     tell.add_argument("--out", metavar="FILE", type=Path,
                       help="write all rows as .csv .geojson .gpkg .gpx .kml .parquet (GeoParquet)")
-    for one in (take, tell):
+    draw = verbs.add_parser("report", help="a map in a folder", allow_abbrev=False, description=(
+        "Write a folder that opens without a server: a page with a map and lists, tiles of the map, and the segments "
+        "and sections of 0.1 mi as GeoParquet and CSV."))
+    _common(draw)
+    draw.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder to write")
+    for one in (take, tell, draw):
         one.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -58,7 +63,7 @@ def _common(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog fleet``."""
-    return {"ingest": _ingest, "summarise": _summarise}[args.fleet_verb](args)
+    return {"ingest": _ingest, "summarise": _summarise, "report": _report}[args.fleet_verb](args)
 
 
 def _ingest(args: argparse.Namespace) -> int:
@@ -81,4 +86,13 @@ def _summarise(args: argparse.Namespace) -> int:
     if args.out is not None:
         write_layer(found.layer(), args.out)
     print(json.dumps(found.as_json(), allow_nan=False) if args.json else found.text)
+    return EXIT_DONE
+
+
+def _report(args: argparse.Namespace) -> int:
+    from logger.api.fleet import fleet_report
+
+    done = fleet_report(args.dataset, args.out, since=args.since, until=args.until, engine=args.engine,
+                        min_cars=args.min_cars)
+    print(json.dumps(done.as_json()) if args.json else done.text)
     return EXIT_DONE

@@ -15,7 +15,7 @@ decay.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -99,6 +99,31 @@ def car_biases(road: Codes, car: Codes, passes: Array, iri: Array, years: Array)
     between = float(np.std(log_gain[known], ddof=1)) if known.sum() > 1 else 0.0
     return CarBiases(np.where(known, np.exp(log_gain), 1.0), np.where(known, log_std, between), group, known,
                      growth if is_timed else np.nan, float(np.sqrt(variance)))
+
+
+def shared_by_session(car: Codes, passes: Array, residual: Array, square: Array) -> float:
+    """Variance of what all passes of a session share: temperature, load and tires of that day. By analysis of
+    variance of a random effect (S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, 1992, section 3.6),
+    from sums of relative residuals of each session (n,) of a car; 0 where nothing tells it."""
+    sessions, cars, total = len(car), len(np.unique(car)), passes.sum()
+    if sessions <= cars or total <= sessions:
+        return 0.0
+    within = (square - residual**2 / passes).sum() / (total - sessions)
+    of_car = np.bincount(car, passes)
+    mean = np.bincount(car, residual) / np.maximum(of_car, 1.0)
+    between = (passes * (residual / passes - mean[car]) ** 2).sum() / (sessions - cars)
+    size = (total - (np.bincount(car, passes**2) / np.maximum(of_car, 1.0)).sum()) / (sessions - cars)
+    return float(max(between - within, 0.0) / size)
+
+
+def with_sessions(biases: CarBiases, car: Codes, passes: Array, variance: float) -> CarBiases:
+    """Biases whose errors hold what passes of a session share. ``car``, ``passes``: of each session (n,)."""
+    cars = len(biases.gain)
+    of_car = np.bincount(car, passes, cars)
+    own = variance * np.bincount(car, passes**2, cars) / np.maximum(of_car, 1.0) ** 2
+    alone = max(1.0 - variance / biases.pass_std**2, 0.0) if biases.pass_std > 0 else 1.0
+    log_std = np.where(biases.known, np.sqrt(alone * biases.log_std**2 + own), biases.log_std)
+    return replace(biases, log_std=log_std)
 
 
 def _groups(information: Array) -> Codes:

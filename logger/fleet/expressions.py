@@ -59,6 +59,18 @@ def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:
         bias_square=total(passes * passes * joined.log_variance), **{name: total(joined[name]) for name in plain})
 
 
+def residuals_by_session(rows: ir.Table, gains: ir.Table, levels: ir.Table, since_us: int | None, until_us: int | None,
+                         zero_us: int) -> ir.Table:
+    """Sums of passes' relative residuals by car and session; ``levels`` has each road's IRI at ``middle`` [years] and
+    its growth a year, as a fraction."""
+    passes = _passes(rows, since_us, until_us).join(gains, "car").join(levels, "road")
+    years = (passes.utc_us - zero_us).cast("float64") / YEAR_US
+    expected = passes.gain * passes.level * (1.0 + passes.growth * (years - passes.middle))
+    passes = passes.mutate(residual=passes.pass_iri_m_per_km / expected - 1.0)
+    return passes.group_by(["car", "session"]).aggregate(
+        passes=passes.count(), residual=passes.residual.sum(), square=(passes.residual * passes.residual).sum())
+
+
 def history(rows: ir.Table, gains: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
     """Passes by road and quarter of a year: number, mean IRI with the cars' gains taken out."""
     passes = _passes(rows, since_us, until_us).join(gains, "car")

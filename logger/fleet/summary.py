@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.fleet.car_biases import CarBiases, car_biases
+from logger.fleet.car_biases import CarBiases, car_biases, shared_by_session, with_sessions
 from logger.fleet.engine import Engine
-from logger.fleet.expressions import for_biases, passes_by_car, roads
+from logger.fleet.expressions import for_biases, passes_by_car, residuals_by_session, roads
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
 from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
 from logger.fleet.road_map import Pieces
@@ -29,6 +29,8 @@ POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 UNCOMFORTABLE_MPS2 = 0.8
 """ISO 2631-1, C.2.3."""
 SECTION_M = MILE_M / 10
+_OWN_GROWTH = 10
+"""Passes from which a road's own line takes less than a fifth from their variance."""
 _ZERO_US = 1_577_836_800_000_000
 """2020-01-01: years count from here, so that their squares keep their digits."""
 
@@ -74,6 +76,7 @@ class FleetFigures:
 
     roads         figures by what was asked for
     cars          pseudonyms (j,), in order, and ``car_passes`` their passes; ``biases`` in the same order
+    shared        by all passes of a session: the share of a pass's variance
     windows       in all passes
     withheld      segments that fewer cars have driven than may be published
     """
@@ -82,6 +85,7 @@ class FleetFigures:
     cars: Keys
     car_passes: Array
     biases: CarBiases
+    shared: float
     windows: int
     withheld: int
 
@@ -103,12 +107,20 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
         passes = sums["passes"].astype(np.float64)
         biases = car_biases(road, car, passes, sums["iri"], sums["years"])
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
+    levels = levels_table(of_roads, biases.growth_per_year)
+    sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
+                                                  _ZERO_US))
+    of_session = np.searchsorted(cars, sessions["car"]), sessions["passes"].astype(np.float64)
+    variance = shared_by_session(*of_session, sessions["residual"], sessions["square"])
+    biases = with_sessions(biases, *of_session, variance)
+    shared = min(variance / biases.pass_std**2, 1.0) if biases.pass_std > 0 else 0.0
     published = of_roads["cars"] >= least_cars
     windows = int(of_roads["windows"].sum())
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
     of_cars = np.asarray(np.bincount(car, passes), dtype=np.float64)
-    return FleetFigures(grouped(segments, by, pieces), cars, of_cars, biases, windows, int((~published).sum()))
+    return FleetFigures(grouped(segments, by, pieces, shared), cars, of_cars, biases, shared, windows,
+                        int((~published).sum()))
 
 
 def gains_table(cars: Keys, biases: CarBiases) -> Any:
@@ -117,6 +129,21 @@ def gains_table(cars: Keys, biases: CarBiases) -> Any:
     import pyarrow
 
     return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
+
+
+def levels_table(sums: Mapping[str, npt.NDArray[Any]], growth: float) -> Any:
+    """What passes over each road are compared with: its mean, and its own growth where there are passes enough, else
+    that of all roads."""
+    import ibis
+    import pyarrow
+
+    passes = sums["passes"].astype(np.float64)
+    mean, middle = sums["iri"] / passes, sums["years"] / passes
+    spread = sums["years_square"] - sums["years"] * middle
+    own = np.divide(sums["iri_years"] - sums["iri"] * middle, spread * mean, out=np.zeros(len(mean)),
+                    where=spread > 1e-9 * passes)
+    used = np.where((passes >= _OWN_GROWTH) & (spread > 1e-9 * passes), own, np.nan_to_num(growth))
+    return ibis.memtable(pyarrow.table({"road": sums["road"], "level": mean, "middle": middle, "growth": used}))
 
 
 def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:
@@ -154,8 +181,9 @@ def group_keys(segments: RoadTable, by: str, pieces: Pieces | None) -> Keys:
     return out
 
 
-def grouped(segments: RoadTable, by: str, pieces: Pieces | None) -> RoadTable:
-    """Segments as they are, or put together: means by length, errors of segments independent of each other."""
+def grouped(segments: RoadTable, by: str, pieces: Pieces | None, shared: float) -> RoadTable:
+    """Segments as they are, or put together: means by length. Of the variance of a segment's error so much is
+    ``shared`` with the others, as if the same sessions had driven all of them; the rest is its own."""
     if by == "segment":
         return segments
     group = group_keys(segments, by, pieces)
@@ -174,7 +202,8 @@ def grouped(segments: RoadTable, by: str, pieces: Pieces | None) -> RoadTable:
     def error_of_mean(name: str) -> Array:
         values = getattr(segments, name)[inside]
         over = total(np.isfinite(values).astype(np.float64))
-        return np.divide(np.sqrt(total(values**2, length_m**2)), over, out=np.full(len(key), np.nan), where=over > 0)
+        of_sum = np.sqrt((1.0 - shared) * total(values**2, length_m**2) + shared * total(values) ** 2)
+        return np.divide(of_sum, over, out=np.full(len(key), np.nan), where=over > 0)
 
     def extreme(name: str, of: Any) -> Keys:
         out = np.full(len(key), segments.last_us.max() if of is np.minimum else 0, dtype=np.int64)

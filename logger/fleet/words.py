@@ -42,6 +42,7 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
     return {
         "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
         "growth_per_year": _known(biases.growth_per_year), "pass_std": _known(biases.pass_std),
+        "session_std": _known(biases.pass_std * figures.shared**0.5),
         "cars": [{"car": shown_car(car), "passes": int(passes), "bias": _known(gain - 1.0 if known else np.nan),
                   "bias_std": _known(gain * std if known else np.nan), "group": int(group)}
                  for car, passes, gain, std, group, known in zip(
@@ -58,7 +59,9 @@ def figures_words(figures: FleetFigures) -> str:
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
     if isfinite(biases.pass_std):
-        lines.append(f"One pass over 66 ft of road is {biases.pass_std:.0%} off (standard deviation)")
+        of_session = biases.pass_std * figures.shared**0.5
+        lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
+                     f"{of_session:.1%} are shared by all passes of a session")
     if isfinite(biases.growth_per_year):
         lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
     return "\n".join([*lines, "", *_cars(figures), "", *_roads(roads), "", *_changes(roads)])
