@@ -11,7 +11,7 @@ import numpy as np
 from logger.fleet.pseudonyms import shown_car
 from logger.fleet.road_cells import SEGMENT_M
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
-from logger.fleet.tiles import DEEPEST, highest_level, projected
+from logger.fleet.tiles import DEEPEST, highest_level, names_of, projected
 from logger.report.document import data_block, document, grid, heading, hint, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.summary import IRI_CLASSES, class_limits_m_per_km
@@ -37,7 +37,7 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     x, y = projected(segments.lat_deg, segments.lon_deg)
     level = highest_level(x, y)
     data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
-            "deepest": DEEPEST, "there": [str(one) for one in range(level, DEEPEST + 1)], "segment_m": SEGMENT_M,
+            "deepest": DEEPEST, "roots": names_of(x, y, level), "segment_m": SEGMENT_M,
             "limits": [class_limits_m_per_km(letter)[0] for letter in list(IRI_CLASSES)[1:]]}
     return document("A fleet's roads", [
         heading("A fleet's roads", under), _tiles(figures, sections), _map(), _rough(sections), _worse(sections),

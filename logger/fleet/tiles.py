@@ -70,8 +70,7 @@ def write_tiles(segments: RoadTable, history: History, folder: Path) -> int:
 
 
 def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    across = 2**level * CELLS
-    column, row = (np.clip(np.floor(one * across), 0, across - 1).astype(np.int64) for one in (x, y))
+    column, row = _tile_of(x, y, level, CELLS)
     place, code = np.unique((column << 32) | row, return_inverse=True)
     length_m = np.bincount(code, segments.length_m)
     mean = np.bincount(code, segments.iri_m_per_km * segments.length_m) / length_m
@@ -79,14 +78,15 @@ def _of_squares(segments: RoadTable, x: Array, y: Array, level: int) -> Iterator
     np.maximum.at(worst, code, segments.iri_m_per_km)
     np.maximum.at(worse, code, segments.worse.astype(np.int64))
     column, row = place >> 32, place & (2**32 - 1)
+    quarter = 1 << (2 * column // CELLS % 2 + 2 * (2 * row // CELLS % 2))
     at = row % CELLS * CELLS + column % CELLS
     for name, rows in _by_tile(column // CELLS, row // CELLS, level):
-        yield name, {"at": at[rows].tolist(), "m": _hundredths(mean[rows]), "w": _hundredths(worst[rows]),
-                     "c": worse[rows].tolist()}
+        yield name, {"n": int(np.bitwise_or.reduce(quarter[rows])), "at": at[rows].tolist(),
+                     "m": _hundredths(mean[rows]), "w": _hundredths(worst[rows]), "c": worse[rows].tolist()}
 
 
 def _of_segments(segments: RoadTable, history: History, x: Array, y: Array) -> Iterator[tuple[str, dict[str, Any]]]:
-    column, row = (np.floor(one * 2**DEEPEST).astype(np.int64) for one in (x, y))
+    column, row = _tile_of(x, y, DEEPEST)
     order = np.lexsort((history.quarter, history.segment))
     steps = np.stack([history.quarter, np.round(history.iri_m_per_km * 100).astype(np.int64), history.passes], axis=1)
     steps = steps[order]
@@ -103,6 +103,18 @@ def _of_segments(segments: RoadTable, history: History, x: Array, y: Array) -> I
             "k": segments.cars[rows].tolist(), "n": segments.passes[rows].astype(int).tolist(),
             "d": (segments.last_us[rows] // DAY_US).tolist(),
             "q": [steps[first[one] : first[one + 1]].tolist() for one in rows.tolist()]}
+
+
+def names_of(x: Array, y: Array, level: int) -> list[str]:
+    """The tiles of a level, by name."""
+    return [name for name, _ in _by_tile(*_tile_of(x, y, level), level)]
+
+
+def _tile_of(x: Array, y: Array, level: int, parts: int = 1) -> tuple[Codes, Codes]:
+    """Column and row of the tile, or of its parts, that places lie in."""
+    across = 2**level * parts
+    column, row = (np.clip(np.floor(one * across), 0, across - 1).astype(np.int64) for one in (x, y))
+    return column, row
 
 
 def _by_tile(column: Codes, row: Codes, level: int) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:

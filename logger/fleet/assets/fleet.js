@@ -12,6 +12,7 @@ let map;
 function fleetTile(name, content) {
   tiles.set(name, content);
   map.repaint();
+  if (map.going) map.look(map.width / 2, map.height / 2);
 }
 
 function element(tag, properties, ...children) {
@@ -45,6 +46,7 @@ class FleetMap extends TrackMap {
     this.y = 0.5 - Math.asinh(Math.tan(lat * Math.PI / 180)) / (2 * Math.PI);
     this.scale = TILE_PX * 2 ** (this.data.deepest + 1);
     this.moved();
+    this.going = true;
     this.look(this.width / 2, this.height / 2);
   }
 
@@ -62,10 +64,7 @@ class FleetMap extends TrackMap {
   }
 
   drawTile(ink, zoom, x, y) {
-    const name = `${zoom}/${x}_${y}`;
-    this.wanted.add(name);
-    const tile = tiles.get(name);
-    if (tile === undefined) this.load(name);
+    const tile = this.tile(zoom, x, y);
     if (!tile) return;
     const side = this.scale / 2 ** zoom, left = this.left(x / 2 ** zoom), top = this.top(y / 2 ** zoom);
     if (tile.at) {
@@ -90,13 +89,25 @@ class FleetMap extends TrackMap {
       });
   }
 
-  load(name) {
-    tiles.set(name, null);
-    if (!this.data.there.includes(name.split("/")[0])) return;
-    const script = element("script", {src: `tiles/${name}.js`});
-    script.onerror = () => script.remove();  // nothing was measured there
-    script.onload = () => script.remove();
-    document.head.append(script);
+  // A tile that is there; false: nothing was measured there; else it is being loaded. Each tile says which of the four
+  // below it there are, so that no file is asked for in vain.
+  tile(zoom, x, y) {
+    const name = `${zoom}/${x}_${y}`;
+    this.wanted.add(name);
+    if (tiles.has(name)) return tiles.get(name);
+    let there = this.data.roots.includes(name);
+    if (zoom > this.data.levels) {
+      const above = this.tile(zoom - 1, x >> 1, y >> 1);
+      if (above === null) return null;
+      there = above && above.n >> (x & 1) + 2 * (y & 1) & 1;
+    }
+    tiles.set(name, there ? null : false);
+    if (there) {
+      const script = element("script", {src: `tiles/${name}.js`});
+      script.onload = () => script.remove();
+      document.head.append(script);
+    }
+    return tiles.get(name);
   }
 
   colour(tile, i) {
@@ -134,6 +145,7 @@ class FleetMap extends TrackMap {
           if (off < best) { best = off; this.chosen = {x: place[0], y: place[1], tile, i}; }
         }
       }
+    this.going &&= !this.chosen;
     this.tell();
     this.drawOver();
   }
