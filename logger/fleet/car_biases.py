@@ -49,8 +49,8 @@ class CarBiases:
     pass_std: float
 
 
-def car_biases(road: Codes, car: Codes, passes: Array, iri: Array, years: Array) -> CarBiases:
-    """The biases of cars from sums (n,) by road and car.
+def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, years: Array) -> CarBiases:
+    """The biases of so many cars from sums (n,) by road and car.
 
     road, car    codes from 0, each pair once
     passes       their number
@@ -58,7 +58,7 @@ def car_biases(road: Codes, car: Codes, passes: Array, iri: Array, years: Array)
     """
     from scipy.sparse import coo_matrix
 
-    cars, roads = int(car.max()) + 1, int(road.max()) + 1
+    roads = int(road.max()) + 1
     mean, time = iri / passes, years / passes
     counts = coo_matrix((passes, (road, car)), shape=(roads, cars)).tocsr()
     by_road, by_car = np.bincount(road, passes, roads), np.bincount(car, passes, cars)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 YEAR_US = 365.25 * 86400e6
 """A Julian year."""
+_PRIME = 1_000_003
 
 
 def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:
@@ -38,9 +39,16 @@ def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Ta
     return passes if until_us is None else passes.filter(passes.utc_us < until_us)
 
 
-def for_biases(by_car: ir.Table) -> ir.Table:
-    """What the biases of cars follow from."""
-    return by_car.select("road", "car", "passes", "iri", "years")
+def cars(by_car: ir.Table) -> ir.Table:
+    """Passes and roads of each car."""
+    return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
+
+
+def for_biases(by_car: ir.Table, one_in: int) -> ir.Table:
+    """What the biases of cars follow from, of one road in so many: by the remainder of the key, first by a prime, as
+    the last bits of a key are a direction."""
+    chosen = by_car if one_in == 1 else by_car.filter((by_car.road % _PRIME) % one_in == 0)
+    return chosen.select("road", "car", "passes", "iri", "years")
 
 
 def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:

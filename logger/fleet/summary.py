@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from logger.fleet.car_biases import CarBiases, car_biases, shared_by_session, with_sessions
 from logger.fleet.engine import Engine
+from logger.fleet.expressions import cars as car_sums
 from logger.fleet.expressions import for_biases, passes_by_car, residuals_by_session, roads
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
 from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
@@ -29,6 +30,9 @@ POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 UNCOMFORTABLE_MPS2 = 0.8
 """ISO 2631-1, C.2.3."""
 SECTION_M = MILE_M / 10
+MOST_PAIRS = 2_000_000
+"""Of roads and cars from which biases are estimated, some 300 MB; of more a part of the roads is taken. What the
+passes of a session share then limits a bias, not the number of roads."""
 _OWN_GROWTH = 10
 """Passes from which a road's own line takes less than a fifth from their variance."""
 _ZERO_US = 1_577_836_800_000_000
@@ -99,13 +103,12 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     """
     by_car = passes_by_car(engine.rows, since_us, until_us, _ZERO_US)
     with engine.kept(by_car) as kept:
-        sums = engine.arrays(for_biases(kept))
-        if not len(sums["road"]):
+        of_cars = engine.arrays(car_sums(kept))
+        order = np.argsort(of_cars["car"])
+        cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
+        if not len(cars):
             return None
-        cars, car = np.unique(sums["car"], return_inverse=True)
-        road = np.unique(sums["road"], return_inverse=True)[1]
-        passes = sums["passes"].astype(np.float64)
-        biases = car_biases(road, car, passes, sums["iri"], sums["years"])
+        biases = _biases(engine.arrays(for_biases(kept, -(-int(of_cars["roads"].sum()) // MOST_PAIRS))), cars)
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
     levels = levels_table(of_roads, biases.growth_per_year)
     sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
@@ -118,9 +121,14 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     windows = int(of_roads["windows"].sum())
     order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
     segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
-    of_cars = np.asarray(np.bincount(car, passes), dtype=np.float64)
-    return FleetFigures(grouped(segments, by, pieces, shared), cars, of_cars, biases, shared, windows,
+    return FleetFigures(grouped(segments, by, pieces, shared), cars, car_passes, biases, shared, windows,
                         int((~published).sum()))
+
+
+def _biases(sums: Mapping[str, npt.NDArray[Any]], cars: Keys) -> CarBiases:
+    road = np.unique(sums["road"], return_inverse=True)[1]
+    return car_biases(road, np.searchsorted(cars, sums["car"]), len(cars), sums["passes"].astype(np.float64),
+                      sums["iri"], sums["years"])
 
 
 def gains_table(cars: Keys, biases: CarBiases) -> Any:
