@@ -51,16 +51,18 @@ class FleetSummary(CommandResult):
 
 
 def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car: str | None = None,
-                 roads: Path | str | None = None, trim_m: float | None = None) -> Ingested:
+                 car_folders: bool = False, roads: Path | str | None = None, trim_m: float | None = None
+                 ) -> Ingested:
     """Add the intact rows of segment logs to a dataset, each once; what is there already is passed over.
 
-    logs      folders at any depth, or files, of segment logs to        the dataset, a folder; it is made where there
-    is none car       the name of the car, which is kept as a pseudonym; None: that of the vehicle in each log's
-    description roads     GeoJSON of roads to lay the windows on, at the first ingest; None: cells of the ground, or
-    the roads of the
-              dataset
-    trim_m    how much of each drive's start and end is left out [m], at the first ingest (None: nothing, or what the
-              dataset has)
+    logs           folders at any depth, or files, of segment logs
+    to             the dataset, a folder; it is made where there is none
+    car            the name of the car, which is kept as a pseudonym; None: that of the vehicle in the logs' description
+    car_folders    a car is called as the folder that its logs lie in
+    roads          GeoJSON of roads to lay the windows on, at the first ingest; None: cells of the ground, or the roads
+                   that the dataset has
+    trim_m         how much of each drive's start and end is left out [m], at the first ingest; None: nothing, or what
+                   the dataset has
 
     Raises BadInput for no log, a log without a car's name, a folder that is no dataset, and other roads or another
     ``trim_m`` than the dataset has; OSError for a disk that refuses.
@@ -78,7 +80,7 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
         TRIM.check("--trim-m", trim_m)
     dataset = Dataset(Path(to))
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    named = [(log, car or _car_of(log)) for log, _ in find_logs_in(places)]
+    named = [(log, log.resolve().parent.name if car_folders else car or _car_of(log)) for log, _ in find_logs_in(places)]
     with dataset.writing():
         key = own_key(dataset.folder)
         if trim_m is not None and not dataset.is_new and trim_m != dataset.manifest.trim_m:

@@ -28,8 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     take.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
                       help="folder of segment logs, exported stick, or log file")
     take.add_argument("--to", metavar="DATASET", type=Path, required=True, help="folder of the dataset; made if needed")
-    take.add_argument("--car", metavar="NAME", help="the car, kept as a pseudonym (default: the vehicle's name in the "
+    whose = take.add_mutually_exclusive_group()
+    whose.add_argument("--car", metavar="NAME", help="the car, kept as a pseudonym (default: the vehicle's name in the "
                                                     "description beside each log; give one where cars share it)")
+    whose.add_argument("--car-folders", action="store_true",
+                       help="each car has a folder of logs, which is called as it is")
     take.add_argument("--roads", metavar="FILE.geojson", type=Path,
                       help="roads to lay the windows on, at the first ingest (default: cells of the ground of 66 ft)")
     add_number(take, "--trim-m", *TRIM, metavar="M",
@@ -69,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
 def _ingest(args: argparse.Namespace) -> int:
     from logger.api.fleet import fleet_ingest
 
-    done = fleet_ingest(args.logs, args.to, car=args.car, roads=args.roads, trim_m=args.trim_m)
+    done = fleet_ingest(args.logs, args.to, car=args.car, car_folders=args.car_folders, roads=args.roads,
+                        trim_m=args.trim_m)
     print(json.dumps(done.as_json()) if args.json else done.text)
     return EXIT_DONE
 

@@ -26,18 +26,18 @@ Codes = npt.NDArray[np.intp]
 _STEPS = 50
 _CLOSE = 1e-9
 _LEAST_INFORMATION = 1e-6
-"""Of the years' variance that cars and roads leave, per pass [years2]: below half a minute nothing is said of
-growth."""
+"""Of the variance of times that cars and roads leave, per pass [years2]: a third of a day squared."""
 
 
 @dataclass(frozen=True, eq=False)
 class CarBiases:
     """Gains of cars (j,).
 
-    gain             what a car reads of a road, over what the mean car of its group reads; 1 where not known log_std
-    standard error of its logarithm; of a car whose gain is not known the spread of the other cars' gains group
-    cars that can be compared share a number; the largest group is 0 known            the gain follows from roads
-    shared with other cars growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not tell
+    gain             what a car reads of a road, over what the mean car of its group reads; 1 where not known
+    log_std          standard error of its logarithm; where the gain is not known, the spread of the other cars' gains
+    group            cars that can be compared share a number; the largest group is 0
+    known            the gain follows from roads shared with other cars
+    growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not tell
     pass_std         relative standard deviation of a pass; NaN: no road has two passes of different cars
     """
 
@@ -49,12 +49,14 @@ class CarBiases:
     pass_std: float
 
 
-def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, years: Array) -> CarBiases:
+def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, years: Array,
+               growth_of: Array | None = None) -> CarBiases:
     """The biases of so many cars from sums (n,) by road and car.
 
     road, car    codes from 0, each pair once
     passes       their number
     iri, years   sums of their IRI [m/km] and of their times [years]
+    growth_of    each road's own, by its code, as a fraction a year; None: one for all, to be estimated
     """
     from scipy.sparse import coo_matrix
 
@@ -72,13 +74,14 @@ def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, ye
     gauge = _gauge(group)
     inverse = np.linalg.inv(information + gauge) - _gauge_inverse(group)
     left = of_time - float(with_time @ inverse @ with_time)
-    is_timed = left > _LEAST_INFORMATION * passes.sum()
+    is_timed = growth_of is None and left > _LEAST_INFORMATION * passes.sum()
+    own = 1.0 if growth_of is None else 1.0 + growth_of[road] * centred
 
     log_gain, growth = np.zeros(cars), 0.0
     level = np.zeros(roads)
     residual = np.zeros(len(mean))
     for _ in range(_STEPS):
-        expected = np.exp(log_gain[car] + growth * centred)
+        expected = np.exp(log_gain[car] + growth * centred) * own
         level = np.bincount(road, passes * mean / expected, roads) / by_road
         residual = mean / (level[road] * expected) - 1.0
         of_cars = np.bincount(car, passes * residual, cars)
@@ -92,7 +95,8 @@ def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, ye
             break
     size = np.bincount(group)[group]
     known = size > 1
-    freedom = len(mean) - roads - int(known.sum()) + len(np.unique(group[known])) - is_timed
+    lines = is_timed if growth_of is None else len(np.unique(growth_of))
+    freedom = len(mean) - roads - int(known.sum()) + len(np.unique(group[known])) - lines
     variance = float((passes * residual**2).sum()) / freedom if freedom > 0 else np.nan
     spread = inverse if not is_timed else inverse + np.outer(inverse @ with_time, inverse @ with_time) / left
     log_std = np.sqrt(np.maximum(np.diag(spread), 0.0) * variance)

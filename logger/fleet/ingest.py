@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from logger.fleet.dataset import ROW_TYPES, Dataset
 from logger.fleet.drive_rows import Filed, Keyed, filed_rows
-from logger.fleet.log_columns import LogColumns, joined_columns, read_columns
+from logger.fleet.log_columns import LogColumns, columns_of, joined_columns, read_bytes
 from logger.store.log.log_name import LogName
 
 BATCH_ROWS = 500_000
@@ -77,11 +77,12 @@ def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed,
     counts, waiting = Counts(), _Waiting()
     past = _Past(dataset)
     for session in sessions:
-        read = [(log, read_columns(log)) for log in session.logs]
-        counts.logs += len(read)
-        if all(past.holds(session, one) for _, one in read):
-            counts.known_logs += len(read)
+        found = [read_bytes(log) for log in session.logs]
+        counts.logs += len(found)
+        if all(past.holds(session, digest) for _, digest in found):
+            counts.known_logs += len(found)
             continue
+        read = [(log, columns_of(*one)) for log, one in zip(session.logs, found, strict=True)]
         _take(session, read, past, waiting, counts, keyed, trim_m)
         if waiting.count >= batch_rows:
             _commit(dataset, waiting, roads, trim_m)
@@ -151,8 +152,8 @@ class _Past:
             self._commits[car, session].add(commit)
         self._now: dict[tuple[int, int], list[npt.NDArray[np.int64]]] = defaultdict(list)
 
-    def holds(self, session: Session, log: LogColumns) -> bool:
-        return (session.car, session.number, log.sha256) in self._logs
+    def holds(self, session: Session, digest: str) -> bool:
+        return (session.car, session.number, digest) in self._logs
 
     def add(self, session: Session, read: Sequence[tuple[Path, LogColumns]],
             rows: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -33,8 +33,10 @@ _LARGEST = {column.name: column.largest for column in COLUMNS}
 class LogColumns:
     """Intact rows (n,) of one log.
 
-    columns          by their names in the file, NaN: not known; ``t_us``, ``utc_us`` (0: not known), ``flags``,
-    ``crc32`` damaged_lines    that were refused sha256           of the whole file
+    columns          by their names in the file, NaN: not known; ``utc_us`` (0: not known), ``t_us``, ``flags``,
+                     ``crc32``
+    damaged_lines    that were refused
+    sha256           of the whole file
     """
 
     columns: Mapping[str, npt.NDArray[Any]]
@@ -42,18 +44,23 @@ class LogColumns:
     sha256: str
 
 
-def read_columns(log: Path) -> LogColumns:
-    """Read a log, damaged or not. BadInput for one that cannot be opened."""
+def read_bytes(log: Path) -> tuple[bytes, str]:
+    """A log as it is, and its SHA-256. BadInput for one that cannot be opened."""
     try:
         with open_regular(log) as file:
             data = file.read()
     except OSError as error:
         raise BadInput(f"{log}: expected a segment log that can be read ({error.strerror})") from None
+    return data, sha256(data).hexdigest()
+
+
+def columns_of(data: bytes, digest: str) -> LogColumns:
+    """The rows of a log, damaged or not."""
     columns = _quick(data)
     damaged = 0
     if columns is None:
         columns, damaged = _row_by_row(data)
-    return LogColumns(columns, damaged, sha256(data).hexdigest())
+    return LogColumns(columns, damaged, digest)
 
 
 def _quick(data: bytes) -> dict[str, npt.NDArray[Any]] | None:

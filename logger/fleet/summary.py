@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ class RoadTable:
     lat_deg, lon_deg          mean place of the passes; ``heading_deg`` their mean direction, NaN where there are many
     length_m                  of road with figures
     cars, passes              of a group of segments the least and the mean number on its segments
+    mean_years                mean time of the passes, from 2020-01-01 on
     iri_m_per_km, ...         as in ``road_figures``
     a_w_mps2, speed_mps       r.m.s. over the passes, and mean
     last_us                   of the last pass [us since 1970]
@@ -62,6 +63,7 @@ class RoadTable:
     length_m: Array
     cars: Keys
     passes: Array
+    mean_years: Array
     iri_m_per_km: Array
     iri_std_m_per_km: Array
     trend_m_per_km_per_year: Array
@@ -108,7 +110,12 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
         cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
         if not len(cars):
             return None
-        biases = _biases(engine.arrays(for_biases(kept, -(-int(of_cars["roads"].sum()) // MOST_PAIRS))), cars)
+        sums = engine.arrays(for_biases(kept, -(-int(of_cars["roads"].sum()) // MOST_PAIRS)))
+        first = _biases(sums, cars, None)
+        # Now that each road's own change shows, no car is charged with it.
+        before = engine.arrays(roads(kept, gains_table(cars, first)))
+        biases = replace(_biases(sums, cars, (before["road"], own_growth(before, first.growth_per_year))),
+                         growth_per_year=first.growth_per_year)
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
     levels = levels_table(of_roads, biases.growth_per_year)
     sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
@@ -125,10 +132,15 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
                         int((~published).sum()))
 
 
-def _biases(sums: Mapping[str, npt.NDArray[Any]], cars: Keys) -> CarBiases:
-    road = np.unique(sums["road"], return_inverse=True)[1]
+def _biases(sums: Mapping[str, npt.NDArray[Any]], cars: Keys, growth: tuple[Keys, Array] | None) -> CarBiases:
+    """The biases of cars; ``growth``: roads and the growth of each."""
+    keys, road = np.unique(sums["road"], return_inverse=True)
+    growth_of = None
+    if growth is not None:
+        order = np.argsort(growth[0])
+        growth_of = growth[1][order][np.searchsorted(growth[0][order], keys)]
     return car_biases(road, np.searchsorted(cars, sums["car"]), len(cars), sums["passes"].astype(np.float64),
-                      sums["iri"], sums["years"])
+                      sums["iri"], sums["years"], growth_of)
 
 
 def gains_table(cars: Keys, biases: CarBiases) -> Any:
@@ -139,19 +151,25 @@ def gains_table(cars: Keys, biases: CarBiases) -> Any:
     return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
 
 
+def own_growth(sums: Mapping[str, npt.NDArray[Any]], otherwise: float) -> Array:
+    """The growth of each road a year, as a fraction: its own where there are passes enough, else that of all roads."""
+    passes = sums["passes"].astype(np.float64)
+    middle = sums["years"] / passes
+    spread = sums["years_square"] - sums["years"] * middle
+    is_own = (passes >= _OWN_GROWTH) & (spread > 1e-9 * passes)
+    own = np.divide((sums["iri_years"] - sums["iri"] * middle) * passes, spread * sums["iri"],
+                    out=np.zeros(len(passes)), where=is_own)
+    return np.where(is_own, own, np.nan_to_num(otherwise))
+
+
 def levels_table(sums: Mapping[str, npt.NDArray[Any]], growth: float) -> Any:
-    """What passes over each road are compared with: its mean, and its own growth where there are passes enough, else
-    that of all roads."""
+    """What passes over each road are compared with: its mean, and its growth."""
     import ibis
     import pyarrow
 
     passes = sums["passes"].astype(np.float64)
-    mean, middle = sums["iri"] / passes, sums["years"] / passes
-    spread = sums["years_square"] - sums["years"] * middle
-    own = np.divide(sums["iri_years"] - sums["iri"] * middle, spread * mean, out=np.zeros(len(mean)),
-                    where=spread > 1e-9 * passes)
-    used = np.where((passes >= _OWN_GROWTH) & (spread > 1e-9 * passes), own, np.nan_to_num(growth))
-    return ibis.memtable(pyarrow.table({"road": sums["road"], "level": mean, "middle": middle, "growth": used}))
+    return ibis.memtable(pyarrow.table({"road": sums["road"], "level": sums["iri"] / passes,
+                                        "middle": sums["years"] / passes, "growth": own_growth(sums, growth)}))
 
 
 def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:
@@ -166,7 +184,7 @@ def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pie
                             where=sums["felt"] > 0).astype(np.float64))
     heading_deg = np.degrees(np.arctan2(sums["east"], sums["north"])) % 360.0
     return _table("segment", sums["road"], sums["lat"] / passes, sums["lon"] / passes, heading_deg, length_m,
-                  sums["cars"], passes, figures, a_w, sums["speed"] / passes, sums["last_us"])
+                  sums["cars"], passes, sums["years"] / passes, figures, a_w, sums["speed"] / passes, sums["last_us"])
 
 
 def piece_of(key: Keys) -> npt.NDArray[np.intp]:
@@ -225,8 +243,8 @@ def grouped(segments: RoadTable, by: str, pieces: Pieces | None, shared: float) 
     east = mean("heading_deg", lambda one: np.sin(np.radians(one)))
     heading_deg = np.where(np.hypot(north, east) > 0.5, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
     return _table(by, key, mean("lat_deg"), mean("lon_deg"), heading_deg, total(np.ones(len(code))),
-                  extreme("cars", np.minimum), mean("passes"), figures, np.sqrt(mean("a_w_mps2", np.square)),
-                  mean("speed_mps"), extreme("last_us", np.maximum))
+                  extreme("cars", np.minimum), mean("passes"), mean("mean_years"), figures,
+                  np.sqrt(mean("a_w_mps2", np.square)), mean("speed_mps"), extreme("last_us", np.maximum))
 
 
 def _normal_p(trend: Array, trend_std: Array) -> Array:
@@ -236,13 +254,14 @@ def _normal_p(trend: Array, trend_std: Array) -> Array:
 
 
 def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Array, length_m: Array, cars: Keys,
-           passes: Array, figures: RoadFigures, a_w_mps2: Array, speed_mps: Array, last_us: Keys) -> RoadTable:
+           passes: Array, mean_years: Array, figures: RoadFigures, a_w_mps2: Array, speed_mps: Array, last_us: Keys
+           ) -> RoadTable:
     worse = significant(figures.p_value, FALSE_SHARE) & (figures.trend_m_per_km_per_year > 0)
     rough = figures.iri_m_per_km - _CERTAIN * figures.iri_std_m_per_km > POOR_M_PER_KM
     hard = a_w_mps2 >= UNCOMFORTABLE_MPS2
     words = np.array(["|".join(word for word, holds in zip(("rough", "worse", "uncomfortable"), three, strict=True)
                                if holds) for three in zip(rough, worse, hard, strict=True)], dtype=np.str_)
     return RoadTable(by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64), passes,
-                     figures.iri_m_per_km, figures.iri_std_m_per_km, figures.trend_m_per_km_per_year,
+                     mean_years, figures.iri_m_per_km, figures.iri_std_m_per_km, figures.trend_m_per_km_per_year,
                      figures.trend_std_m_per_km_per_year, figures.p_value, a_w_mps2, speed_mps,
                      last_us.astype(np.int64), worse, words)
