@@ -43,6 +43,12 @@ class FleetSummary(CommandResult):
 
     found: FleetFigures
 
+    def as_json(self) -> dict[str, Any]:
+        """The object that the command prints with ``--json``; made now, as it may be long."""
+        from logger.fleet.words import figures_json
+
+        return figures_json(self.found)
+
     def layer(self) -> Layer:
         """Roads with their places, for the formats of ``convert``."""
         from logger.fleet.layer import roads_layer
@@ -80,7 +86,8 @@ def fleet_ingest(logs: Path | str | Sequence[Path | str], to: Path | str, *, car
         TRIM.check("--trim-m", trim_m)
     dataset = Dataset(Path(to))
     places = [Path(logs)] if isinstance(logs, str | Path) else [Path(one) for one in logs]
-    named = [(log, log.resolve().parent.name if car_folders else car or _car_of(log)) for log, _ in find_logs_in(places)]
+    named = [(log, log.resolve().parent.name if car_folders else car or _car_of(log))
+             for log, _ in find_logs_in(places)]
     with dataset.writing():
         key = own_key(dataset.folder)
         if trim_m is not None and not dataset.is_new and trim_m != dataset.manifest.trim_m:
@@ -109,10 +116,10 @@ def fleet_summarise(dataset: Path | str, *, by: str = "segment", since: str | No
     >>> bool((summary.found.roads.iri_m_per_km > 0).all())
     True
     """
-    from logger.fleet.words import figures_json, figures_words
+    from logger.fleet.words import figures_words
 
     with _summarised(Path(dataset), by, since, until, engine, min_cars) as (figures, _, _):
-        return FleetSummary(figures_words(figures), figures_json(figures), figures)
+        return FleetSummary(figures_words(figures), {}, figures)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

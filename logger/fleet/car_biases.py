@@ -95,8 +95,7 @@ def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, ye
             break
     size = np.bincount(group)[group]
     known = size > 1
-    lines = is_timed if growth_of is None else len(np.unique(growth_of))
-    freedom = len(mean) - roads - int(known.sum()) + len(np.unique(group[known])) - lines
+    freedom = len(mean) - roads - int(known.sum()) + len(np.unique(group[known])) - is_timed
     variance = float((passes * residual**2).sum()) / freedom if freedom > 0 else np.nan
     spread = inverse if not is_timed else inverse + np.outer(inverse @ with_time, inverse @ with_time) / left
     log_std = np.sqrt(np.maximum(np.diag(spread), 0.0) * variance)
@@ -121,13 +120,14 @@ def shared_by_session(car: Codes, passes: Array, residual: Array, square: Array)
 
 
 def with_sessions(biases: CarBiases, car: Codes, passes: Array, variance: float) -> CarBiases:
-    """Biases whose errors hold what passes of a session share. ``car``, ``passes``: of each session (n,)."""
-    cars = len(biases.gain)
-    of_car = np.bincount(car, passes, cars)
-    own = variance * np.bincount(car, passes**2, cars) / np.maximum(of_car, 1.0) ** 2
-    alone = max(1.0 - variance / biases.pass_std**2, 0.0) if biases.pass_std > 0 else 1.0
-    log_std = np.where(biases.known, np.sqrt(alone * biases.log_std**2 + own), biases.log_std)
-    return replace(biases, log_std=log_std)
+    """Biases whose errors hold what passes of a session share, by the design effect 1 + (k - 1) rho of clusters of size k
+    (L. Kish, Survey Sampling, 1965, section 5.4). ``car``, ``passes``: of each session (n,)."""
+    if not biases.pass_std > 0:
+        return biases
+    cars, rho = len(biases.gain), min(variance / biases.pass_std**2, 1.0)
+    size = np.bincount(car, passes**2, cars) / np.maximum(np.bincount(car, passes, cars), 1.0)
+    effect = np.where(biases.known, 1.0 + np.maximum(size - 1.0, 0.0) * rho, 1.0)
+    return replace(biases, log_std=biases.log_std * np.sqrt(effect))
 
 
 def _groups(information: Array) -> Codes:

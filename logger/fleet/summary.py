@@ -33,8 +33,6 @@ SECTION_M = MILE_M / 10
 MOST_PAIRS = 2_000_000
 """Of roads and cars from which biases are estimated, some 300 MB; of more a part of the roads is taken. What the
 passes of a session share then limits a bias, not the number of roads."""
-_OWN_GROWTH = 10
-"""Passes from which a road's own line takes less than a fifth from their variance."""
 _ZERO_US = 1_577_836_800_000_000
 """2020-01-01: years count from here, so that their squares keep their digits."""
 
@@ -114,10 +112,10 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
         first = _biases(sums, cars, None)
         # Now that each road's own change shows, no car is charged with it.
         before = engine.arrays(roads(kept, gains_table(cars, first)))
-        biases = replace(_biases(sums, cars, (before["road"], own_growth(before, first.growth_per_year))),
+        biases = replace(_biases(sums, cars, (before["road"], own_growth(before, first))),
                          growth_per_year=first.growth_per_year)
         of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
-    levels = levels_table(of_roads, biases.growth_per_year)
+    levels = levels_table(of_roads, biases)
     sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
                                                   _ZERO_US))
     of_session = np.searchsorted(cars, sessions["car"]), sessions["passes"].astype(np.float64)
@@ -151,25 +149,31 @@ def gains_table(cars: Keys, biases: CarBiases) -> Any:
     return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
 
 
-def own_growth(sums: Mapping[str, npt.NDArray[Any]], otherwise: float) -> Array:
-    """The growth of each road a year, as a fraction: its own where there are passes enough, else that of all roads."""
+def own_growth(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Array:
+    """The growth of each road a year, as a fraction: what its passes say, drawn towards that of all roads by as much as
+    roads agree (empirical Bayes; the variance between roads by its moments)."""
     passes = sums["passes"].astype(np.float64)
     middle = sums["years"] / passes
-    spread = sums["years_square"] - sums["years"] * middle
-    is_own = (passes >= _OWN_GROWTH) & (spread > 1e-9 * passes)
+    spread = np.maximum(sums["years_square"] - sums["years"] * middle, 0.0)
+    common = float(np.nan_to_num(biases.growth_per_year))
+    tells = spread > 1e-6 * passes
+    if not tells.any() or not np.isfinite(biases.pass_std):
+        return np.full(len(passes), common)
     own = np.divide((sums["iri_years"] - sums["iri"] * middle) * passes, spread * sums["iri"],
-                    out=np.zeros(len(passes)), where=is_own)
-    return np.where(is_own, own, np.nan_to_num(otherwise))
+                    out=np.full(len(passes), common), where=tells)
+    noise = biases.pass_std**2
+    between = max(float((spread * (own - common) ** 2).sum()) - noise * int(tells.sum()), 0.0) / float(spread.sum())
+    return common + (own - common) * between * spread / (between * spread + noise)
 
 
-def levels_table(sums: Mapping[str, npt.NDArray[Any]], growth: float) -> Any:
+def levels_table(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Any:
     """What passes over each road are compared with: its mean, and its growth."""
     import ibis
     import pyarrow
 
     passes = sums["passes"].astype(np.float64)
     return ibis.memtable(pyarrow.table({"road": sums["road"], "level": sums["iri"] / passes,
-                                        "middle": sums["years"] / passes, "growth": own_growth(sums, growth)}))
+                                        "middle": sums["years"] / passes, "growth": own_growth(sums, biases)}))
 
 
 def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:

