@@ -120,8 +120,8 @@ def shared_by_session(car: Codes, passes: Array, residual: Array, square: Array)
 
 
 def with_sessions(biases: CarBiases, car: Codes, passes: Array, variance: float) -> CarBiases:
-    """Biases whose errors hold what passes of a session share, by the design effect 1 + (k - 1) rho of clusters of size k
-    (L. Kish, Survey Sampling, 1965, section 5.4). ``car``, ``passes``: of each session (n,)."""
+    """Biases whose errors hold what passes of a session share, by the design effect 1 + (k - 1) rho of clusters of size
+    k (L. Kish, Survey Sampling, 1965, section 5.4). ``car``, ``passes``: of each session (n,)."""
     if not biases.pass_std > 0:
         return biases
     cars, rho = len(biases.gain), min(variance / biases.pass_std**2, 1.0)
