@@ -81,10 +81,17 @@ def _spark(master: str) -> Iterator[Any]:
         from pyspark.sql import SparkSession
     except ImportError as error:
         raise BadInput(f"--engine spark: expected PySpark: pip install 'ibis-framework[pyspark]' ({error})") from None
-    session = (SparkSession.builder.master(master).appName("ridelog fleet")
-               .config("spark.ui.enabled", "false").config("spark.sql.session.timeZone", "UTC")
-               .config("spark.sql.execution.arrow.pyspark.enabled", "true").getOrCreate())
-    session.sparkContext.setLogLevel("ERROR")
+    from py4j.protocol import Py4JError
+    from pyspark.errors import PySparkException
+
+    try:
+        session = (SparkSession.builder.master(master).appName("ridelog fleet")
+                   .config("spark.ui.enabled", "false").config("spark.sql.session.timeZone", "UTC")
+                   .config("spark.sql.execution.arrow.pyspark.enabled", "true").getOrCreate())
+        session.sparkContext.setLogLevel("ERROR")
+    except (Py4JError, PySparkException) as error:
+        said = str(error).strip().splitlines() or ["no reason was given"]
+        raise BadInput(f"--engine: expected a master of Spark that answers at {master!r} ({said[-1][:120]})") from None
     try:
         yield session
     finally:

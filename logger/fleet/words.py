@@ -54,7 +54,7 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
 def figures_words(figures: FleetFigures) -> str:
     """A summary in lines: what it rests on, cars that read too high or too low, the roughest roads, and the changes."""
     roads, biases = figures.roads, figures.biases
-    lines = [f"{figures.windows:,} windows of {len(figures.cars):,} cars; {len(roads.key):,} {roads.by}s, "
+    lines = [f"{_count(figures.windows, 'window')} of {_count(len(figures.cars), 'car')}; {_count(len(roads.key), roads.by)}, "
              f"{roads.length_m.sum() / 1000:,.1f} km"]
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
@@ -101,12 +101,16 @@ def _changes(roads: RoadTable) -> list[str]:
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
     if not order:
         return [f"No {roads.by} has become worse, as far as these drives tell"]
-    lines = [f"Became worse: {len(worse):,} {roads.by}s (at most {FALSE_SHARE:.0%} of them falsely)",
+    lines = [f"Became worse: {_count(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [
         f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
         f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
         f"{roads.p_value[one]:.1g}" for one in order]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'s' * (number != 1)}"
 
 
 def _known(value: float) -> float | None:
