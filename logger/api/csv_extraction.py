@@ -198,13 +198,13 @@ def _accelerations(tables: _Tables, asked: Asked, notes: list[str]) -> tuple[Arr
     unit = _one_unit(table, roles)
     apart = tables.gravity or (table if "gx" in table.columns else None)
     if apart is not None and (unit is None or felt(time_s, samples).unit_mps2 is None):
-        told_s, told = _ordered(apart, seconds(apart, table), GRAVITY, [])
-        told_unit = _one_unit(apart, GRAVITY) or unit
-        if unit is None or told_unit is None:
+        gravity_s, gravity = _ordered(apart, seconds(apart, table), GRAVITY, [])
+        gravity_unit = _one_unit(apart, GRAVITY) or unit
+        if unit is None or gravity_unit is None:
             raise BadInput(f"{table.header.path}: expected to know the unit of accelerations and gravity, which are to "
                            "be added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
-        gravity = np.stack([np.interp(time_s, told_s, axis) for axis in told.T], axis=1)
-        samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[told_unit] * gravity
+        gravity = np.stack([np.interp(time_s, gravity_s, axis) for axis in gravity.T], axis=1)
+        samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[gravity_unit] * gravity
         unit = "m/s2"
     return time_s, *_in_si(table, time_s, samples, unit, roles, asked, notes)
 

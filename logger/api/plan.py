@@ -31,7 +31,7 @@ class NextDrive:
     """A drive that may come next.
 
     do            in words
-    gains         deviations by which effects would be told better from what is most like them
+    gains         deviations by which effects would be separated better from what is most like them
     more_named    how many more effects ``diagnose`` would name, were each of them there by itself
     """
 
@@ -47,7 +47,7 @@ class Plan(CommandResult):
 
     detectability    by how much each effect stands out, by name
     isolability      what of the first effect remains when the second one is fitted in its place, by both names
-    groups           effects that would be seen and not told from each other
+    groups           effects that would be detected, but not separated from each other
     next             drives that may come next, those that add most first
     noise_mps2       of the accelerometer, rounding in it [m/s2]
     """

@@ -153,8 +153,8 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
     from logger.units import WINDOW_M
 
     tell(_headed(title, why, commands.estimate(folder, vehicle)))
-    with progress() as told:
-        told("estimating the road")
+    with progress() as say:
+        say("estimating the road")
         drive = _run(folder)
         found = assessed(drive, read_model(vehicle_path(vehicle)), Sensor(NOISE_MPS2, step_of(drive, None)), WINDOW_M,
                          learns_noise=True)

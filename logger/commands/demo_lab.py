@@ -90,7 +90,7 @@ def truth_beside(story: Story, effect: str, values: Mapping[str, float], off: Ma
     rows = [("Number", "True", "Without", "With")]
     rows += [(one.name, f"{off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
-    told = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
+    numbers = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
     mine = numbers_of(story.rounds[-1].addition.new[-1]) if effect in found else "nothing of the kind"
-    return (f"The drives were simulated. The car had {effect}, {told}; found: {mine}. Its numbers differed from its "
+    return (f"The drives were simulated. The car had {effect}, {numbers}; found: {mine}. Its numbers differed from its "
             "file, in per cent:", columns(rows))

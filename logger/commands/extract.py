@@ -143,7 +143,7 @@ def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
 
 def lines(source: Path, found: Extracted) -> list[str]:
     """What a person is told of a recording."""
-    told = [f"{source}: {note}" for note in found.notes]
+    printed = [f"{source}: {note}" for note in found.notes]
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
@@ -153,9 +153,9 @@ def lines(source: Path, found: Extracted) -> list[str]:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         if one.delay_s or one.delay_std_s:
             words += f"; taken out: a receiver's delay of {one.delay_s:.2f} +- {one.delay_std_s:.2f} s"
-        told.append(words)
+        printed.append(words)
     if found.left_out_s >= 1:
-        told.append(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
+        printed.append(f"{source}: {found.left_out_s:.0f} s of driving left out, off the profile or too short")
     if found.torn_tail:
-        told.append(f"{source}: the recording was cut short; everything before the cut was used")
-    return told
+        printed.append(f"{source}: the recording was cut short; everything before the cut was used")
+    return printed

@@ -185,7 +185,7 @@ def _drive(path: Path, flat_will_do: bool) -> tuple[Drive, Track | Excitation | 
     return run, run.track
 
 
-# --- what is told ---
+# --- what is printed ---
 
 
 def _refusal_json(refusal: NotIdentifiable) -> dict[str, Any]:

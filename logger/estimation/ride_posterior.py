@@ -102,14 +102,14 @@ class RidePosterior:
         per_cpm = self._car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
         ride = np.interp(self._f_hz / speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / speed_mps
         noise = 2 * variance / self._rate_hz
-        told = ride / (ride + noise)
+        wiener_gain = ride / (ride + noise)
         step_hz = self._rate_hz / _LINES
-        left = np.fft.irfft(self._power * told * noise)[:self._lags] * self._rate_hz / 2
+        left = np.fft.irfft(self._power * wiener_gain * noise)[:self._lags] * self._rate_hz / 2
         return RideKnowledge(
             variance=float(self._power @ ride) * step_hz,
             left=float(left[0]),
             correlation=left / left[0],
-            noise_share=float((self._power * told**2).mean()),
+            noise_share=float((self._power * wiener_gain**2).mean()),
             accel_variance=float(ride.sum()) * step_hz,
         )
 

@@ -4,9 +4,9 @@ Problem. Neighbouring pieces come from different solutions and may stand at diff
 reading tells; joined end to start, their heights would be steps. And an estimate holds waves that are mostly belief.
 
 Solution. Pieces are joined by their increments, which the slow waves hardly touch. Then waves longer than the longest
-and shorter than the shortest wavelength told are taken out. That range changes with the speed; one range is taken for
-the whole drive, the one told over at least ``TOLD_OVER`` of the distance at either end. Where a piece is missing one
-part of the profile ends and another begins.
+and shorter than the shortest resolved wavelength are taken out. That range changes with the speed; one range is taken
+for the whole drive, the one resolved over at least ``RESOLVED_SHARE`` of the distance at either end. Where a piece is
+missing one part of the profile ends and another begins.
 
 A piece says what the sensor's noise leaves of each wavelength, but two more things bound the longest: a wave that
 passes more slowly than ``SLOWEST_HZ`` is taken for drift of the sensor (``road_solver``), and beyond ``LONGEST_M`` the
@@ -27,7 +27,7 @@ from logger.estimation.streaming import RoadPiece
 
 Array = npt.NDArray[np.float64]
 
-TOLD_OVER = 0.75
+RESOLVED_SHARE = 0.75
 SLOWEST_HZ = 0.125
 LONGEST_M = 1 / FLATTENED_BELOW_CPM
 _ORDER = 8
@@ -69,12 +69,13 @@ def road_profile(pieces: Sequence[RoadPiece], speed_mps: Array) -> RoadProfile |
     speed_mps    (p,) mean speed over each piece [m/s]
     """
     resolved = np.array([isfinite(piece.shortest_m) for piece in pieces], dtype=np.bool_)
-    if not resolved.any() or np.mean(resolved) < TOLD_OVER:
+    if not resolved.any() or np.mean(resolved) < RESOLVED_SHARE:
         return None
     shortest = np.array([piece.shortest_m for piece in pieces])[resolved]
     longest = np.array([piece.longest_m for piece in pieces])[resolved]
     longest = np.minimum(longest, np.minimum(speed_mps[resolved] / SLOWEST_HZ, LONGEST_M))
-    shortest_m, longest_m = float(np.quantile(shortest, TOLD_OVER)), float(np.quantile(longest, 1 - TOLD_OVER))
+    shortest_m = float(np.quantile(shortest, RESOLVED_SHARE))
+    longest_m = float(np.quantile(longest, 1 - RESOLVED_SHARE))
     if shortest_m >= longest_m:
         return None
     joined = [_joined(run) for run in _runs([piece for piece in pieces if isfinite(piece.shortest_m)])]

@@ -69,7 +69,7 @@ class DriveModel:
         """Accelerations (n,) per record without its beginning, with these values (p,) [m/s2]."""
         raise NotImplementedError
 
-    def told(self, run: int, prediction: Array) -> Array:
+    def observed(self, run: int, prediction: Array) -> Array:
         """A prediction (n,) of a record, counted from 0, as far as its readings tell: as it was measured where nothing
         was read, and where a clipped reading is reached."""
         record = self.records[run]
@@ -78,12 +78,12 @@ class DriveModel:
         whole = np.concatenate([np.zeros(record.first), prediction])
         return record.kept_mps2 - record.left_by(whole)[record.first:]
 
-    def told_slopes(self, run: int, prediction: Array, slopes: Array) -> Array:
+    def observed_slopes(self, run: int, prediction: Array, slopes: Array) -> Array:
         """Slopes (n, p) of that: none where it does not change with the prediction (n,)."""
         usable = self.records[run].usable
         if usable is None:
             return slopes
-        fixed = (usable[self.records[run].first:] != READING) & (self.told(run, prediction) == self.measured[run])
+        fixed = (usable[self.records[run].first:] != READING) & (self.observed(run, prediction) == self.measured[run])
         return np.where(fixed[:, None], 0.0, slopes)
 
     def vehicle_with(self, values: Array) -> Vehicle:

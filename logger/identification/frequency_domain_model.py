@@ -33,7 +33,7 @@ class VehicleModel(DriveModel):
     def predict(self, values: Array) -> list[Array]:
         """As ``Predictor``: accelerations without the beginnings of the records [m/s2]."""
         car = sensed_car(self.vehicle_with(values))
-        return [self.told(run, road.samples(_response(
+        return [self.observed(run, road.samples(_response(
                     car, road.s, road.under_wheels(car.structure, self.road_with(values, run)))))
                 for run, road in enumerate(self._roads)]
 
@@ -59,8 +59,8 @@ class VehicleModel(DriveModel):
             for index, name in self._inputs_of(run):
                 derivatives[index] = _through(car, w, road.by_input(car.structure, at, name))
             prediction = road.samples(road.s**2 * (q @ car.row))
-            predictions.append(self.told(run, prediction))
-            slopes.append(self.told_slopes(run, prediction, road.samples(derivatives).T))
+            predictions.append(self.observed(run, prediction))
+            slopes.append(self.observed_slopes(run, prediction, road.samples(derivatives).T))
         return predictions, slopes
 
     def _inputs_of(self, run: int) -> list[tuple[int, str]]:

@@ -104,16 +104,16 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         if power <= 1 or not weak.any():
             break
         shares = _shares(names, direction * limits, direction * limits * traces)
-        told = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
+        errors = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
         if len(shares) == 1:
-            (name, error), = told.items()
+            (name, error), = errors.items()
             words = (f"this drive says nothing about {name}: its standard error would be {error} of it. Hold it fixed, "
                      "or add runs that feel it.")
         else:
             why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
                 f"{_moves(shares)} drowns in the noise")
             words = (f"this drive does not tell {_listed(list(shares))} apart: {why} (standard errors "
-                     f"{', '.join(told.values())}). Hold one of them fixed, or add runs that differ.")
+                     f"{', '.join(errors.values())}). Hold one of them fixed, or add runs that differ.")
         findings.append(Finding(WEAK, shares, words))
         weak &= ~np.isin(names, list(shares))
     return findings

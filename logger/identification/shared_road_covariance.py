@@ -81,9 +81,9 @@ def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
     np.fill_diagonal(wider, variances)
     errors = np.sqrt(variances)
     growth = float((errors / np.sqrt(np.diag(fit.covariance))).max())
-    told = replace(fit, covariance=wider, correlation=wider / np.outer(errors, errors),
-                   standard_errors=dict(zip(fit.parameters, errors.tolist(), strict=True)))
-    return CommonRoughness(told, share, growth)
+    widened = replace(fit, covariance=wider, correlation=wider / np.outer(errors, errors),
+                      standard_errors=dict(zip(fit.parameters, errors.tolist(), strict=True)))
+    return CommonRoughness(widened, share, growth)
 
 
 @dataclass(frozen=True, eq=False)

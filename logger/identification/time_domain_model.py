@@ -53,7 +53,7 @@ class SimulatedModel(DriveModel):
                      for record, road in zip(self.records, roads, strict=True)]
         tracks = [self._track(run, road) for run, road in enumerate(roads)]
         predictions = self._runs.predict(self.car_with(values), farther_m, tracks=tracks)
-        return [self.told(run, one[self.records[run].first:]) for run, one in enumerate(predictions)]
+        return [self.observed(run, one[self.records[run].first:]) for run, one in enumerate(predictions)]
 
     def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
         """As ``DifferentiablePredictor``: differences, to both sides of a number unless it is at a bound."""

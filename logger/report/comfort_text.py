@@ -102,24 +102,24 @@ def _zone(zone: CautionZone, value: float, unit: str) -> dict[str, Any]:
 
 def lines(result: RideComfort, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
-    told = [f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
+    printed = [f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
              f"weighting {result.weighting.name.capitalize()}", ""]
     heads = ("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4")
-    told.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
+    printed.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
     for axis in sorted(result.axes):
         figures = result.axes[axis]
         values = (figures.a_w_mps2, figures.mtvv_mps2, figures.vdv_mps175, figures.crest_factor, figures.mtvv_ratio,
                   figures.vdv_ratio)
-        told.append(f"{axis:5}" + "".join(f"{value:13.3f}" for value in values))
+        printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" for value in values))
     exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
-    told += [f"MTVV with exponential averaging: {exponential} m/s2", "", *_conclusions(result), "",
+    printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *_conclusions(result), "",
               f"Method: {METHOD}; the mean is taken off."]
     if result.unseen_from_hz is not None:
-        told.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
+        printed.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
                      f"up to {result.weighting.counts_up_to_hz:g} Hz: the values are of what was recorded.")
     if result.left_out:
-        told.append("Other axes are combined only with Wk, x and y together; left out.")
-    return told
+        printed.append("Other axes are combined only with Wk, x and y together; left out.")
+    return printed
 
 
 def _conclusions(result: RideComfort) -> list[str]:

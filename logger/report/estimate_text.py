@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from logger.estimation.assessment import MIX_IRI, SPEED_CLASS_MPS, Assessment, figures, speed_classes
-from logger.estimation.road_profile import TOLD_OVER
+from logger.estimation.road_profile import RESOLVED_SHARE
 
 _FAR_ABOVE = 1.5
 _MOVING_MPS = 1.0
@@ -96,7 +96,7 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
         f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
         f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s.",
-        "Wavelengths told: " + _range_words(found),
+        "Wavelengths resolved: " + _range_words(found),
     ]
     if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
         shown.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
@@ -141,10 +141,10 @@ def _unanswered(summary: dict[str, Any]) -> str:
 def _range_words(found: Assessment) -> str:
     road = found.road
     if road is None:
-        return f"none over {TOLD_OVER:.0%} of the way."
+        return f"none over {RESOLVED_SHARE:.0%} of the way."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {TOLD_OVER:.0%} of the way); that is what "
-            f"a profile holds{left_out}.")
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); that is "
+            f"what a profile holds{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[str]:

@@ -20,9 +20,9 @@ def figures_of(found: Assessment) -> dict[str, Any]:
 
 def rows(before: Assessment, after: Assessment) -> list[tuple[str, ...]]:
     """The table of ``HEADS``: by the file as it was given, by the last one, and the truth."""
-    told = [_row("by the file as it was", figures_of(before)), _row("by the last file", figures_of(after))]
+    estimated = [_row("by the file as it was", figures_of(before)), _row("by the last file", figures_of(after))]
     known = after.exact_m_per_km[np.isfinite(after.exact_m_per_km)]
-    return [*told, ("as it was measured", f"{known.mean():.2f}", "", "", "", "")]
+    return [*estimated, ("as it was measured", f"{known.mean():.2f}", "", "", "", "")]
 
 
 def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:

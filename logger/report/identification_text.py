@@ -179,7 +179,8 @@ def _limits(fit: Fit, sound: bool) -> Iterator[str]:
     vague = {name: error / abs(fit.parameters[name]) for name, error in fit.standard_errors.items()
              if name in sizes and error > _DOUBTFUL * abs(fit.parameters[name])}
     if vague:
-        yield "Hardly told by these runs: " + ", ".join(f"{name} ({share:.0%})" for name, share in vague.items()) + "."
+        listed = ", ".join(f"{name} ({share:.0%})" for name, share in vague.items())
+        yield f"Poorly determined by these runs: {listed}."
     elif sound:
         yield "These runs tell all that was asked."
     if len(fit.parameters) > 1:

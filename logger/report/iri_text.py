@@ -28,10 +28,10 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     whole = result.row(0)
     roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
-    told = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
     if profile.widest_step_m is not None:
-        told.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
-    told += [
+        printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
+    printed += [
         "", ", ".join(f"{_HEADS[key]} {value:.3f}" for key, value in whole.items()) + " m/km",
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
         f"Ride: {ride_words(roughness)}", "",
@@ -40,5 +40,5 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     for number, window in enumerate(result.windows, start=1):
         start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))
         values = "".join(f" {value:10.3f}" for value in result.row(number).values())
-        told.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
-    return told
+        printed.append(f"{start_m:10.2f} {end_m:10.2f}{values}" + ("   partial" if window.partial else ""))
+    return printed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.lab.planning.outlook import TOLD_SIGMA
+from logger.lab.planning.outlook import ISOLABLE_SIGMA
 from logger.lab.planning.plan import Plan
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
@@ -22,8 +22,8 @@ def page(found: Plan, vehicle: str) -> Html:
     return document(title, [
         heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
         tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
-               ("Too faint", f"{int((found.now.alone < DETECTABLE_SIGMA).sum())}", ""),
-               ("Groups not told apart", f"{len(found.groups)}", ""),
+               ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
+               ("Groups that cannot be separated", f"{len(found.groups)}", ""),
                ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2")]),
         paragraphs(summary(found)),
         section("What remains of one effect beside another", figure(found) + hint(meaning())),
@@ -38,17 +38,17 @@ def page(found: Plan, vehicle: str) -> Html:
 def figure(found: Plan) -> Html:
     """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
     when that one is fitted in its place. Those that stand out most first."""
-    order = np.argsort(-found.now.alone, kind="stable")
+    order = np.argsort(-found.now.detectability, kind="stable")
     return heat_map("Standard deviations that remain of the effect of a row when that of a column is fitted in its "
                     "place; framed: by how much it stands out",
-                    [found.names[one] for one in order], found.now.beside[np.ix_(order, order)], TOLD_SIGMA, _FULL)
+                    [found.names[one] for one in order], found.now.beside[np.ix_(order, order)], ISOLABLE_SIGMA, _FULL)
 
 
 def _next(found: Plan) -> Html:
     """Nothing where there is none."""
     if not found.next:
         return EMPTY
-    drawn = grid(("Drive", "Effects more", "Told apart better, in standard deviations"), [
+    drawn = grid(("Drive", "Effects more", "Better separated, in standard deviations"), [
         (do_words(one.option), f"{one.more_named:.1f}",
          ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
         words=(0, 2))

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from logger.lab.planning.next_drives import Option
-from logger.lab.planning.outlook import TOLD_SIGMA
+from logger.lab.planning.outlook import ISOLABLE_SIGMA
 from logger.lab.planning.plan import NextDrive, Plan
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.report.text_layout import columns, paragraphs
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
-HEADS = ("Effect", "Stands out by", "Told apart by", "Most like", "")
+HEADS = ("Effect", "Stands out by", "Separated by", "Most like", "")
 GAIN_HINT = "Effects more: how many more could be named, by what is expected."
 SENSOR_HINT = ("A second accelerometer is taken to be as noisy as the first one, a travel sensor to 0.5 mm, a "
                "gyroscope to 0.001 rad/s.")
@@ -32,8 +32,8 @@ def summary(found: Plan) -> list[str]:
              f"{from_where}. Of {len(found.names)} effects at their usual strength, each by itself, "
              f"ridelog diagnose would name {named}."]
     if found.groups:
-        lines.append("Seen, but not told from each other: " + "; ".join(", ".join(one) for one in found.groups) + ".")
-    hidden = [name for name, each in zip(found.names, found.now.alone, strict=True) if each < DETECTABLE_SIGMA]
+        lines.append("Detected, but not separable: " + "; ".join(", ".join(one) for one in found.groups) + ".")
+    hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
         lines.append(f"Too faint to be seen in these drives: {', '.join(hidden)}.")
     lines += [f"{name} is left out: {why}." for name, why in found.obstacles.items()]
@@ -41,21 +41,21 @@ def summary(found: Plan) -> list[str]:
 
 
 def rows(found: Plan) -> list[tuple[str, str, str, str, str]]:
-    """Each effect, those that stand out most first: by how much, by how much it is told from what, and what that
+    """Each effect, those that stand out most first: by how much, by how much it is separated from what, and what that
     means."""
     made = []
-    for index in sorted(range(len(found.names)), key=lambda one: -found.now.alone[one]):
-        alone, told = float(found.now.alone[index]), float(found.now.told[index])
+    for index in sorted(range(len(found.names)), key=lambda one: -found.now.detectability[one]):
+        alone, apart = float(found.now.detectability[index]), float(found.now.isolability[index])
         near = int(found.now.nearest[index])
         like = found.names[near] if near != index and alone >= DETECTABLE_SIGMA else ""
-        made.append((found.names[index], number(alone), number(told), like, _judged(alone, told)))
+        made.append((found.names[index], number(alone), number(apart), like, _judged(alone, apart)))
     return made
 
 
-def _judged(alone: float, told: float) -> str:
+def _judged(alone: float, apart: float) -> str:
     if alone < DETECTABLE_SIGMA:
         return "too faint"
-    return "can be named" if told >= TOLD_SIGMA else "cannot be told apart"
+    return "can be named" if apart >= ISOLABLE_SIGMA else "cannot be separated"
 
 
 def number(deviations: float) -> str:
@@ -66,8 +66,8 @@ def number(deviations: float) -> str:
 def meaning() -> str:
     """What the numbers are."""
     return (f"Standard deviations, the car's own numbers and the distances being free within their tolerance. An "
-            f"effect is seen from {DETECTABLE_SIGMA:g} on, and told from another one if {TOLD_SIGMA:.1f} remain when "
-            "that one is fitted in its place.")
+            f"effect is seen from {DETECTABLE_SIGMA:g} on, and separated from another one if {ISOLABLE_SIGMA:.1f} "
+            "remain when that one is fitted in its place.")
 
 
 def plan_lines(found: Plan) -> list[str]:
@@ -105,7 +105,7 @@ def next_words(one: NextDrive) -> str:
     more = len(one.gains) - len(shown)
     gains = ", ".join(f"{name} by {number(each)}" for name, each in shown.items())
     count = f"{one.more_named:.1f} effects more could be named" if one.more_named >= 0.05 else "no more can be named"
-    return f"{do_words(one.option)}: {count}. Told apart better: {gains}{f' and {more} more' if more else ''}."
+    return f"{do_words(one.option)}: {count}. Better separated: {gains}{f' and {more} more' if more else ''}."
 
 
 def _most(gains: Mapping[str, float]) -> dict[str, float]:
@@ -118,8 +118,8 @@ def as_json(found: Plan) -> dict[str, Any]:
     return {
         "drives": [{"drive": name, "seconds": seconds} for name, seconds in found.drives],
         "noise_mps2": found.noise.variance**0.5, "noise_measured": found.measured,
-        "effects": {one.effect.name: dict(one.values) for one in found.spoken},
-        "detectability": dict(zip(names, map(float, now.alone), strict=True)),
+        "effects": {one.effect.name: dict(one.values) for one in found.effects},
+        "detectability": dict(zip(names, map(float, now.detectability), strict=True)),
         "isolability": {name: {other: float(now.beside[row, column]) for column, other in enumerate(names)
                                if column != row} for row, name in enumerate(names)},
         "groups": [list(one) for one in found.groups], "left_out": dict(found.obstacles),

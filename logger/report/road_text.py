@@ -31,10 +31,10 @@ def _track_json(track: TrackClass) -> dict[str, Any]:
 def lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
-    told = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
     for side, track in zip(("left track", "right track") if len(tracks) > 1 else ("",), tracks, strict=True):
-        told += [*(["", side] if side else []), "", *_track_lines(track)]
-    return told
+        printed += [*(["", side] if side else []), "", *_track_lines(track)]
+    return printed
 
 
 def _track_lines(track: TrackClass) -> list[str]:

@@ -67,8 +67,8 @@ def _limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     sizes = [one.name for one in free if one.by_factors]
     vague = {name: fit.standard_errors[name] / abs(fit.parameters[name]) for name in sizes}
     if rough := [f"{name} ({share:.0%})" for name, share in vague.items() if share > _DOUBTFUL]:
-        yield (f"Hardly told without the road's profile: {', '.join(rough)}. Several drives over one road at different "
-               "speeds (--same-road) tell more.")
+        yield (f"Poorly determined without the road's profile: {', '.join(rough)}. Several drives over one road at "
+               "different speeds (--same-road) tell more.")
     yield ("The road is taken for one of ISO 8608 with this waviness; where it has bumps and holes, or its spectrum "
            "bends, the estimates lean to make up for it. Masses, springs and dampers are known only against those "
            "that were held fixed.")

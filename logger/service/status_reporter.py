@@ -165,9 +165,9 @@ class StatusReporter:
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""
         doubt = self._progress[name].look(now_us, state == "ok", readings)
-        told = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
-        if state == "ok" and told:
-            return told
+        reported = self._core.accelerometer_doubt if name == "accelerometer" else self._core.gps_doubt
+        if state == "ok" and reported:
+            return reported
         if doubt or state != "ok" or name != "accelerometer":
             return doubt
         frozen_s = self._pipeline.stillness.frozen_s

@@ -263,7 +263,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     assert read_vehicle(out).sprung_mass_kg == told["parameters"][MASS]
     assert identify(files[:1], MASS, "--unmeasured-road", "--waviness", "2.1") == 0
     text = capsys.readouterr().out
-    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "taken for one of ISO 8608", "Hardly told"):
+    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "taken for one of ISO 8608", "Poorly determined"):
         assert words in text
     assert identify(files[:1], "pitch_inertia_kg_m2", "--unmeasured-road", "--json") == 1
     assert "pitch_inertia_kg_m2" in json.loads(capsys.readouterr().out)["cannot_tell"][0]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from logger.estimation.road_profile import TOLD_OVER, band_passed, road_profile
+from logger.estimation.road_profile import RESOLVED_SHARE, band_passed, road_profile
 from logger.estimation.streaming import RoadPiece
 
 SPACING_M = 0.15
@@ -81,8 +81,8 @@ def test_the_range_is_told_over_most_of_the_way() -> None:
     pieces = cut(road, range(70), (0.5, 30.0)) + cut(road, range(70, 100), (0.8, 20.0))
     profile = road_profile(pieces, at(FAST, pieces))
     assert profile is not None
-    assert np.mean([piece.shortest_m <= profile.shortest_m for piece in pieces]) >= TOLD_OVER
-    assert np.mean([piece.longest_m >= profile.longest_m for piece in pieces]) >= TOLD_OVER
+    assert np.mean([piece.shortest_m <= profile.shortest_m for piece in pieces]) >= RESOLVED_SHARE
+    assert np.mean([piece.longest_m >= profile.longest_m for piece in pieces]) >= RESOLVED_SHARE
     assert (profile.shortest_m, profile.longest_m) == (0.8, 20.0)
 
 

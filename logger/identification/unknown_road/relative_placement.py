@@ -36,10 +36,10 @@ def best_placement(
     like, power = np.empty((2, len(shifts), len(parts)))
     for index, shift in enumerate(shifts):
         shifted = waves * np.exp(2j * np.pi * wave_number_cpm * shift)
-        told = crossing.readings(crossing.under_axles(white, shifted), response)[0]
+        predicted = crossing.readings(crossing.under_axles(white, shifted), response)[0]
         for place, part in enumerate(parts):
-            like[index, place] = told[part] @ measured[part]
-            power[index, place] = told[part] @ told[part]
+            like[index, place] = predicted[part] @ measured[part]
+            power[index, place] = predicted[part] @ predicted[part]
     from_middle_m = np.array([way_m[part].mean() for part in parts]) - 0.5 * (way_m.min() + way_m.max())
     best, found_at = -np.inf, (0.0, 1.0)
     steps = int(scale_off * length_m / 2 / (2 * _STEP_M))

@@ -24,7 +24,7 @@ from logger.vehicle.effect import Chosen, Effect, chosen
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
-TOLD_SIGMA = float(np.sqrt(CONFUSED))
+ISOLABLE_SIGMA = float(np.sqrt(CONFUSED))
 """Effects are told apart where so many deviations of the one remain beside the other: their square is the difference of
 the two scores."""
 _MOST_TRIALS = 4
@@ -67,15 +67,15 @@ def _values_of(effect: Effect) -> list[dict[str, float]]:
 class Outlook:
     """What some drives could show, in standard deviations.
 
-    alone     (e,) by how much each effect stands out
-    beside    (e, e) what of it remains after another one was fitted; of itself: all
+    detectability    (e,) by how much each effect stands out
+    beside           (e, e) what of it remains after another one was fitted; of itself: all
     """
 
-    alone: Array
+    detectability: Array
     beside: Array
 
     @property
-    def told(self) -> Array:
+    def isolability(self) -> Array:
         """(e,) by how much each is told from the effect that is most like it."""
         return np.asarray(self.beside.min(axis=1))
 
@@ -90,17 +90,17 @@ class Outlook:
         deviation of one, and has to stand out and to be told from all others."""
         from scipy.special import ndtr
 
-        return np.minimum(ndtr(self.alone - DETECTABLE_SIGMA), ndtr(self.told - TOLD_SIGMA))
+        return np.minimum(ndtr(self.detectability - DETECTABLE_SIGMA), ndtr(self.isolability - ISOLABLE_SIGMA))
 
 
-def spoken_for(settings: Settings, told: Information, precision: Array) -> Indices:
+def representatives(settings: Settings, information: Information, precision: Array) -> Indices:
     """Which column (e,) stands for each effect: its usual values or, where these say little, those by which it stands
     out most.
 
-    told         what some drives tell
-    precision    (p,) of the prior of the car's numbers
+    information    what some drives tell
+    precision      (p,) of the prior of the car's numbers
     """
-    marginal, costs = _marginal(told, precision)
+    marginal, costs = _marginal(information, precision)
     alone = np.sqrt(np.maximum((np.einsum("sii->si", marginal) + costs[:, None]).min(axis=0), 0.0))
     found = settings.first.copy()
     for index, effect in enumerate(settings.effects):
@@ -109,24 +109,24 @@ def spoken_for(settings: Settings, told: Information, precision: Array) -> Indic
     return found
 
 
-def outlook(settings: Settings, told: Information, precision: Array, spoken: Indices) -> Outlook:
-    """What drives that tell so much could show; arguments as of ``spoken_for``, whose result is ``spoken``."""
-    marginal, costs = _marginal(told, precision)
+def outlook(settings: Settings, information: Information, precision: Array, columns: Indices) -> Outlook:
+    """What drives that tell so much could show; arguments as of ``representatives``, whose result is ``columns``."""
+    marginal, costs = _marginal(information, precision)
     own = np.maximum(np.einsum("sii->si", marginal), 0.0)
-    explained = marginal[:, spoken] ** 2 / np.maximum(own, _TINY)[:, None]
+    explained = marginal[:, columns] ** 2 / np.maximum(own, _TINY)[:, None]
     most = np.maximum.reduceat(explained, settings.first, axis=2)
     np.einsum("sii->si", most)[:] = 0.0
-    beside = (own[:, spoken, None] - most + costs[:, None, None]).min(axis=0)
+    beside = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
     found = np.sqrt(np.maximum(beside, 0.0))
     return Outlook(np.diag(found).copy(), found)
 
 
-def _marginal(told: Information, precision: Array) -> tuple[Array, Array]:
+def _marginal(information: Information, precision: Array) -> tuple[Array, Array]:
     """Of the effects' columns (s, m, m), the car's numbers integrated out, and what errors of each size cost more than
     those that are expected (s,)."""
     count = len(precision)
-    mixed = told.products[:, :count, count:]
-    known = told.products[:, :count, :count] + np.diag(precision)
-    found = told.products[:, count:, count:] - mixed.transpose(0, 2, 1) @ np.linalg.solve(known, mixed)
-    costs = told.costs + [larger(USUAL, size).cost for size in SIZES[: len(told.costs)]]
+    mixed = information.products[:, :count, count:]
+    known = information.products[:, :count, :count] + np.diag(precision)
+    found = information.products[:, count:, count:] - mixed.transpose(0, 2, 1) @ np.linalg.solve(known, mixed)
+    costs = information.costs + [larger(USUAL, size).cost for size in SIZES[: len(information.costs)]]
     return np.asarray(found), np.asarray(costs - costs[0])

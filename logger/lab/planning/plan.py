@@ -23,7 +23,7 @@ from logger.lab.likelihood.map_fit import aligned, fit, read_beside
 from logger.lab.likelihood.noise_floor import noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.planning.next_drives import Option, option_drives
-from logger.lab.planning.outlook import TOLD_SIGMA, Outlook, Settings, outlook, spoken_for
+from logger.lab.planning.outlook import ISOLABLE_SIGMA, Outlook, Settings, outlook, representatives
 from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, information
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
@@ -58,7 +58,7 @@ class Plan:
     drives       names and seconds of the runs and the planned drives
     noise        of the accelerometers; ``measured``: whether it is that of the runs
     names        of the effects (e,)
-    spoken       (e,) the values that each is looked at with
+    effects      (e,) the values that each is looked at with
     now          what the drives could show of them
     obstacles    effects that cannot be there, and why
     next         drives that may come next, those that gain most first
@@ -68,7 +68,7 @@ class Plan:
     noise: SensorNoise
     measured: bool
     names: tuple[str, ...]
-    spoken: tuple[Chosen, ...]
+    effects: tuple[Chosen, ...]
     now: Outlook
     obstacles: Mapping[str, str]
     next: tuple[NextDrive, ...]
@@ -76,8 +76,8 @@ class Plan:
     @property
     def groups(self) -> list[tuple[str, ...]]:
         """Effects that would stand out, and cannot be told from each other."""
-        seen = self.now.alone >= DETECTABLE_SIGMA
-        alike = (np.minimum(self.now.beside, self.now.beside.T) < TOLD_SIGMA) & seen & seen[:, None]
+        seen = self.now.detectability >= DETECTABLE_SIGMA
+        alike = (np.minimum(self.now.beside, self.now.beside.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
         found: list[set[int]] = []
         for index in np.flatnonzero(seen):
             near = {int(index), *map(int, np.flatnonzero(alike[index]))}
@@ -112,26 +112,26 @@ def plan(there: CarThere, runs: Posterior | None, planned: Sequence[Run], effect
     base = [run for one in posteriors for run in one.runs.runs]
     with ThreadPoolExecutor(workers) as pool:
         asked = _Asked(settings, posteriors[0].prior.without_wall().curvature(there.logs), pool)
-        told: list[Information] = []
+        parts: list[Information] = []
         if fitted is not None:
             progress("what the runs show")
-            told.append(asked.of_runs(fitted))
+            parts.append(asked.of_runs(fitted))
         for number, drive in enumerate(drives, 1):
             progress(f"what planned drive {number} of {len(drives)} would show")
-            told.append(drive.information(asked.changes(drive), ()))
-        total = reduce(add, told)
-        spoken = spoken_for(settings, total, asked.precision)
-        now = outlook(settings, total, asked.precision, spoken)
+            parts.append(drive.information(asked.changes(drive), ()))
+        total = reduce(add, parts)
+        columns = representatives(settings, total, asked.precision)
+        now = outlook(settings, total, asked.precision, columns)
         following: list[NextDrive] = []
         for number, one in enumerate(option_drives(there, noise, road, base), 1):
             progress(f"what a next drive would add: {number} tried")
             changes = asked.changes(one.drive)
             for option, signals in one.options:
                 after = total + one.drive.information(changes, signals)
-                following.append(_next(option, settings, now, outlook(settings, after, asked.precision, spoken)))
+                following.append(_next(option, settings, now, outlook(settings, after, asked.precision, columns)))
     return Plan(
         tuple((run.name, (run.count - run.first) / run.rate_hz) for run in base), noise, measured,
-        tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in spoken), now, obstacles,
+        tuple(one.name for one in settings.effects), tuple(settings.columns[one] for one in columns), now, obstacles,
         tuple(sorted(following, key=lambda one: (-round(one.more_named, 1), -len(one.gains)))))
 
 
@@ -158,7 +158,7 @@ class _Asked:
 
 
 def _next(option: Option, settings: Settings, now: Outlook, then: Outlook) -> NextDrive:
-    gained, likelier = then.told - now.told, then.chances - now.chances
-    order = np.lexsort((now.told / np.maximum(then.told, 1.0), -likelier.round(2)))
+    gained, likelier = then.isolability - now.isolability, then.chances - now.chances
+    order = np.lexsort((now.isolability / np.maximum(then.isolability, 1.0), -likelier.round(2)))
     gains = {settings.effects[one].name: float(gained[one]) for one in order if gained[one] > _WORTH_TELLING}
     return NextDrive(option, gains, float(likelier.sum()))

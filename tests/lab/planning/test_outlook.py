@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.planning.outlook import Settings, outlook, spoken_for
+from logger.lab.planning.outlook import Settings, outlook, representatives
 from logger.lab.planning.planned_drive import CarThere, Information, PlannedDrive, SensorNoise, at_speed
 from logger.profiles.track import Track
 from logger.roads import iso8608
@@ -34,13 +34,13 @@ def test_what_remains_is_what_least_squares_leave() -> None:
     deviations = np.array([0.1, 0.3, 1.0, 3.0])
     every = np.vstack([numbers, changes])
     precision = deviations**-2.0
-    told = Information((every @ every.T)[None], np.zeros(1))
-    spoken = spoken_for(settings, told, precision)
-    found = outlook(settings, told, precision, spoken)
-    assert list(spoken) == list(settings.first)
-    for row, column in enumerate(spoken):
+    information = Information((every @ every.T)[None], np.zeros(1))
+    shown = representatives(settings, information, precision)
+    found = outlook(settings, information, precision, shown)
+    assert list(shown) == list(settings.first)
+    for row, column in enumerate(shown):
         alone = left_by(numbers, deviations, changes[column])
-        assert found.alone[row] == pytest.approx(alone) == pytest.approx(found.beside[row, row])
+        assert found.detectability[row] == pytest.approx(alone) == pytest.approx(found.beside[row, row])
         for other in set(range(len(NAMES))) - {row}:
             beside = [left_by(np.vstack([numbers, changes[one]]), np.append(deviations, np.inf), changes[column])
                       for one in settings.columns_of(other)]
@@ -65,7 +65,7 @@ def of_drive(drive: PlannedDrive, settings: Settings) -> Array:
     changes = np.array([drive.change(one) for one in settings.columns])
     precision = drive.posterior.prior.without_wall().curvature(np.zeros(13))
     total = drive.information(changes, ())
-    return outlook(settings, total, precision, spoken_for(settings, total, precision)).alone
+    return outlook(settings, total, precision, representatives(settings, total, precision)).detectability
 
 
 def test_a_gain_stands_out_by_no_more_than_the_recorders_own_gain_allows() -> None:
