@@ -54,8 +54,8 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
 def figures_words(figures: FleetFigures) -> str:
     """A summary in lines: what it rests on, cars that read too high or too low, the roughest roads, and the changes."""
     roads, biases = figures.roads, figures.biases
-    lines = [f"{_count(figures.windows, 'window')} of {_count(len(figures.cars), 'car')}; {_count(len(roads.key), roads.by)}, "
-             f"{roads.length_m.sum() / 1000:,.1f} km"]
+    lines = [f"{_count(figures.windows, 'window')} of {_count(len(figures.cars), 'car')}; "
+             f"{_count(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
     if isfinite(biases.pass_std):
