@@ -28,8 +28,8 @@ FLOORS = (
     "errors", "units", "geodesy", "records", "chart_data", "printable", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab", "extraction",
-    "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "demo", "api",
-    "commands",
+    "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "fleet", "demo",
+    "api", "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
 STORE = ("formats", "log", "export", "integrity")

@@ -28,6 +28,7 @@ VERBS = {
     "report": "make one web page of logs: map, plots, table",
     "sections": "logs in sections of 100 m, 0.1 mi or any length: IRI with its error, condition, comfort",
     "passes": "drives laid over each other: means by place and direction, what changed, places to visit",
+    "fleet": "many cars over years: logs into a dataset, figures of its roads and cars, a map",
     "convert": "logs as GeoJSON, GeoPackage, GPX, KML, Parquet or CSV, for other programs",
     "iri": "exact IRI of a measured profile",
     "comfort": "ISO 2631 comfort and health values of an acceleration record",

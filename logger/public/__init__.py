@@ -14,6 +14,7 @@ Quantities are in SI units, which their names end in. What is wrong with an inpu
 from logger.api.calibration import Calibration, Slopes, calibrate
 from logger.api.conversion import Conversion, convert
 from logger.api.drives import Estimate, Run, estimate, make_run, read_run, simulate, write_run
+from logger.api.fleet import FleetReport, FleetSummary, Ingested, fleet_ingest, fleet_report, fleet_summarise
 from logger.api.identification import Identification, identify
 from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, ShiftedNumber, add_effect, compare, diagnose
 from logger.api.lab_loop import LabStory, lab
@@ -44,7 +45,10 @@ __all__ = [
     "EffectInfo",
     "Effects",
     "Estimate",
+    "FleetReport",
+    "FleetSummary",
     "Identification",
+    "Ingested",
     "Iri",
     "LabStory",
     "LearnedLaw",
@@ -74,6 +78,9 @@ __all__ = [
     "diagnose_same_road",
     "effects",
     "estimate",
+    "fleet_ingest",
+    "fleet_report",
+    "fleet_summarise",
     "identify",
     "iri",
     "lab",

@@ -19,16 +19,19 @@ _RIGHT = Html(" class=n")
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def document(title: str, parts: Iterable[str], *, style: str = "", script: str = "", images_from: str = "") -> Html:
+def document(title: str, parts: Iterable[str], *, style: str = "", script: str = "", images_from: str = "",
+             loads: bool = False) -> Html:
     """The page of a title and of parts; those that are not HTML are shown as they are written.
 
     style, script    of this page alone, ours
     images_from      another host that the page may take pictures from (``https://host``); empty: none
+    loads            the script may load others, which lie beside the page
     """
     policy = _POLICY + (f"; img-src {images_from}" if images_from else "")
     run = EMPTY
     if script:
-        policy += f"; script-src 'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'"
+        digest = b64encode(sha256(script.encode()).digest()).decode()
+        policy += f"; script-src 'sha256-{digest}'" + " 'strict-dynamic'" * loads
         run = html("<script>{}</script>", Html(script))
     return html('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta http-equiv="Content-Security-Policy" content="{}">'

@@ -31,7 +31,7 @@ COMFORT_NAMES = tuple(word for _, word in sorted(COMFORT_WORDS))
 
 _DOUBTFUL = frozenset({"unsettled", "gap", "partial", "stationary"})
 _HIDDEN = "hidden"
-_NOT_COUNTED = frozenset({"unsettled"})
+NOT_COUNTED = frozenset({"unsettled"})
 """Windows whose figures stand in no mean and no share: the filters still knew nothing of the ride."""
 
 
@@ -130,7 +130,7 @@ def expected_square(record: WindowRecord) -> float | None:
 
 def counts(record: WindowRecord) -> bool:
     """Tell whether a row's figures may stand in a mean."""
-    return not _NOT_COUNTED.intersection(record.flags)
+    return not NOT_COUNTED.intersection(record.flags)
 
 
 def summary_json(summary: DriveSummary) -> dict[str, Any]:

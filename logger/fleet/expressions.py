@@ -1,0 +1,87 @@
+"""The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
+
+Two groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and time;
+the biases of cars follow from these alone. ``roads``: the sums of each piece of road over all cars, each car's readings
+divided by its gain. What follows from the sums is arithmetic over as many rows as there are pieces of road.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import ibis.expr.types as ir
+
+YEAR_US = 365.25 * 86400e6
+"""A Julian year."""
+_PRIME = 1_000_003
+
+
+def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:
+    """Sums of passes by road and car, of a time [us since 1970, half-open]; years count from ``zero_us``."""
+    passes = _passes(rows, since_us, until_us)
+    passes = passes.mutate(
+        years=(passes.utc_us - zero_us).cast("float64") / YEAR_US, iri=passes.pass_iri_m_per_km,
+        heading_rad=passes.heading_deg.cast("float64").radians(), square=passes.pass_a_w_mps2 * passes.pass_a_w_mps2)
+    return passes.group_by(["road", "car"]).aggregate(
+        passes=passes.count(), windows=passes.pass_windows.sum(),
+        years=passes.years.sum(), years_square=(passes.years * passes.years).sum(),
+        iri=passes.iri.sum(), iri_years=(passes.iri * passes.years).sum(), iri_square=(passes.iri * passes.iri).sum(),
+        felt=passes.square.count(), a_w_square=passes.square.sum(), speed=passes.speed_mps.cast("float64").sum(),
+        lat=passes.lat_deg.sum(), lon=passes.lon_deg.sum(), north=passes.heading_rad.cos().sum(),
+        east=passes.heading_rad.sin().sum(), last_us=passes.utc_us.max())
+
+
+def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
+    passes = rows.filter(rows.pass_iri_m_per_km.notnull())
+    if since_us is not None:
+        passes = passes.filter(passes.utc_us >= since_us)
+    return passes if until_us is None else passes.filter(passes.utc_us < until_us)
+
+
+def cars(by_car: ir.Table) -> ir.Table:
+    """Passes and roads of each car."""
+    return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
+
+
+def for_biases(by_car: ir.Table, one_in: int) -> ir.Table:
+    """What the biases of cars follow from, of one road in so many: by the remainder of the key, first by a prime, as
+    the last bits of a key are a direction."""
+    chosen = by_car if one_in == 1 else by_car.filter((by_car.road % _PRIME) % one_in == 0)
+    return chosen.select("road", "car", "passes", "iri", "years")
+
+
+def roads(by_car: ir.Table, gains: ir.Table) -> ir.Table:
+    """Sums by road over all cars; ``gains`` has each car's gain and the variance of its logarithm."""
+    joined = by_car.join(gains, "car")
+    passes = joined.passes.cast("float64")
+
+    def total(column: Any) -> Any:
+        return column.sum()
+
+    plain = ("years", "years_square", "felt", "a_w_square", "speed", "lat", "lon", "north", "east", "windows")
+    return joined.group_by("road").aggregate(
+        passes=total(joined.passes), cars=joined.car.count(), last_us=joined.last_us.max(),
+        iri=total(joined.iri / joined.gain), iri_years=total(joined.iri_years / joined.gain),
+        iri_square=total(joined.iri_square / (joined.gain * joined.gain)),
+        bias_square=total(passes * passes * joined.log_variance), **{name: total(joined[name]) for name in plain})
+
+
+def residuals_by_session(rows: ir.Table, gains: ir.Table, levels: ir.Table, since_us: int | None, until_us: int | None,
+                         zero_us: int) -> ir.Table:
+    """Sums of passes' relative residuals by car and session; ``levels`` has each road's IRI at ``middle`` [years] and
+    its growth a year, as a fraction."""
+    passes = _passes(rows, since_us, until_us).join(gains, "car").join(levels, "road")
+    years = (passes.utc_us - zero_us).cast("float64") / YEAR_US
+    expected = passes.gain * passes.level * (1.0 + passes.growth * (years - passes.middle))
+    passes = passes.mutate(residual=passes.pass_iri_m_per_km / expected - 1.0)
+    return passes.group_by(["car", "session"]).aggregate(
+        passes=passes.count(), residual=passes.residual.sum(), square=(passes.residual * passes.residual).sum())
+
+
+def history(rows: ir.Table, gains: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
+    """Passes by road and quarter of a year: number, mean IRI with the cars' gains taken out."""
+    passes = _passes(rows, since_us, until_us).join(gains, "car")
+    passes = passes.mutate(quarter=(passes.utc_us.cast("float64") / (YEAR_US / 4)).floor().cast("int64"))
+    return passes.group_by(["road", "quarter"]).aggregate(
+        passes=passes.count(), iri=(passes.pass_iri_m_per_km / passes.gain).sum())

@@ -1,0 +1,126 @@
+"""The overview of a fleet: a page of some ten kilobytes with a map, whose tiles lie beside it, and the lists to act
+on."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from logger.fleet.pseudonyms import shown_car
+from logger.fleet.road_cells import SEGMENT_M
+from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
+from logger.fleet.tiles import DEEPEST, highest_level, names_of, projected
+from logger.report.document import data_block, document, grid, heading, hint, section, tiles
+from logger.report.html import EMPTY, Html, concatenated, html
+from logger.report.summary import IRI_CLASSES, class_limits_m_per_km
+from logger.report.terminal import class_words, distance_words
+from logger.store.log.log_reader import utc
+
+_SHOWN = 20
+_SHARED = ("windows.js", "canvas.js", "map.js")
+_STYLE = """
+.history{display:block;width:100%;height:150px;margin-top:8px}
+#map{height:min(560px,64vh)}
+"""
+_MODES = (("m", "Mean IRI"), ("w", "Roughest"), ("t", "Became worse"))
+_HINT = "Tap or click a piece of road for its figures; the nearer the map, the finer they are."
+
+
+def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
+    """The page of figures by segment; ``sections``: the same by 0.1 mi, for the lists."""
+    segments = figures.roads
+    first, last = utc(int(segments.last_us.min())), utc(int(segments.last_us.max()))
+    under = (f"{figures.windows:,} windows of {len(figures.cars):,} cars · roads last seen {first:%Y-%m-%d} to "
+             f"{last:%Y-%m-%d}")
+    x, y = projected(segments.lat_deg, segments.lon_deg)
+    level = highest_level(x, y)
+    data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
+            "deepest": DEEPEST, "roots": names_of(x, y, level), "segment_m": SEGMENT_M,
+            "limits": [class_limits_m_per_km(letter)[0] for letter in list(IRI_CLASSES)[1:]]}
+    return document("A fleet's roads", [
+        heading("A fleet's roads", under), _tiles(figures, sections), _map(), _rough(sections), _worse(sections),
+        _cars(figures), data_block("data", data),
+    ], style=_shared("page.css") + _STYLE, loads=True,
+        script='"use strict";\n' + "".join(map(_shared, _SHARED)) + _own())
+
+
+@cache
+def _shared(name: str) -> str:
+    return (resources.files("logger.report") / "assets" / name).read_text("utf-8")
+
+
+@cache
+def _own() -> str:
+    return (resources.files("logger.fleet") / "assets" / "fleet.js").read_text("utf-8")
+
+
+def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
+    segments, growth = figures.roads, figures.biases.growth_per_year
+    mean = float(np.average(segments.iri_m_per_km, weights=segments.length_m))
+    return tiles([
+        ("Road, each direction", distance_words(float(segments.length_m.sum())), ""),
+        ("Mean roughness (IRI)", f"{mean:.2f}", "m/km"),
+        ("Change of the mean road", f"{growth:+.1%}" if np.isfinite(growth) else "not known", "a year"),
+        ("Became worse", f"{int(sections.worse.sum()):,}", f"of {len(sections.key):,} sections"),
+        ("To visit", f"{int((sections.visit != '').sum()):,}", "sections"),
+    ])
+
+
+def _map() -> Html:
+    buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
+                                "true" if name == "m" else "false", words) for name, words in _MODES)
+    legend = concatenated(html('<li><i class="f{}"></i>{}</li>', rank, class_words(letter))
+                          for rank, letter in enumerate(list(IRI_CLASSES)[:5]))
+    return section("Map", html(
+        '<noscript><p class="warn">The map is drawn by a script, which this browser does not run.</p></noscript>'
+        '<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
+        '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the roads. Arrow '
+        'keys move it, plus and minus zoom, 0 shows all. The lists below hold the places to visit."></canvas>'
+        '<canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
+        '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
+        '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
+        '<button type="button" data-zoom="all" aria-label="Show all">⤢</button></div></div>'
+        '<ul class="legend">{}</ul><div class="readout"><div id="reading" aria-live="polite">'
+        '<p class="hint" id="hint">{}</p></div></div>', buttons, legend, _HINT))
+
+
+def _place(sections: RoadTable, one: int) -> Html:
+    return html('<button type="button" data-lat="{0:.6f}" data-lon="{1:.6f}">{0:.5f}, {1:.5f}</button>',
+                float(sections.lat_deg[one]), float(sections.lon_deg[one]))
+
+
+def _rough(sections: RoadTable) -> Html:
+    order = np.flatnonzero(sections.visit != "")
+    order = order[np.argsort(-sections.iri_m_per_km[order], kind="stable")][:_SHOWN].tolist()
+    rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f} ± {sections.iri_std_m_per_km[one]:.2f}",
+             f"{sections.length_m[one]:.0f}", str(sections.cars[one]), f"{sections.passes[one]:.0f}",
+             f"{utc(int(sections.last_us[one])):%Y-%m-%d}", sections.visit[one].replace("|", ", ")) for one in order]
+    heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")
+    return section("To visit", grid(heads, rows, words=(0, 5, 6)) + hint(
+        "Sections of 0.1 mi, one direction each. Rough: above 170 in/mi with 95 % certainty; worse: its change is "
+        "significant; uncomfortable: 0.8 m/s² and more. Cars and passes: the fewest cars and the mean passes of its "
+        "segments.")) if rows else section("To visit", Html('<p class="empty">No section gives a reason.</p>'))
+
+
+def _worse(sections: RoadTable) -> Html:
+    order = np.flatnonzero(sections.worse)
+    order = order[np.argsort(sections.p_value[order], kind="stable")][:_SHOWN].tolist()
+    rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f}",
+             f"{sections.trend_m_per_km_per_year[one]:+.2f} ± {sections.trend_std_m_per_km_per_year[one]:.2f}",
+             f"{sections.p_value[one]:.1g}") for one in order]
+    return section("Became worse", grid(("Place", "IRI [m/km]", "A year [m/km]", "p"), rows) + hint(
+        f"The {len(rows)} most certain of {int(sections.worse.sum()):,}; of all that are called worse at most "
+        f"{FALSE_SHARE:.0%} are so falsely (Benjamini and Hochberg 1995).")) if rows else EMPTY
+
+
+def _cars(figures: FleetFigures) -> Html:
+    biases = figures.biases
+    order = np.argsort(-np.abs(biases.gain - 1.0) * biases.known, kind="stable")[:_SHOWN].tolist()
+    rows = [(shown_car(int(figures.cars[one])), f"{biases.gain[one] - 1.0:+.1%} ± "
+             f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
+             f"{figures.car_passes[one]:,.0f}") for one in order]
+    return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(
+        "What a car reads of the roads that it shares with others, against the mean car; the figures above are free of "
+        "it. The cars that read otherwise come first."))

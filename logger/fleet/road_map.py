@@ -1,0 +1,140 @@
+"""An integer for a piece of road of a map: the line of roads that a window lies on, and the direction driven on it.
+
+Candidates are pieces of 66 ft near a place (P. Newson and J. Krumm, Hidden Markov map matching through noise and
+sparseness, 2009: a receiver's errors as a normal distribution across the road). A road is chosen by distance and
+direction, of the row itself and of its neighbours along the drive, so that one bad fix does not jump to the parallel
+road. Rows near no road get the key of their cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.fleet.road_cells import ON_MAP, SEGMENT_M, cell_keys
+from logger.geodesy import EARTH_RADIUS_M
+
+Array = npt.NDArray[np.float64]
+Keys = npt.NDArray[np.int64]
+
+_PLACE_STD_M = 4.07
+"""Of a receiver across the road (Newson and Krumm 2009, section 4)."""
+_HEADING_STD_DEG = 20.0
+"""Of the direction between windows 50 ft apart with fixes some metres off."""
+_REACH_M = 30.0
+_CANDIDATES = 12
+_NEIGHBOURS = 4
+"""Rows each way that vote: 30 m, over which a receiver's error has not changed but a junction is passed."""
+_FAR = 25.0
+"""Cost of a road that is not among a neighbour's candidates: five standard deviations."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Pieces of roads (k,), as long as ``SEGMENT_M`` or, at the end of a road, shorter.
+
+    road               its line in the file, from 0
+    start_m            along the line [m]
+    lat_deg, lon_deg   of its two ends (k, 2) [degrees]
+    """
+
+    road: npt.NDArray[np.intp]
+    start_m: Array
+    length_m: Array
+    lat_deg: Array
+    lon_deg: Array
+
+    @property
+    def heading_deg(self) -> Array:
+        """Of each, from its start to its end, clockwise from north [degrees]."""
+        middle_rad = np.radians(self.lat_deg.mean(axis=1))
+        east = ((np.diff(self.lon_deg)[:, 0] + 180.0) % 360.0 - 180.0) * np.cos(middle_rad)
+        return np.degrees(np.arctan2(east, np.diff(self.lat_deg)[:, 0])) % 360.0
+
+
+def pieces_of(lines: Sequence[tuple[Array, Array]]) -> Pieces:
+    """Lines of latitudes and longitudes (n,) [degrees] in pieces; a line without length has none."""
+    found: list[tuple[Array, ...]] = []
+    for road, (lat_deg, lon_deg) in enumerate(lines):
+        east = np.diff(lon_deg) * np.cos(np.radians((lat_deg[1:] + lat_deg[:-1]) / 2))
+        step_m = np.hypot(np.diff(lat_deg), east) * (np.pi / 180.0 * EARTH_RADIUS_M)
+        along_m = np.concatenate([[0.0], np.cumsum(step_m)])
+        if along_m[-1] <= 0:
+            continue
+        cut_m = np.append(np.arange(int(np.ceil(along_m[-1] / SEGMENT_M - 1e-9))) * SEGMENT_M, along_m[-1])
+        lat, lon = (np.interp(cut_m, along_m, degrees) for degrees in (lat_deg, lon_deg))
+        count = len(cut_m) - 1
+        found.append((np.full(count, float(road)), cut_m[:-1], np.diff(cut_m),
+                      np.stack([lat[:-1], lat[1:]], axis=1), np.stack([lon[:-1], lon[1:]], axis=1)))
+    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+    return Pieces(columns[0].astype(np.intp), *columns[1:])
+
+
+class RoadMap:
+    """Finds the roads of a map. ``keys`` is what ``drive_rows`` wants."""
+
+    def __init__(self, pieces: Pieces) -> None:
+        from scipy.spatial import cKDTree
+
+        self.pieces = pieces
+        self._heading_deg = pieces.heading_deg
+        self._tree = cKDTree(_on_sphere(pieces.lat_deg.mean(axis=1), pieces.lon_deg.mean(axis=1)))
+
+    def keys(self, lat_deg: Array, lon_deg: Array, heading_deg: Array, drive: npt.NDArray[np.intp]) -> Keys:
+        """Keys (n,) of places and directions [degrees], in the order driven; ``drive`` tells drives apart."""
+        out = cell_keys(lat_deg, lon_deg, heading_deg)
+        if not len(out):
+            return out
+        piece, cost, forward = self._candidates(lat_deg, lon_deg, heading_deg)
+        way = np.where(np.isfinite(cost), 2 * self.pieces.road[piece] + forward, -1 - np.arange(piece.shape[1]))
+        total = cost + _of_neighbours(way, cost, drive)
+        best = np.argmin(total, axis=1)
+        row = np.arange(len(out))
+        found = np.isfinite(total[row, best])
+        chosen = ON_MAP | (2 * piece[row, best].astype(np.int64) + forward[row, best])
+        return np.where(found, chosen, out)
+
+    def _candidates(self, lat_deg: Array, lon_deg: Array, heading_deg: Array
+                    ) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.int64]]:
+        """Pieces (n, k) near places, what speaks against them (infinity: too far), and 1 where driven forwards."""
+        count = min(_CANDIDATES, len(self.pieces.road))
+        _, piece = self._tree.query(_on_sphere(lat_deg, lon_deg), k=list(range(1, count + 1)))
+        scale = np.pi / 180.0 * EARTH_RADIUS_M
+        shrink = np.cos(np.radians(lat_deg))[:, None]
+
+        def from_place(end: int) -> tuple[Array, Array]:
+            east = (self.pieces.lon_deg[piece, end] - lon_deg[:, None] + 180.0) % 360.0 - 180.0
+            return east * shrink * scale, (self.pieces.lat_deg[piece, end] - lat_deg[:, None]) * scale
+
+        (x0, y0), (x1, y1) = from_place(0), from_place(1)
+        dx, dy = x1 - x0, y1 - y0
+        along = np.clip(-(x0 * dx + y0 * dy) / (dx**2 + dy**2), 0.0, 1.0)
+        off_m = np.hypot(x0 + along * dx, y0 + along * dy)
+        turn_deg = (heading_deg[:, None] - self._heading_deg[piece] + 180.0) % 360.0 - 180.0
+        forward = (np.abs(turn_deg) <= 90.0).astype(np.int64)
+        turn_deg = np.minimum(np.abs(turn_deg), 180.0 - np.abs(turn_deg))
+        cost = (off_m / _PLACE_STD_M) ** 2 + (turn_deg / _HEADING_STD_DEG) ** 2
+        return piece, np.where(off_m <= _REACH_M, cost, np.inf), forward
+
+
+def _of_neighbours(way: npt.NDArray[np.int64], cost: Array, drive: npt.NDArray[np.intp]) -> Array:
+    """What neighbours along the drive say of each candidate's road (n, k): the mean of their costs for it."""
+    said, votes = np.zeros(way.shape), np.zeros((len(way), 1))
+    for shift in (*range(-_NEIGHBOURS, 0), *range(1, _NEIGHBOURS + 1)):
+        other = np.arange(len(way)) + shift
+        there = (other >= 0) & (other < len(way))
+        other = np.where(there, other, 0)
+        there &= drive[other] == drive
+        same = way[:, :, None] == way[other][:, None, :]
+        theirs = np.minimum(np.where(same, cost[other][:, None, :], np.inf).min(axis=2), _FAR)
+        said += np.where(there[:, None], theirs, 0.0)
+        votes += there[:, None]
+    return said / np.maximum(votes, 1.0)
+
+
+def _on_sphere(lat_deg: Array, lon_deg: Array) -> Array:
+    lat, lon = np.radians(lat_deg), np.radians(lon_deg)
+    return EARTH_RADIUS_M * np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=1)

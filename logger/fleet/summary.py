@@ -1,0 +1,271 @@
+"""The figures of a dataset: roads, sections, cells or routes, and the cars that measured them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.fleet.car_biases import CarBiases, car_biases, shared_by_session, with_sessions
+from logger.fleet.engine import Engine
+from logger.fleet.expressions import cars as car_sums
+from logger.fleet.expressions import for_biases, passes_by_car, residuals_by_session, roads
+from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
+from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
+from logger.fleet.road_map import Pieces
+from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
+from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
+
+Array = npt.NDArray[np.float64]
+Keys = npt.NDArray[np.int64]
+
+FALSE_SHARE = 0.05
+"""Of false ones among the changes that are called significant."""
+_CERTAIN = 1.645
+"""Standard errors from a mean to where it lies with 95 % certainty on one side."""
+POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
+UNCOMFORTABLE_MPS2 = 0.8
+"""ISO 2631-1, C.2.3."""
+SECTION_M = MILE_M / 10
+MOST_PAIRS = 2_000_000
+"""Of roads and cars from which biases are estimated, some 300 MB; of more a part of the roads is taken. What the
+passes of a session share then limits a bias, not the number of roads."""
+_ZERO_US = 1_577_836_800_000_000
+"""2020-01-01: years count from here, so that their squares keep their digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoadTable:
+    """Figures of n segments, sections, cells or routes; NaN: not known.
+
+    key                       of a segment or a section; for others the number of the cell or route
+    lat_deg, lon_deg          mean place of the passes; ``heading_deg`` their mean direction, NaN where there are many
+    length_m                  of road with figures
+    cars, passes              of a group of segments the least and the mean number on its segments
+    mean_years                mean time of the passes, from 2020-01-01 on
+    iri_m_per_km, ...         as in ``road_figures``
+    a_w_mps2, speed_mps       r.m.s. over the passes, and mean
+    last_us                   of the last pass [us since 1970]
+    worse                     the change is significant and upwards
+    visit                     words that say why to go there; empty: no reason
+    """
+
+    by: str
+    key: Keys
+    lat_deg: Array
+    lon_deg: Array
+    heading_deg: Array
+    length_m: Array
+    cars: Keys
+    passes: Array
+    mean_years: Array
+    iri_m_per_km: Array
+    iri_std_m_per_km: Array
+    trend_m_per_km_per_year: Array
+    trend_std_m_per_km_per_year: Array
+    p_value: Array
+    a_w_mps2: Array
+    speed_mps: Array
+    last_us: Keys
+    worse: npt.NDArray[np.bool_]
+    visit: npt.NDArray[np.str_]
+
+
+@dataclass(frozen=True, eq=False)
+class FleetFigures:
+    """What a summary holds.
+
+    roads         figures by what was asked for
+    cars          pseudonyms (j,), in order, and ``car_passes`` their passes; ``biases`` in the same order
+    shared        by all passes of a session: the share of a pass's variance
+    windows       in all passes
+    withheld      segments that fewer cars have driven than may be published
+    """
+
+    roads: RoadTable
+    cars: Keys
+    car_passes: Array
+    biases: CarBiases
+    shared: float
+    windows: int
+    withheld: int
+
+
+def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | None, least_cars: int,
+              pieces: Pieces | None) -> FleetFigures | None:
+    """Figures of a time [us since 1970, half-open]; None where no pass lies in it.
+
+    by        segment, section, cell or route
+    pieces    of the map that keys were made with, if one was
+    """
+    by_car = passes_by_car(engine.rows, since_us, until_us, _ZERO_US)
+    with engine.kept(by_car) as kept:
+        of_cars = engine.arrays(car_sums(kept))
+        order = np.argsort(of_cars["car"])
+        cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
+        if not len(cars):
+            return None
+        sums = engine.arrays(for_biases(kept, -(-int(of_cars["roads"].sum()) // MOST_PAIRS)))
+        first = _biases(sums, cars, None)
+        # Now that each road's own change shows, no car is charged with it.
+        before = engine.arrays(roads(kept, gains_table(cars, first)))
+        biases = replace(_biases(sums, cars, (before["road"], own_growth(before, first))),
+                         growth_per_year=first.growth_per_year)
+        of_roads = engine.arrays(roads(kept, gains_table(cars, biases)))
+    levels = levels_table(of_roads, biases)
+    sessions = engine.arrays(residuals_by_session(engine.rows, gains_table(cars, biases), levels, since_us, until_us,
+                                                  _ZERO_US))
+    of_session = np.searchsorted(cars, sessions["car"]), sessions["passes"].astype(np.float64)
+    variance = shared_by_session(*of_session, sessions["residual"], sessions["square"])
+    biases = with_sessions(biases, *of_session, variance)
+    shared = min(variance / biases.pass_std**2, 1.0) if biases.pass_std > 0 else 0.0
+    published = of_roads["cars"] >= least_cars
+    windows = int(of_roads["windows"].sum())
+    order = np.flatnonzero(published)[np.argsort(of_roads["road"][published])]
+    segments = _segments({name: values[order] for name, values in of_roads.items()}, biases.pass_std, pieces)
+    return FleetFigures(grouped(segments, by, pieces, shared), cars, car_passes, biases, shared, windows,
+                        int((~published).sum()))
+
+
+def _biases(sums: Mapping[str, npt.NDArray[Any]], cars: Keys, growth: tuple[Keys, Array] | None) -> CarBiases:
+    """The biases of cars; ``growth``: roads and the growth of each."""
+    keys, road = np.unique(sums["road"], return_inverse=True)
+    growth_of = None
+    if growth is not None:
+        order = np.argsort(growth[0])
+        growth_of = growth[1][order][np.searchsorted(growth[0][order], keys)]
+    return car_biases(road, np.searchsorted(cars, sums["car"]), len(cars), sums["passes"].astype(np.float64),
+                      sums["iri"], sums["years"], growth_of)
+
+
+def gains_table(cars: Keys, biases: CarBiases) -> Any:
+    """Gains as a table for the expressions."""
+    import ibis
+    import pyarrow
+
+    return ibis.memtable(pyarrow.table({"car": cars, "gain": biases.gain, "log_variance": biases.log_std**2}))
+
+
+def own_growth(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Array:
+    """The growth of each road a year, as a fraction: what its passes say, drawn towards that of all roads by as much as
+    roads agree (empirical Bayes; the variance between roads by its moments)."""
+    passes = sums["passes"].astype(np.float64)
+    middle = sums["years"] / passes
+    spread = np.maximum(sums["years_square"] - sums["years"] * middle, 0.0)
+    common = float(np.nan_to_num(biases.growth_per_year))
+    tells = spread > 1e-6 * passes
+    if not tells.any() or not np.isfinite(biases.pass_std):
+        return np.full(len(passes), common)
+    own = np.divide((sums["iri_years"] - sums["iri"] * middle) * passes, spread * sums["iri"],
+                    out=np.full(len(passes), common), where=tells)
+    noise = biases.pass_std**2
+    between = max(float((spread * (own - common) ** 2).sum()) - noise * int(tells.sum()), 0.0) / float(spread.sum())
+    return common + (own - common) * between * spread / (between * spread + noise)
+
+
+def levels_table(sums: Mapping[str, npt.NDArray[Any]], biases: CarBiases) -> Any:
+    """What passes over each road are compared with: its mean, and its growth."""
+    import ibis
+    import pyarrow
+
+    passes = sums["passes"].astype(np.float64)
+    return ibis.memtable(pyarrow.table({"road": sums["road"], "level": sums["iri"] / passes,
+                                        "middle": sums["years"] / passes, "growth": own_growth(sums, biases)}))
+
+
+def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pieces | None) -> RoadTable:
+    passes = sums["passes"].astype(np.float64)
+    figures = road_figures(Sums(passes, *(sums[name] for name in (
+        "years", "years_square", "iri", "iri_years", "iri_square", "bias_square"))), pass_std)
+    length_m = np.full(len(passes), SEGMENT_M)
+    on_map = (sums["road"] & ON_MAP) != 0
+    if pieces is not None:
+        length_m[on_map] = pieces.length_m[piece_of(sums["road"][on_map])]
+    a_w = np.sqrt(np.divide(sums["a_w_square"], sums["felt"], out=np.full(len(passes), np.nan),
+                            where=sums["felt"] > 0).astype(np.float64))
+    heading_deg = np.degrees(np.arctan2(sums["east"], sums["north"])) % 360.0
+    return _table("segment", sums["road"], sums["lat"] / passes, sums["lon"] / passes, heading_deg, length_m,
+                  sums["cars"], passes, sums["years"] / passes, figures, a_w, sums["speed"] / passes, sums["last_us"])
+
+
+def piece_of(key: Keys) -> npt.NDArray[np.intp]:
+    """The pieces of a map that keys (n,) of it mean."""
+    return ((key & ~ON_MAP) >> 1).astype(np.intp)
+
+
+def group_keys(segments: RoadTable, by: str, pieces: Pieces | None) -> Keys:
+    """The section, cell or route that each segment belongs to; -1: to no route."""
+    key = segments.key
+    on_map = (key & ON_MAP) != 0
+    if by == "cell":
+        return block_of(cell_keys(segments.lat_deg, segments.lon_deg, np.zeros(len(key))))
+    out = np.where(on_map, -1, -1 if by == "route" else section_of(key))
+    if pieces is not None:
+        piece, forward = piece_of(key[on_map]), key[on_map] & 1
+        route = 2 * pieces.road[piece].astype(np.int64) + forward
+        along = np.floor(pieces.start_m[piece] / SECTION_M + 1e-9).astype(np.int64)
+        out[on_map] = route if by == "route" else ON_MAP | (route << 24) | along
+    return out
+
+
+def grouped(segments: RoadTable, by: str, pieces: Pieces | None, shared: float) -> RoadTable:
+    """Segments as they are, or put together: means by length. Of the variance of a segment's error so much is
+    ``shared`` with the others, as if the same sessions had driven all of them; the rest is its own."""
+    if by == "segment":
+        return segments
+    group = group_keys(segments, by, pieces)
+    inside = group >= 0
+    key, code = np.unique(group[inside], return_inverse=True)
+    length_m = segments.length_m[inside]
+
+    def total(values: Array, weight: Array = length_m) -> Array:
+        return np.asarray(np.bincount(code, np.nan_to_num(values) * weight, len(key)))
+
+    def mean(name: str, change: Callable[[Array], Array] = np.asarray) -> Array:
+        values = change(getattr(segments, name)[inside])
+        over = total(np.isfinite(values).astype(np.float64))
+        return np.divide(total(values), over, out=np.full(len(key), np.nan), where=over > 0)
+
+    def error_of_mean(name: str) -> Array:
+        values = getattr(segments, name)[inside]
+        over = total(np.isfinite(values).astype(np.float64))
+        of_sum = np.sqrt((1.0 - shared) * total(values**2, length_m**2) + shared * total(values) ** 2)
+        return np.divide(of_sum, over, out=np.full(len(key), np.nan), where=over > 0)
+
+    def extreme(name: str, of: Any) -> Keys:
+        out = np.full(len(key), segments.last_us.max() if of is np.minimum else 0, dtype=np.int64)
+        of.at(out, code, getattr(segments, name)[inside])
+        return out
+
+    trend, trend_std = mean("trend_m_per_km_per_year"), error_of_mean("trend_std_m_per_km_per_year")
+    figures = RoadFigures(mean("iri_m_per_km"), error_of_mean("iri_std_m_per_km"), trend, trend_std,
+                          _normal_p(trend, trend_std))
+    north = mean("heading_deg", lambda one: np.cos(np.radians(one)))
+    east = mean("heading_deg", lambda one: np.sin(np.radians(one)))
+    heading_deg = np.where(np.hypot(north, east) > 0.5, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
+    return _table(by, key, mean("lat_deg"), mean("lon_deg"), heading_deg, total(np.ones(len(code))),
+                  extreme("cars", np.minimum), mean("passes"), mean("mean_years"), figures,
+                  np.sqrt(mean("a_w_mps2", np.square)), mean("speed_mps"), extreme("last_us", np.maximum))
+
+
+def _normal_p(trend: Array, trend_std: Array) -> Array:
+    from scipy.stats import norm
+
+    return np.asarray(2.0 * norm.sf(np.abs(trend) / trend_std))
+
+
+def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Array, length_m: Array, cars: Keys,
+           passes: Array, mean_years: Array, figures: RoadFigures, a_w_mps2: Array, speed_mps: Array, last_us: Keys
+           ) -> RoadTable:
+    worse = significant(figures.p_value, FALSE_SHARE) & (figures.trend_m_per_km_per_year > 0)
+    rough = figures.iri_m_per_km - _CERTAIN * figures.iri_std_m_per_km > POOR_M_PER_KM
+    hard = a_w_mps2 >= UNCOMFORTABLE_MPS2
+    words = np.array(["|".join(word for word, holds in zip(("rough", "worse", "uncomfortable"), three, strict=True)
+                               if holds) for three in zip(rough, worse, hard, strict=True)], dtype=np.str_)
+    return RoadTable(by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64), passes,
+                     mean_years, figures.iri_m_per_km, figures.iri_std_m_per_km, figures.trend_m_per_km_per_year,
+                     figures.trend_std_m_per_km_per_year, figures.p_value, a_w_mps2, speed_mps,
+                     last_us.astype(np.int64), worse, words)

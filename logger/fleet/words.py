@@ -1,0 +1,121 @@
+"""Figures of a fleet in words and as JSON."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from logger.fleet.ingest import Counts
+from logger.fleet.layer import FIELDS, roads_layer
+from logger.fleet.pseudonyms import shown_car
+from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
+from logger.store.log.log_reader import utc
+
+_SHOWN_ROADS, _SHOWN_CARS = 15, 10
+_SURE = 2.0
+"""Standard errors that a bias is listed from."""
+
+
+def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
+    """What an ingest did, by name; ``rows``: in the dataset after it."""
+    return {**vars(counts), "rows": rows}
+
+
+def ingest_words(counts: Counts, rows: int, place: str) -> str:
+    """The same in lines."""
+    lines = [f"{place}: {counts.added:,} rows added, {rows:,} in all"]
+    said = ((counts.known_logs, "logs were known already"), (counts.repeated, "rows were known already"),
+            (counts.contradictions, "rows contradict a known one of their number and time; the first one stays"),
+            (counts.damaged_lines, "damaged lines refused ('ridelog verify' lists them)"),
+            (counts.undated, "rows without a date left out"),
+            (counts.unplaced, "rows without a place or a direction left out"),
+            (counts.trimmed, "rows cut at the ends of drives"))
+    return "\n".join([*lines, *(f"  {number:,} {words}" for number, words in said if number)])
+
+
+def figures_json(figures: FleetFigures) -> dict[str, Any]:
+    """A summary by name; null: not known."""
+    names = [field.name for field in FIELDS]
+    biases = figures.biases
+    return {
+        "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
+        "growth_per_year": _known(biases.growth_per_year), "pass_std": _known(biases.pass_std),
+        "session_std": _known(biases.pass_std * figures.shared**0.5),
+        "cars": [{"car": shown_car(car), "passes": int(passes), "bias": _known(gain - 1.0 if known else np.nan),
+                  "bias_std": _known(gain * std if known else np.nan), "group": int(group)}
+                 for car, passes, gain, std, group, known in zip(
+                     figures.cars.tolist(), figures.car_passes.tolist(), biases.gain.tolist(), biases.log_std.tolist(),
+                     biases.group.tolist(), biases.known.tolist(), strict=True)],
+        "roads": [dict(zip(names, one.values, strict=True)) for one in roads_layer(figures.roads).features]}
+
+
+def figures_words(figures: FleetFigures) -> str:
+    """A summary in lines: what it rests on, cars that read too high or too low, the roughest roads, and the changes."""
+    roads, biases = figures.roads, figures.biases
+    lines = [f"{_count(figures.windows, 'window')} of {_count(len(figures.cars), 'car')}; "
+             f"{_count(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
+    if figures.withheld:
+        lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
+    if isfinite(biases.pass_std):
+        of_session = biases.pass_std * figures.shared**0.5
+        lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
+                     f"{of_session:.1%} are shared by all passes of a session")
+    if isfinite(biases.growth_per_year):
+        lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
+    return "\n".join([*lines, "", *_cars(figures), "", *_roads(roads), "", *_changes(roads)])
+
+
+def _cars(figures: FleetFigures) -> list[str]:
+    biases = figures.biases
+    bias, std = biases.gain - 1.0, biases.gain * biases.log_std
+    if not biases.known.any():
+        return ["No road has passes of two cars: nothing is known of their biases"]
+    order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
+    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > _SURE * std[one]]
+    alone = int((~biases.known).sum())
+    lines = [f"Cars that read otherwise than the mean car ({len(sure)} of {len(bias)})"]
+    lines += [f"  {shown_car(int(figures.cars[one]))}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
+              f"{int(figures.car_passes[one]):,} passes" for one in sure[:_SHOWN_CARS]]
+    if len(sure) > _SHOWN_CARS:
+        lines.append(f"  and {len(sure) - _SHOWN_CARS} more (--json has all)")
+    return lines + ([f"  of {alone} cars nothing is known: they share no road with others"] if alone else [])
+
+
+def _roads(roads: RoadTable) -> list[str]:
+    order = np.argsort(-np.nan_to_num(roads.iri_m_per_km), kind="stable")[:_SHOWN_ROADS].tolist()
+    if not order:
+        return ["No road to show"]
+    lines = [f"Roughest {roads.by}s",
+             "  place                    IRI [m/km]      cars  passes  a_w [m/s2]  last seen   visit"]
+    return lines + [
+        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} ± "
+        f"{_number(roads.iri_std_m_per_km[one], 2):5}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
+        f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
+        f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
+
+
+def _changes(roads: RoadTable) -> list[str]:
+    worse = np.flatnonzero(roads.worse)
+    order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
+    if not order:
+        return [f"No {roads.by} has become worse, as far as these drives tell"]
+    lines = [f"Became worse: {_count(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
+             "  place                    IRI [m/km]   a year [m/km]    p"]
+    return lines + [
+        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
+        f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
+        f"{roads.p_value[one]:.1g}" for one in order]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'s' * (number != 1)}"
+
+
+def _known(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if isfinite(value) else ""

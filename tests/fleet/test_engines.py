@@ -1,0 +1,49 @@
+"""The same expressions on DuckDB and on Spark with workers of its own: the same figures."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger.api.fleet import fleet_summarise
+from logger.commands.main import main
+from logger.errors import BadInput
+
+from ..support.drives.fleet_town import drives, town, write_logs
+
+NO_SPARK = "needs PySpark (pip install 'ibis-framework[pyspark]') and Java 17, and one of them is not here"
+HAS_SPARK = importlib.util.find_spec("pyspark") is not None and shutil.which("java") is not None
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("town")
+    write_logs(drives(town(6, 400.0, 4, seed=3), 60, seed=4), folder / "logs")
+    for car in sorted((folder / "logs").iterdir()):
+        assert main(["fleet", "ingest", str(car), "--to", str(folder / "town"), "--car", car.name]) == 0
+    return folder / "town"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_SPARK, reason=NO_SPARK)
+@pytest.mark.filterwarnings("ignore")  # of PySpark and of what it finds in this machine's Java
+def test_spark_gives_the_same_figures(dataset: Path) -> None:
+    ours, theirs = (fleet_summarise(dataset, by="section", since="2024-03-01", engine=one).found
+                    for one in ("duckdb", "spark local-cluster[2,1,1024]"))
+    assert (ours.windows, ours.withheld, ours.cars.tolist()) == (theirs.windows, theirs.withheld, theirs.cars.tolist())
+    for name in ("gain", "log_std", "growth_per_year", "pass_std"):
+        assert np.allclose(getattr(ours.biases, name), getattr(theirs.biases, name), rtol=1e-9)
+    for name in ("iri_m_per_km", "iri_std_m_per_km", "trend_m_per_km_per_year", "trend_std_m_per_km_per_year",
+                 "a_w_mps2", "lat_deg", "passes"):
+        assert np.allclose(getattr(ours.roads, name), getattr(theirs.roads, name), rtol=1e-7, equal_nan=True)
+    assert (ours.roads.key == theirs.roads.key).all() and (ours.roads.visit == theirs.roads.visit).all()
+
+
+@pytest.mark.skipif(HAS_SPARK, reason="PySpark is here")
+def test_spark_that_is_missing_is_asked_for(dataset: Path) -> None:
+    with pytest.raises(BadInput, match="--engine spark: expected PySpark: pip install"):
+        fleet_summarise(dataset, engine="spark local[2]")
