@@ -84,7 +84,8 @@ def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start
 class Question:
     """What is asked of a record; as of ``modes``.
 
-    said    how an option is written in a complaint
+    vehicle      that was driven, and ``speed_mps`` of a record that does not say it
+    said         how an option is written in a complaint
     """
 
     method: str = USUAL_METHOD
@@ -95,6 +96,8 @@ class Question:
     from_s: float | None = None
     to_s: float | None = None
     segments: int | None = None
+    vehicle: Model | Path | str | None = None
+    speed_mps: float | None = None
     said: Callable[[str], str] = str
 
     def wrong(self, option: str, words: str) -> BadInput:
@@ -149,19 +152,27 @@ def modes(
     record: Channels | Path | str, method: str = USUAL_METHOD, *, columns: Sequence[str] | None = None,
     input_column: str | None = None, order: int | None = None, response: str | None = None,
     from_s: float | None = None, to_s: float | None = None, segments: int | None = None,
+    vehicle: Model | Path | str | None = None, speed_mps: float | None = None,
 ) -> Modes:
     """Natural frequencies, damping ratios and mode shapes of a free decay or of a response to random forces, each with
     its standard deviation. The order and the modes are chosen by rule.
 
-    record          100 samples or more; or its CSV file, as ``read_channels``
+    A drive needs the ``vehicle``: what its sensor reads is coloured by the road, and by the second axle that follows
+    the first. Then the vehicle's springs, dampers and masses are fitted to the spectrum, and the modes are those of the
+    numbers found (``logger.modal.driven_car``).
+
+    record          100 samples or more; or its CSV file, as ``read_channels``; with a vehicle a drive or its folder, as
+                    ``read_run``, or a record of one sensor with ``speed_mps``
     method          era, for a free decay; ssi, ssi-cov, ar, for a random response; n4sid, arx, armax, beside a measured
-                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode
+                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode; none with a vehicle
     columns         of the sensors; None: all but the input
     input_column    of a force or motion that was measured, for n4sid, arx and armax
     order           states of the model (lags for ar, arx and armax), 2 or more; None: chosen by rule
     response        "decay" or "random"; None: the record is looked at
     from_s, to_s    stretch to be looked at [s]; None: as long as the record
     segments        of an fft; None: 8
+    vehicle         that was driven, as in ``read_vehicle``; its wheelbase, contact patch and sensor's place are held
+    speed_mps       of a record that does not say it
 
     Raises BadInput for what does not fit together, a record that is too short for it, and as ``read_channels``. Source:
     P. van Overschee and B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
@@ -173,7 +184,7 @@ def modes(
     >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
     ([1.5], [0.02])
     """
-    question = Question(method, columns, input_column, order, response, from_s, to_s, segments)
+    question = Question(method, columns, input_column, order, response, from_s, to_s, segments, vehicle, speed_mps)
     return modes_by(question, found_modes(record, question),
                     "record" if isinstance(record, Channels) else Path(record).name)
 
@@ -249,7 +260,14 @@ def vehicle_modes(
 
 def found_modes(given: channel_file.ChannelRecord | Path | str, question: Question) -> Found:
     """The modes of a record or of a file. BadInput as ``modes``."""
+    from logger.api.driven_modes import modes_of_drive
+
+    if question.vehicle is not None:
+        return modes_of_drive(given, question)
+    if question.speed_mps is not None:
+        raise question.wrong("speed", f": expected {question.said('vehicle')} with it")
     _check(question)
+    _check_stands(given, question)
     record, inputs = _asked(given, question)
     try:
         return Found(_find(question, record, inputs), record)
@@ -259,6 +277,17 @@ def found_modes(given: channel_file.ChannelRecord | Path | str, question: Questi
 
 def _name(given: channel_file.ChannelRecord | Path | str) -> str:
     return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+
+
+def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Question) -> None:
+    """BadInput for a drive, unless what moved it was measured, or it is said to be a free decay."""
+    drives = (bool({*given.names} & {*channel_file.NOT_SENSORS}) if isinstance(given, channel_file.ChannelRecord) else
+              channel_file.is_drive(given))
+    if drives and question.input_column is None and question.response != "decay":
+        raise BadInput(
+            f"{_name(given)}: expected {question.said('vehicle')} with a drive: the road, and the second axle that "
+            "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
+            f"looked at with {question.said('response')} decay")
 
 
 def _check(question: Question) -> None:
