@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from logger.api.drives import Run, read_run
-from logger.api.modal import Channels, Found, read_channels
 from logger.api.ranges import SPEED
 from logger.api.vehicles import model_of
+from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
 from logger.errors import BadInput
 from logger.runs import READING, SKIP_S
 from logger.store.formats.channel_file import SPEED as SPEED_COLUMN
@@ -18,15 +18,13 @@ from logger.store.formats.channel_file import ChannelRecord
 from logger.store.formats.drive_file import header_of
 from logger.store.formats.record_file import VERTICAL
 
-if TYPE_CHECKING:
-    from logger.api.modal import Array, Question
+Array = npt.NDArray[np.float64]
 
 _UNUSED = ("order", "response", "input_column", "segments")
 
 
 def modes_of_drive(given: Run | ChannelRecord | Path | str, question: Question) -> Found:
     """The modes of the vehicle near the one of the question that was driven. BadInput as ``logger.api.modal.modes``."""
-    from logger.api.modal import USUAL_METHOD
     from logger.modal.driven_car import car_modes
 
     assert question.vehicle is not None
@@ -57,10 +55,8 @@ def modes_of_drive(given: Run | ChannelRecord | Path | str, question: Question) 
 
 
 def _record(given: Run | ChannelRecord | Path | str, question: Question
-            ) -> tuple[str, float, float, Array, Array, np.ndarray]:
+            ) -> tuple[str, float, float, Array, Array, npt.NDArray[np.bool_]]:
     """Name, start [s], rate [Hz], readings, speeds [m/s] and whether each is a reading."""
-    from logger.api.modal import _name
-
     path = given if isinstance(given, Path | str) else None
     drive = given if isinstance(given, Run) else None
     if path is not None and (Path(path).is_dir() or SPEED_COLUMN in header_of(Path(path))):
@@ -75,7 +71,8 @@ def _record(given: Run | ChannelRecord | Path | str, question: Question
             raise BadInput(f"{drive.path}: expected a drive, found a car that stands")
         usable = np.ones(len(drive.time_s), bool) if drive.usable is None else drive.usable == READING
         return (str(drive.path), float(drive.time_s[0]), drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, usable)
-    name = _name(given) if not isinstance(given, Run) else str(given.path)
+    assert not isinstance(given, Run)
+    name = name_of(given)
     if question.speed_mps is None:
         raise BadInput(f"{name}: expected a column {SPEED_COLUMN}, or {said} M/S")
     SPEED.check(said, question.speed_mps)

@@ -1,8 +1,8 @@
-"""Vibration records of many sensors, and the modes of the structure that they were on."""
+"""The modes of the structure, or the vehicle, that a record was made on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, DECREMENT, IRI, MODAL_METHODS, RESPONSES, SPECTRUM, SPEED
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
+from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
 from logger.errors import BadInput
 from logger.store.formats import channel_file
 
@@ -23,94 +24,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-USUAL_METHOD, _SEGMENTS = "ssi", 8
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Channels(channel_file.ChannelRecord, Shown):
-    """A record of c sensors, evenly sampled.
-
-    names      of the channels
-    start_s    time of the first sample [s]; ``rate_hz`` samples a second
-    samples    (n, c), in any unit
-    """
-
-    def __repr__(self) -> str:
-        deviations = self.samples.std(axis=0).tolist()
-        return table("Channels", [
-            ("time", len(self.samples) / self.rate_hz, "s"), ("rate", self.rate_hz, "Hz"),
-            ("samples", len(self.samples), ""),
-            *((f"{name}, standard deviation", one, "") for name, one in zip(self.names, deviations, strict=True))])
-
-    def charts(self) -> Sequence[Chart]:
-        """The channels over time."""
-        from logger.chart_data import Curves
-
-        time_s = self.start_s + np.arange(len(self.samples)) / self.rate_hz
-        return [Curves("Channels", "time [s]", "reading", tuple(
-            line(name, time_s, one) for name, one in zip(self.names, self.samples.T, strict=True)))]
-
-
-def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
-    """Read a CSV record with ``t_s`` and one column per sensor: these columns, or all.
-
-    Raises BadInput (``file:line: expected ..., found ...``) for anything else, and for a column that never moves.
-
-    >>> read_channels(folder / "drive.csv", ["accel_z_mps2"]).samples.shape
-    (1115, 1)
-    """
-    return Channels(**vars(channel_file.read_channels(path, columns)))
-
-
-def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
-    """A record out of arrays (n,) by the names of their channels.
-
-    rate_hz    samples a second; the first was taken at ``start_s`` [s]
-
-    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
-
-    >>> make_channels({"top": [0.0, 1.0, 0.0], "middle": [0.0, 0.5, 0.0]}, rate_hz=100.0).samples.shape
-    (3, 2)
-    """
-    arrays = [np.asarray(one, dtype=np.float64) for one in samples.values()]
-    if not arrays or arrays[0].ndim != 1 or any(one.shape != arrays[0].shape for one in arrays):
-        raise BadInput("channels: expected arrays of one length and one axis")
-    if not (len(arrays[0]) > 1 and rate_hz > 0 and np.isfinite(start_s) and np.isfinite(arrays).all()):
-        raise BadInput("channels: expected two finite values or more in each, and a rate above 0 Hz")
-    return Channels(tuple(samples), start_s, rate_hz, np.stack(arrays, axis=1))
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is asked of a record; as of ``modes``.
-
-    vehicle      that was driven, and ``speed_mps`` of a record that does not say it
-    said         how an option is written in a complaint
-    """
-
-    method: str = USUAL_METHOD
-    columns: Sequence[str] | None = None
-    input_column: str | None = None
-    order: int | None = None
-    response: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
-    segments: int | None = None
-    vehicle: Model | Path | str | None = None
-    speed_mps: float | None = None
-    said: Callable[[str], str] = str
-
-    def wrong(self, option: str, words: str) -> BadInput:
-        """The complaint about an option."""
-        return BadInput(f"{self.said(option)}{words}")
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What was found; ``record``: of the sensors alone, the stretch that was looked at."""
-
-    result: ModalResult
-    record: Channels
+_SEGMENTS = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -272,11 +186,7 @@ def found_modes(given: channel_file.ChannelRecord | Path | str, question: Questi
     try:
         return Found(_find(question, record, inputs), record)
     except ValueError as error:
-        raise BadInput(f"{_name(given)}: {error}") from None
-
-
-def _name(given: channel_file.ChannelRecord | Path | str) -> str:
-    return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+        raise BadInput(f"{name_of(given)}: {error}") from None
 
 
 def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Question) -> None:
@@ -285,7 +195,7 @@ def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Ques
               channel_file.is_drive(given))
     if drives and question.input_column is None and question.response != "decay":
         raise BadInput(
-            f"{_name(given)}: expected {question.said('vehicle')} with a drive: the road, and the second axle that "
+            f"{name_of(given)}: expected {question.said('vehicle')} with a drive: the road, and the second axle that "
             "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
             f"looked at with {question.said('response')} decay")
 
@@ -316,7 +226,7 @@ def _check(question: Question) -> None:
 
 def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -> tuple[Channels, Array | None]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
-    pushed, name = question.input_column, _name(given)
+    pushed, name = question.input_column, name_of(given)
     at = name if isinstance(given, channel_file.ChannelRecord) else f"{name}:1"
     wished = () if question.columns is None else tuple(question.columns)
     if question.columns is not None and (

@@ -79,7 +79,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog modes``."""
-    from logger.api.modal import USUAL_METHOD, Question, found_modes, modes_by
+    from logger.api.modal import found_modes, modes_by
+    from logger.api.vibration_records import USUAL_METHOD, Question
 
     if args.vehicle is not None and args.file is None:
         return _of_vehicle(args)

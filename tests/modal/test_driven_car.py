@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from logger.commands.main import main
+from logger.errors import BadInput
 from logger.modal.driven_car import UnlikeCar, car_modes, fitted_names, pieces_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes
@@ -49,8 +50,8 @@ def test_each_mode_is_one_of_the_cars_own(name: str, seed: int, speed_mps: float
     assert len(told) >= least
     for one in told:
         assert one.damping_ratio > 0
-        assert min(max(abs(hz - one.frequency_hz) / one.frequency_std_hz, abs(ratio - one.damping_ratio) / one.damping_std)
-                   for hz, ratio in own) < SURE
+        assert min(max(abs(hz - one.frequency_hz) / one.frequency_std_hz,
+                       abs(ratio - one.damping_ratio) / one.damping_std) for hz, ratio in own) < SURE
 
 
 def test_the_pitch_of_a_sensor_amid_an_even_car_is_not_told() -> None:
@@ -83,18 +84,17 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run, _ = drive("golden-car", 1, 20.0, "B")
     write_run(tmp_path / "run", run)
     file = str(tmp_path / "run" / "drive.csv")
-    assert main(["modes", file]) == 2
-    assert "expected --vehicle with a drive" in capsys.readouterr().err
-    assert main(["modes", file, "--columns", "speed_mps", "--response", "decay"]) == 2
-    assert "which says how the car went" in capsys.readouterr().err
+    bare = tmp_path / "bare.csv"
+    bare.write_text("\n".join(line.rsplit(",", 2)[0] for line in Path(file).read_text().splitlines()) + "\n")
     assert main(["modes", file, "--vehicle", "golden-car"]) == 0
     assert "the distance between the axles taken out" in capsys.readouterr().out
-    assert len(modes_in_python(tmp_path / "run", vehicle="golden-car").frequency_hz) == 2
-    assert main(["modes", file, "--vehicle", "golden-car", "--method", "era"]) == 2
-    assert "fitted to the spectrum" in capsys.readouterr().err
-    rows = [line.rsplit(",", 2)[0] for line in Path(file).read_text().splitlines()]
-    bare = tmp_path / "bare.csv"
-    bare.write_text("\n".join(rows) + "\n")
-    assert main(["modes", str(bare), "--vehicle", "golden-car"]) == 2
-    assert "expected a column speed_mps, or --speed" in capsys.readouterr().err
     assert main(["modes", str(bare), "--vehicle", "golden-car", "--speed", "20"]) == 0
+    assert len(modes_in_python(tmp_path / "run", vehicle="golden-car").frequency_hz) == 2
+    for arguments, words in (
+            ([file], "expected --vehicle with a drive"),
+            ([file, "--method", "fft", "--columns", "accel_z_mps2"], "expected --vehicle with a drive"),
+            ([file, "--columns", "speed_mps", "--response", "decay"], "which says how the car went"),
+            ([file, "--vehicle", "golden-car", "--method", "era"], "fitted to the spectrum"),
+            ([str(bare), "--vehicle", "golden-car"], "expected a column speed_mps, or --speed")):
+        with pytest.raises(BadInput, match=words):
+            main(["modes", *arguments])
