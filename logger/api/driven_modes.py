@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.drives import Run, read_run
+from logger.api.drives import read_run
 from logger.api.ranges import SPEED
 from logger.api.vehicles import model_of
 from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 _UNUSED = ("order", "response", "input_column", "segments")
 
 
-def modes_of_drive(given: Run | ChannelRecord | Path | str, question: Question) -> Found:
+def modes_of_drive(given: ChannelRecord | Path | str, question: Question) -> Found:
     """The modes of the vehicle near the one of the question that was driven. BadInput as ``logger.api.modal.modes``."""
     from logger.modal.driven_car import car_modes
 
@@ -54,15 +54,13 @@ def modes_of_drive(given: Run | ChannelRecord | Path | str, question: Question) 
     return Found(found, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
 
 
-def _record(given: Run | ChannelRecord | Path | str, question: Question
+def _record(given: ChannelRecord | Path | str, question: Question
             ) -> tuple[str, float, float, Array, Array, npt.NDArray[np.bool_]]:
     """Name, start [s], rate [Hz], readings, speeds [m/s] and whether each is a reading."""
     path = given if isinstance(given, Path | str) else None
-    drive = given if isinstance(given, Run) else None
+    said = question.said("speed")
     if path is not None and (Path(path).is_dir() or SPEED_COLUMN in header_of(Path(path))):
         drive = read_run(path)
-    said = question.said("speed")
-    if drive is not None:
         if question.speed_mps is not None:
             raise question.wrong("speed", f": expected a record without speeds, {drive.path} has them")
         if question.columns is not None and tuple(question.columns) != (VERTICAL,):
@@ -71,13 +69,13 @@ def _record(given: Run | ChannelRecord | Path | str, question: Question
             raise BadInput(f"{drive.path}: expected a drive, found a car that stands")
         usable = np.ones(len(drive.time_s), bool) if drive.usable is None else drive.usable == READING
         return (str(drive.path), float(drive.time_s[0]), drive.rate_hz, drive.accel_z_mps2, drive.speed_mps, usable)
-    assert not isinstance(given, Run)
     name = name_of(given)
     if question.speed_mps is None:
         raise BadInput(f"{name}: expected a column {SPEED_COLUMN}, or {said} M/S")
     SPEED.check(said, question.speed_mps)
     record = read_channels(path, question.columns or (VERTICAL,)) if path is not None else given
-    if not isinstance(record, ChannelRecord) or len(record.names) != 1:
+    assert isinstance(record, ChannelRecord)
+    if len(record.names) != 1:
         raise BadInput(f"{name}: expected one sensor ({question.said('columns')})")
     count = len(record.samples)
     return (name, record.start_s, record.rate_hz, record.samples[:, 0], np.full(count, question.speed_mps),
