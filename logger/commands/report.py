@@ -10,6 +10,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import replace_bytes
+from logger.printable import counted
 from logger.report.maps import Way
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
                           "summary": summary_json(summarise(records))}))
     else:
-        print(f"Report: {args.out} ({len(records)} windows from {len(files)} file{'s' * (len(files) != 1)})")
+        print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})")
     return EXIT_DONE
 
 

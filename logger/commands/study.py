@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.study_page import page
 
-        write_text(args.out, page(study, result))
+        write_text(args.out, page(study, result, QUICK_SHARE if args.quick else 1.0))
     if args.json:
         print(json.dumps(as_json(study, result), allow_nan=False))
     else:

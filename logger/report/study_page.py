@@ -8,13 +8,14 @@ from logger.report.html import Html, concatenated
 from logger.studies.study import Result, Study, Table
 
 
-def page(study: Study, result: Result) -> Html:
-    """The study as one HTML document."""
+def page(study: Study, result: Result, share: float = 1.0) -> Html:
+    """The study as one HTML document; ``share`` of its draws and grid points that was computed."""
+    quick = [] if share == 1.0 else [f"Quick: with {share:.0%} of the draws and grid points."]
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of N. Blum, dissertation, University of Maryland, 2015"),
-        paragraphs([result.verdict]), *map(_table, result.tables),
+        paragraphs([*quick, result.verdict]), *map(_table, result.tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
-        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}"]))])
+        section("How it was made", paragraphs([study.how, f"ridelog study {study.called}{' --quick' * bool(quick)}"]))])
 
 
 def _table(table: Table) -> Html:
