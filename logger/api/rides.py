@@ -149,7 +149,7 @@ def comfort(
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
     return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, weighting,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
-                   summary["comfort"], used.weigh(ride.accel_mps2[record_file.VERTICAL], ride.rate_hz), ride.rate_hz,
+                   summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))
 
 

@@ -15,7 +15,7 @@ from logger.report.maps import Way
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
 from logger.store.formats.road_lines import read_road_lines
-from logger.store.log.log_reader import LoggedFile, find_logs_in, read_logged
+from logger.store.log.log_reader import LoggedFile, find_logs_in, read_found
 
 STREETS = "https://tile.openstreetmap.org/{z}/{x}/{y}.png"
 """Where pictures of streets come from when they are asked for: OpenStreetMap's standard tiles."""
@@ -64,7 +64,7 @@ def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: S
     """
     if out.exists() and not out.is_file():
         raise BadInput(f"{out}: expected the name of a file to write")
-    files = [logged for log, place in logs if (logged := read_logged(log, place)) is not None]
+    files = read_found(logs)
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(str(log) for log, _ in logs)}: expected a log with at least one intact row")
     try:

@@ -214,8 +214,8 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
                            "has it: --unit g takes them as g, --unit mps2 as they are")
     if np.ptp(counted[:, 0]) == 0.0:
         if counted[0, 0] == 0.0:
-            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works shows "
-                           "some noise at least; check that it was read")
+            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
+                           "shows some noise at least; check that it was read")
         return [Doubt("constant", f"every sample is {counted[0, 0]:.4g} m/s2: a sensor that works shows some noise at "
                       "least; check that it was read", {"value_mps2": float(counted[0, 0])})]
     if moving is not None and not moving.any():
