@@ -1,4 +1,4 @@
-"""What a chart shows, as arrays: lines over an axis, or shades over a grid. ``logger.report.charts`` draws it."""
+"""What a chart shows, as arrays: lines over an axis, shades over a grid, or bars. ``logger.report.charts`` draws it."""
 
 from __future__ import annotations
 
@@ -56,4 +56,14 @@ class Field:
     top: float
 
 
-Chart = Curves | Field
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """A chart of named values from 0, one below the other; ``level``: a value that has a name, drawn through all."""
+
+    title: str
+    value_name: str
+    bars: tuple[tuple[str, float], ...]
+    level: tuple[float, str] | None = None
+
+
+Chart = Curves | Field | Bars

@@ -22,7 +22,7 @@ from logger.errors import EXIT_DONE, BadInput
 from logger.files import write_text
 
 if TYPE_CHECKING:
-    from logger.chart_data import Curves, Field
+    from logger.chart_data import Chart
     from logger.studies.study import Cell, Result, Study, Table
 
 QUICK_SHARE = 0.1
@@ -124,9 +124,11 @@ def as_json(study: Study, result: Result) -> dict[str, Any]:
     }
 
 
-def _figure(one: Curves | Field) -> dict[str, Any]:
-    from logger.chart_data import Field
+def _figure(one: Chart) -> dict[str, Any]:
+    from logger.chart_data import Bars, Field
 
+    if isinstance(one, Bars):
+        return {"title": one.title, "value": one.value_name, "bars": [list(bar) for bar in one.bars]}
     told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):
         return {**told, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),

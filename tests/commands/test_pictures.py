@@ -116,3 +116,28 @@ def test_a_logarithmic_axis_puts_powers_of_ten_at_even_steps() -> None:
     for label in (">0.1<", ">1<", ">10<", ">100<", ">0.01<"):
         assert label in drawn
 
+
+
+def test_a_fit_has_its_residuals_and_correlations(tmp_path: Path) -> None:
+    car = ridelog.read_vehicle("golden-car")
+    road = ridelog.random_road(iso_class="B", length_m=150.0)
+    ridelog.write_run(tmp_path / "run", ridelog.simulate(car, road, 15.0, noise_mps2=0.05))
+    out, vehicle = tmp_path / "fit.html", tmp_path / "fitted.yaml"
+    names = "front.suspension_stiffness_n_per_m,front.suspension_damping_n_s_per_m"
+    assert main(["identify", str(tmp_path / "run"), "--vehicle", "golden-car", "--free", names, "--out", str(out),
+                 "--out", str(vehicle)]) == 0
+    text = out.read_text("utf-8")
+    assert "Autocorrelation of the residuals" in text
+    assert "Numbers that err together" in text
+    assert names.replace(",", ", ") in text
+    assert "fitted by ridelog identify" in vehicle.read_text("utf-8")
+
+
+def test_white_residuals_stay_in_the_band() -> None:
+    from logger.report.identification_charts import _left
+
+    white = [np.random.default_rng(seed).standard_normal(4000) for seed in (1, 2)]
+    curves = _left(white)
+    found, band = curves.lines[0].y, curves.lines[1].y
+    assert 0.88 <= float((abs(found) < band).mean()) <= 1.0
+    assert band[0] == pytest.approx(1.96 / np.sqrt(8000), rel=1e-3)

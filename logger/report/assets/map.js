@@ -96,8 +96,8 @@ class TrackMap {
     clearTimeout(this.resting);
     if (grown !== 1) this.resting = setTimeout(() => this.repaint(), REST_MS);
     this.drawEnds(ink);
-    this.drawPlaces(ink);
     this.drawWorst(ink);
+    this.drawPlaces(ink);
     this.drawScale(ink, width, height);
   }
 
