@@ -1,13 +1,14 @@
-"""What chips on an I2C bus have in common: what a failed transfer means, and which address a chip answers at."""
+"""What chips on an I2C bus have in common: what a failed transfer means, which address a chip answers at, and whether
+it still holds its settings."""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from drivers.errors import BadReply, DeviceError, NotPresent, Timeout, WrongDevice
+from drivers.errors import BadReply, DeviceError, NotPresent, SettingsLost, Timeout, WrongDevice
 from drivers.ports import I2cBus
-from drivers.registers import Register
+from drivers.registers import Field, Register
 
 NOT_ACKNOWLEDGED = (errno.EREMOTEIO, errno.ENXIO)
 
@@ -55,3 +56,51 @@ def find_chip(bus: I2cBus, chip_id: Register, addresses: Sequence[int], title: s
         raise faults[0]
     places = " or ".join(f"0x{chip:02X}" for chip in addresses)
     raise NotPresent(f"nothing answers at I2C address {places}: check the sensor's power, ground, SDA and SCL")
+
+
+class ConfiguredChip:
+    """A chip whose settings a driver writes when it starts it, and reads back later, one register at a time.
+
+    A driver's ``start`` calls ``_write_settings`` and then sets ``_chip``, the address that the chip answers at; None:
+    it has not been started.
+
+    name                 of the chip
+    registers_to_check   so many ``check_next`` see every setting once
+    """
+
+    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[Field, int]]]) -> None:
+        self.name = name
+        self.registers_to_check = len(settings)
+        self._bus = bus
+        self._settings_written = tuple(settings)
+        self._chip: int | None = None
+        self._checked = 0
+
+    def check_settings(self) -> None:
+        """SettingsLost when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
+        for _ in self._settings_written:
+            self.check_next()
+
+    def check_next(self) -> None:
+        """Read back one register, each in its turn. SettingsLost when it does not hold what ``start`` wrote; after a
+        transfer that failed it is the same one's turn again."""
+        chip = self._started()
+        register, values = self._settings_written[self._checked]
+        try:
+            register.check(self._bus, chip, values)
+        except OSError as error:
+            raise bus_fault(error, chip) from error
+        except BadReply as error:
+            raise SettingsLost(f"{self.name} lost its settings (did its supply dip?): {error}") from error
+        self._checked = (self._checked + 1) % len(self._settings_written)
+
+    def _write_settings(self, chip: int) -> None:
+        """OSError of the bus; BadReply where the chip does not take one."""
+        self._checked = 0
+        for register, values in self._settings_written:
+            register.update(self._bus, chip, values)
+
+    def _started(self) -> int:
+        if self._chip is None:
+            raise NotPresent(f"the {self.name} has not been started")
+        return self._chip

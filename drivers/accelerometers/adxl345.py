@@ -28,9 +28,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from drivers.accelerometers.accelerometer import Accelerometer, Readings
-from drivers.chip_bus import bus_fault, find_chip
+from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
 from drivers.dated_samples import DatedSamples, Samples
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost
+from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
@@ -90,29 +90,24 @@ class Adxl345Config:
             raise SettingsError(f"rate_hz is one of {', '.join(map(str, RATE_CODES))}, not {self.rate_hz}", "rate_hz")
 
 
-class Adxl345:
+class Adxl345(ConfiguredChip):
     """One chip on a bus. ``sleep`` takes seconds. Every method but ``stop`` raises the DeviceError family, as
     ``Bma220`` does; after any, wait and call ``start`` again: it assumes nothing about the chip."""
 
     def __init__(self, bus: I2cBus, rate_hz: int, sleep: Callable[[float], None]) -> None:
-        self._bus = bus
-        self._sleep = sleep
-        self._rate_hz = rate_hz
-        self._chip: int | None = None
-        self._checked = 0
-        self._lost = True
-        self._wanted: tuple[tuple[Register, Mapping[Field, int]], ...] = (
+        super().__init__("ADXL345", bus, (
             (FORMAT, {FULL_RESOLUTION: 1, RANGE_CODE: SIXTEEN_G, JUSTIFY: 0, SELF_TEST: 0}),
             (RATE, {RATE_CODE: RATE_CODES[rate_hz], LOW_POWER: 0}),
             (FIFO, {FIFO_MODE: STREAM}),
             (POWER, {MEASURE: 1, SLEEP: 0, LINK_AND_SLEEP: 0}),
-        )
-        self.registers_to_check = len(self._wanted)
+        ))
+        self._sleep = sleep
+        self._rate_hz = rate_hz
+        self._lost = True
 
     def start(self) -> int:
         """Find the chip, set it up with an empty buffer, and let it measure. Gives the address that it answers at."""
         self._chip = None
-        self._checked = 0
         self._lost = True
         chip = find_chip(self._bus, DEVICE_ID, ADDRESSES, "an ADXL345")
         try:
@@ -120,8 +115,7 @@ class Adxl345:
             for offset in OFFSETS:
                 offset.update(self._bus, chip, {WHOLE_BYTE: 0})
             FIFO.update(self._bus, chip, {FIFO_MODE: BYPASS})  # empties the buffer
-            for register, values in self._wanted:
-                register.update(self._bus, chip, values)
+            self._write_settings(chip)
         except OSError as error:
             raise bus_fault(error, chip) from error
         self._sleep(TURN_ON_S + 1 / self._rate_hz)
@@ -153,23 +147,6 @@ class Adxl345:
         self._lost = False
         return t_us, bytes((OVERRUN.insert(interrupts, int(lost)), status)) + b"".join(entries)
 
-    def check_settings(self) -> None:
-        """SettingsLost when the chip no longer holds what ``start`` wrote."""
-        for _ in self._wanted:
-            self.check_next()
-
-    def check_next(self) -> None:
-        """Read back one register, each in its turn. SettingsLost when it does not hold what ``start`` wrote."""
-        chip = self._started()
-        register, values = self._wanted[self._checked]
-        try:
-            register.check(self._bus, chip, values)
-        except OSError as error:
-            raise bus_fault(error, chip) from error
-        except BadReply as error:
-            raise SettingsLost(f"ADXL345 lost its settings (did its supply dip?): {error}") from error
-        self._checked = (self._checked + 1) % len(self._wanted)
-
     def stop(self) -> None:
         """Let the chip stand by. Never raises."""
         chip, self._chip = self._chip, None
@@ -182,11 +159,6 @@ class Adxl345:
         if len(data) != ENTRY_BYTES:
             raise BadReply(f"ADXL345 at 0x{chip:02X}: a read of {ENTRY_BYTES} bytes gave {len(data)}")
         return data
-
-    def _started(self) -> int:
-        if self._chip is None:
-            raise NotPresent("the ADXL345 has not been started")
-        return self._chip
 
 
 class Adxl345Decoder:

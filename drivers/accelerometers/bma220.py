@@ -44,12 +44,12 @@ from drivers.accelerometers._bma220_registers import (
     WATCHDOG_CODE,
 )
 from drivers.accelerometers.accelerometer import Accelerometer, Readings
-from drivers.chip_bus import bus_fault, find_chip
-from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost
+from drivers.chip_bus import ConfiguredChip, bus_fault, find_chip
+from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.machine import Machine
 from drivers.ports import I2cBus
 from drivers.readings import STANDARD_GRAVITY_MPS2, AccelerationBlock
-from drivers.registers import Field, Register, ToggleRegister
+from drivers.registers import ToggleRegister
 from drivers.settings import Kind, OneOf, OrNone, SettingNode, Special, Whole
 from drivers.sources import US_PER_S, ChipSource, Deadlines, Played, Source
 
@@ -120,7 +120,7 @@ class Bma220Identity:
     bandwidth_hz: int
 
 
-class Bma220:
+class Bma220(ConfiguredChip):
     """One chip on a bus. ``sleep`` takes seconds. Every method but ``stop`` raises the DeviceError family:
 
     NotPresent   nothing acknowledges, or a kernel driver owns the address
@@ -128,36 +128,28 @@ class Bma220:
     WrongDevice  another chip is at the address
     BadReply     the chip does not do what it was told
     SettingsLost    it did, and no longer does
-
-    registers_to_check   so many ``check_next`` see every setting once
     """
 
     def __init__(self, bus: I2cBus, settings: Bma220Settings, sleep: Callable[[float], None]) -> None:
-        self._bus = bus
-        self._read_block = bus.read_i2c_block_data
-        self._settings = settings
-        self._sleep = sleep
-        self._chip: int | None = None
-        self._checked = 0
-        self._wanted: tuple[tuple[Register, Mapping[Field, int]], ...] = (
+        super().__init__("BMA220", bus, (
             (WATCHDOG, {WATCHDOG_CODE: WATCHDOG_CODES[settings.watchdog_ms]}),
             (RANGE, {RANGE_CODE: RANGE_CODES[settings.range_g], SELF_TEST: 0}),
             (FILTER, {FILTER_CODE: FILTER_CODES[settings.filter_hz], SERIAL_HIGH_BANDWIDTH: 0}),
             (AXES, {ENABLED_AXES: 0b111, SLEEP_ENABLE: 0}),
-        )
-        self.registers_to_check = len(self._wanted)
+        ))
+        self._read_block = bus.read_i2c_block_data
+        self._settings = settings
+        self._sleep = sleep
 
     def start(self) -> Bma220Identity:
         """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
         self._chip = None
-        self._checked = 0
         chip = find_chip(self._bus, CHIP_ID, self._settings.addresses, "a BMA220")
         try:
             revision = REVISION.read(self._bus, chip)
             self._make_run(SUSPEND, chip)
             self._make_run(SOFT_RESET, chip)
-            for register, values in self._wanted:
-                register.update(self._bus, chip, values)
+            self._write_settings(chip)
         except OSError as error:
             raise bus_fault(error, chip) from error
         self._sleep(SETTLING_S[self._settings.filter_hz])
@@ -181,24 +173,6 @@ class Bma220:
         t_us = now_us()
         return t_us, self.read_raw()
 
-    def check_settings(self) -> None:
-        """SettingsLost when the chip no longer holds what ``start`` wrote, as after a dip of its supply."""
-        for _ in self._wanted:
-            self.check_next()
-
-    def check_next(self) -> None:
-        """Read back one register, each in its turn. SettingsLost when it does not hold what ``start`` wrote; after a
-        transfer that failed it is the same one's turn again."""
-        chip = self._started()
-        register, values = self._wanted[self._checked]
-        try:
-            register.check(self._bus, chip, values)
-        except OSError as error:
-            raise bus_fault(error, chip) from error
-        except BadReply as error:
-            raise SettingsLost(f"BMA220 lost its settings (did its supply dip?): {error}") from error
-        self._checked = (self._checked + 1) % len(self._wanted)
-
     def stop(self) -> None:
         """Suspend the chip if it was running. Never raises: a chip that cannot be told is left as it is."""
         chip, self._chip = self._chip, None
@@ -206,11 +180,6 @@ class Bma220:
             with suppress(OSError, DeviceError):
                 if SUSPEND.flip(self._bus, chip):
                     SUSPEND.flip(self._bus, chip)
-
-    def _started(self) -> int:
-        if self._chip is None:
-            raise NotPresent("the BMA220 has not been started")
-        return self._chip
 
     def _make_run(self, toggle: ToggleRegister, chip: int) -> None:
         """Flip the state until the chip says that it runs, two reads at most."""

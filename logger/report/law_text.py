@@ -10,6 +10,7 @@ from logger.lab.laws.learn import Law, Learning, Nearest
 from logger.lab.selection.add_effect import AddedEffects
 from logger.report.diagnosis_text import JUDGED_ON, looks_like
 from logger.report.quantities import finite, measured, numbers_of, unit_of
+from logger.report.removed_text import removed_json, removed_words
 from logger.report.text_layout import paragraphs
 from logger.vehicle.effect import Chosen
 
@@ -53,7 +54,8 @@ def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
     if found.law is None or addition is None:
         assert found.diagnosis is not None
         said = why_none(found)
-        lines = [paragraphs([f"{said[0].upper()}{said[1:]}."])]
+        removed = removed_words(found.diagnosis.removed, found.diagnosis.band)
+        lines = [paragraphs([*removed, f"{said[0].upper()}{said[1:]}."])]
         lines += [f"  {one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values]
         if shape := looks_like(found.diagnosis):
             lines += ["", paragraphs(shape, "- ")]
@@ -64,7 +66,7 @@ def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
 def sentences(law: Law, addition: AddedEffects) -> list[str]:
     """The law, what it brings, and what it may be instead: paragraphs."""
     said = words(law, addition)
-    lines = [f"Learned: {said}.", _errors(addition)]
+    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
     if law.beside:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Beside it is missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
@@ -137,6 +139,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             "error_after_unseen": diagnosis.steps[-1].error, "noise_floor_error": diagnosis.noise_floor_error,
             "verdict": list(diagnosis.verdict), "unexplained": diagnosis.unexplained,
             "steps": [{"step": one.words, "error": one.error} for one in diagnosis.steps],
+            **removed_json(diagnosis.removed),
         }
     one = learned(law, addition)
     unseen = addition.unseen_after
@@ -158,6 +161,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             "log_likelihood_less": (law.nearest.law_gain - law.nearest.gain) / 2},
         "confused_with": [other.family.name for other in law.rivals],
         "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
+        **removed_json(addition.removed),
         "sentences": sentences(law, addition),
     }
 

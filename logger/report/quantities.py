@@ -82,11 +82,3 @@ def signal_errors(errors: Mapping[str, Sequence[float]], words: str) -> list[str
     """A sentence on the errors of other signals, by name, as many of each as ``words`` has places; none for none."""
     each = "; ".join(f"{name} {words.format(*(f'{one:.3f}' for one in some))}" for name, some in errors.items())
     return [f"Errors of the other signals: {each}."] if each else []
-
-
-def distance_error(off_m: float) -> list[str]:
-    """A sentence on distances that are off by so much at most [m], if that is more than usual; nothing for 0."""
-    if off_m == 0:
-        return []
-    return [f"The distances of these runs are off by more than usual: up to {off_m:.2g} m. The fits take that into "
-            "account."]

@@ -5,6 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
+
+from logger.lab.residuals.removed import Removed
+from logger.lab.residuals.sensor_drift import OFFSET, Drift
 from logger.lab.selection.add_effect import AddedEffects, Number
 from logger.report.add_effect_text import MOVED_HEADS, as_json, bias, errors, judgement, moved_rows
 from logger.store.formats.effect_file import shipped_effects
@@ -14,6 +18,7 @@ from logger.vehicle.uncertain import NumberErrors
 from ..support.lab.runs_with_residual import CAR
 
 EFFECTS = shipped_effects()
+AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.153)
 MASS = Number("sprung_mass_kg", nominal=875.0, without=846.0, without_standard_error=9.8, found=876.0,
               standard_error=7.5, written=874.0)
 TIRE = Number("rear.tire_stiffness_n_per_m", nominal=238180.0, without=300000.0, without_standard_error=3000.0,
@@ -25,7 +30,7 @@ FOUND = AddedEffects(
           chosen(EFFECTS["dry_friction"], EFFECTS["dry_friction"].usual | {"friction_force_n": 84.7}, standard_errors={
               "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")})),
     ("dry_friction",), (STILL, MASS, TIRE), error_before=0.47, error_refitted=0.43, error_after=0.153,
-    error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, distance_error_m=0.0,
+    error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, removed=AS_USUAL,
     errors=NumberErrors({"sprung_mass_kg": 7.5}))
 
 
@@ -42,6 +47,13 @@ def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
     assert judgement(FOUND) == [
         "dry_friction: friction_force_n 85 ± 4 N, transition_velocity_m_per_s 0 m/s.",
         "It helps: the probability that noise alone improves the fit as much is below 1e-9."]
+
+
+def test_what_is_removed_is_said_before_the_effect() -> None:
+    drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
+    found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
+    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2): it is no part of the car")
+    assert as_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
 def test_an_effect_that_does_not_help_is_warned_of() -> None:
@@ -65,7 +77,8 @@ def test_a_number_at_its_bound_was_not_measured() -> None:
 
 
 def test_distances_that_are_off_are_told_of() -> None:
-    assert any("up to 0.34 m" in one for one in judgement(replace(FOUND, distance_error_m=0.34)))
+    assert any("up to 0.34 m" in one for one in judgement(
+        replace(FOUND, removed=replace(AS_USUAL, distance_error_m=0.34))))
 
 
 def test_the_number_that_was_biased_most_is_told_with_how_wrong_it_was() -> None:

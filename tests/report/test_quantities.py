@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logger.report.quantities import chance, distance_error, finite, measured, numbers_of, unit_of
+from logger.report.quantities import chance, finite, measured, numbers_of, unit_of
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 
@@ -70,8 +70,3 @@ def test_units_of_the_effects_that_come_with_ridelog(name: str) -> None:
 
 def test_only_errors_that_are_known_are_kept() -> None:
     assert finite({"a": 1.0, "b": float("inf"), "c": float("nan")}) == {"a": 1.0}
-
-
-def test_distances_are_told_of_only_where_they_are_off() -> None:
-    assert distance_error(0.0) == []
-    assert "up to 0.34 m" in distance_error(0.3412)[0]

@@ -13,7 +13,8 @@ added behind it (no more than the quietest band of the record holds), and B Butt
 on samples (S. Butterworth 1930; A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2). Spectra know
 neither phases nor places: distances that are off by metres do not matter here. Whether B = 1 does as well is then
 asked of the sizes of log S(f): an effect that the model lacks bends a spectrum by some dB, here up, there down, and
-no B makes that good; a filter takes away tens of dB, and with the right B next to nothing is left.
+no B makes that good; a filter takes away tens of dB, and with the right B next to nothing is left. Nor may a sensor
+on a bracket (``sensor_mount_resonance``) together with a longer contact patch (``tire_enveloping``) do as well.
 
 What is a filter, and what a slow sensor? No part of a car or of a sensor falls faster than with the fourth power of
 the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); a rubber mount or a tire's contact
@@ -54,6 +55,8 @@ _WIDTH_HZ, _LOWEST_HZ, _HIGHEST_OF_RATE = 1.5, 1.0, 0.37
 # Cut-offs, orders, gains and shares of the spectrum that may be noise: finer ones change a cut-off by less than 2 %.
 _CUTOFF_STEP, _LEAST_HZ, _MOST_OF_RATE = 0.04, 6.0, 0.45
 _ORDERS = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0])
+_RINGS_AT_HZ, _RINGS_WITH = np.geomspace(8.0, 80.0, 45), np.geomspace(0.02, 0.7, 9)
+_NULLS_HZ = np.append(np.inf, np.geomspace(12.0, 120.0, 14))
 _GAINS, _NOISES = np.array([0.4, 0.7, 1.0, 1.4, 2.0]), 8
 STEEPEST_EFFECT = 2.5
 """A filter of a higher order than this is none that a car or a sensor has."""
@@ -61,6 +64,11 @@ STEEPEST_EFFECT = 2.5
 # on 221 unfiltered runs with every effect, of which none was taken for filtered: where the difference is above 1 dB the
 # factor is 3 at most; of runs that were filtered, at orders of 4 and more and half of 0.38 of the rate, it is 5 to 50.
 _BETTER, _BETTER_DB = 3.5, 1.0
+# A sensor that rides on a spring, over tires that are longer than the model's, may fall as steeply for a while. They do
+# as well as a filter or better where they are the truth (their sizes are 0.2 to 0.87 of a filter's), and a filter does
+# as well or better where it is (0.97 to 20, the least of them with noise behind it); of a run alone they do worse, up
+# to 1.4.
+_NO_WORSE = 0.9
 # One filter for all runs has cut-offs that are so alike in each (their logarithms), and leaves of none more than
 # without it, but for a rounding.
 _ALIKE, _SAME = 0.1, 0.02
@@ -92,11 +100,11 @@ def seen_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list[L
     predictions    (n,) per run, of a model that is about right; where the runs lie does not matter
     """
     fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
-    common = _seen(fits, runs[0].rate_hz)
+    common = _seen(fits, runs[0].rate_hz, common=True)
     if common is not None and all(_goes_with(one, common, runs[0].rate_hz) for one in fits):
         common = replace(common, causal=_is_causal(runs, predictions, common))
         return [common] * len(fits)
-    each = [_seen([one], runs[0].rate_hz) for one in fits]
+    each = [_seen([one], runs[0].rate_hz, common=len(fits) == 1) for one in fits]
     found = [None if one is None else replace(one, causal=_is_causal([run], [prediction], one))
              for one, run, prediction in zip(each, runs, predictions, strict=True)]
     steep = [one for one in found if one is not None and is_steep(one)]
@@ -164,11 +172,14 @@ def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
                         0 < len(filtered) < len(runs))
 
 
-def _seen(fits: Sequence[_Fits], rate_hz: float) -> LowPass | None:
+def _seen(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None:
+    """A filter that some runs went through; ``common``: all that one recorder wrote."""
     plain = sum(one.plain * one.size for one in fits)
     table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
     place = np.unravel_index(int(table.argmin()), table.shape)
     size, left = sum(one.size for one in fits), float(table[place])
+    if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * left:
+        return None
     if plain < _BETTER * left or _DB * (plain - left) < _BETTER_DB * size:
         return None
     return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
@@ -231,10 +242,11 @@ def _goes_with(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """Mean sizes of what is left of log S of a run, of the bands in which there is something: without a filter, and
-    with each (cut-offs, orders); samples."""
+    """Mean sizes of what is left of log S of a run, of the bands in which there is something: without a filter, with
+    the best of what sensors and tires do in place of one, and with each (cut-offs, orders); samples."""
 
     plain: float
+    by_effects: float
     filtered: Array
     size: int
 
@@ -254,7 +266,19 @@ def _fits(run: Run, prediction: Array) -> _Fits:
 
     x = np.tan(np.pi * middles / run.rate_hz) / np.tan(np.pi * _cutoffs_hz(run.rate_hz)[:, None] / run.rate_hz)
     tables = [left(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
-    return _Fits(float(left(made)), np.stack(tables, axis=1), run.count - run.first)
+    by_effects = min(float(left(made * one).min()) for one in _effects_alone(middles))
+    return _Fits(float(left(made)), by_effects, np.stack(tables, axis=1), run.count - run.first)
+
+
+def _effects_alone(f_hz: Array) -> Iterator[Array]:
+    """What sensors and cars make of a record, in power, at frequencies (b,): (n, 1, b) at a time. A sensor that rides
+    on a spring or not, on tires of which each contact length takes out one wavelength, or none."""
+    ratio = f_hz / _RINGS_AT_HZ[:, None, None]
+    tires = np.sinc(f_hz / _NULLS_HZ[:, None, None]) ** 2
+    for damping in 2 * _RINGS_WITH[:, None, None, None] * ratio:
+        for rings in (1 + damping**2) / ((1 - ratio**2) ** 2 + damping**2):
+            yield rings * tires
+    yield tires
 
 
 def _cutoffs_hz(rate_hz: float) -> Array:

@@ -17,13 +17,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.likelihood.distance_error import unusual_m
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import aligned, fit, own_slopes, read_beside
 from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, noise_as_read, signal_errors_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import number_errors, standard_errors
+from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import HoldOut, held_out
 from logger.vehicle.effect import Chosen
@@ -81,7 +81,7 @@ class AddedEffects:
     p_value             how often, at most, noise alone would gain as much
     unseen_before, unseen_after    the model without and with the effects on what its fit did not see; None: not known
     band                what of the runs was compared; None: all of it
-    distance_error_m    by how much a distance is off at most, if that is more than usual; else 0
+    removed             what is taken out of the errors before they are judged: drift, wrong distances
     errors              of the numbers of vehicle and effects together
     signals             errors of signals beside the sensor's acceleration, by name: refitted without and with
     """
@@ -96,7 +96,7 @@ class AddedEffects:
     error_as_written: float
     noise_floor_error: float
     p_value: float
-    distance_error_m: float
+    removed: Removed
     errors: NumberErrors
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     unseen_before: HoldOut | None = None
@@ -162,14 +162,14 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         for name, was, now in zip(prior.names, spread_before, spread_after, strict=True)
     )
     effects, _ = standard_errors(after)
-    state = after.state
+    start, state = posterior.start(present), after.state
     return AddedEffects(
         vehicle, effects, tuple(one.effect.name for one in added), numbers,
-        error_before=posterior.error(posterior.start(present)), error_refitted=posterior.error(before.state),
+        error_before=posterior.error(start), error_refitted=posterior.error(before.state),
         error_after=posterior.error(state), error_as_written=posterior.error(posterior.at(state.effects, state.logs)),
         noise_floor_error=floor_error(posterior, noise_as_read(posterior, state)),
         p_value=probability_by_chance(before.score - after.score, candidates),
-        distance_error_m=unusual_m(posterior.record_errors, state.record), errors=number_errors(after),
+        removed=removed_from(posterior, start.predictions, state), errors=number_errors(after),
         unseen_before=held_out(before, own_slopes(before)), unseen_after=held_out(after, own_slopes(after)),
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state))
 

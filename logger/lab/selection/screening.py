@@ -8,9 +8,10 @@ simulated at a few trial values; what the car's own numbers and the distance err
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -124,6 +125,15 @@ def as_recorded(base: Baseline) -> Baseline:
     return Baseline.of(LinearModel(posterior, there, numbers), as_recorded=True)
 
 
+def taken_out(now: Baseline, name: str) -> Baseline:
+    """A model without one of its effects, all else as it was with it: whatever belongs in the place of that effect is
+    found beside others that have not yet moved to make up for it."""
+    posterior, state = now.posterior, now.state
+    rest = tuple(one for one in state.effects if one.effect.name != name)
+    there = posterior.at(rest, state.logs, state.record, state.size)
+    return Baseline.of(LinearModel(posterior, there, posterior.number_slopes(there, posterior.prior.steps)))
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """An effect at one set of values, and what it would do.
@@ -155,10 +165,19 @@ class Screened:
         return self.trials[0].gain
 
 
-def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Screened:
+def shared_numbers(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """Numbers of an effect that another one has as well, as that one has them, inside their ranges: a resonance that is
+    taken for one thing lies where it lies when it is another one."""
+    return {one.name: min(max(values[one.name], one.low), one.high)
+            for one in effect.parameters if one.moves and one.name in values}
+
+
+def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment],
+             near: Mapping[str, float] = MappingProxyType({})) -> Screened:
     """Trials of an effect on a model.
 
     seen    ways in which the runs may be misaligned
+    near    numbers of an effect in whose place this one is tried
     """
     # Where the distance errors are of a usual size, or none but those of the record, positions are not far wrong.
     anew = base.state.size.is_unusual and not base.as_recorded and not effect.reshapes
@@ -167,6 +186,8 @@ def screened(base: Baseline, effect: Effect, seen: Sequence[Misalignment]) -> Sc
         trials += [values for values in effect.trials(way) if values not in trials]
     prior = base.posterior.prior
     known = [one for one in effect.parameters if one.name in effect.replaces and one.name in prior.names]
+    if shared := shared_numbers(effect, near):
+        trials.append(trials[0] | shared)
     if known:  # where a fit has brought the car's own numbers is worth a trial
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})

@@ -8,10 +8,11 @@ whatever gains most in its place stays, or nothing. The next round begins on tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,7 +22,15 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.candidate_fit import CandidateFit, refined, roughly_fitted
 from logger.lab.selection.evidence import CONFUSED, IMITATION, least_gain
 from logger.lab.selection.holdout import HoldOut
-from logger.lab.selection.screening import Baseline, Screened, as_recorded, misalignment_of_record, screened
+from logger.lab.selection.screening import (
+    Baseline,
+    Screened,
+    as_recorded,
+    misalignment_of_record,
+    screened,
+    shared_numbers,
+    taken_out,
+)
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 from logger.vehicle.effect_parameters import moves_of
 
@@ -79,6 +88,14 @@ class Selection:
     steps: tuple[tuple[str, HoldOut], ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Instead:
+    """One of a model's effects, in whose place others are tried."""
+
+    now: Baseline
+    one: Chosen
+
+
 @dataclass(eq=False)
 class Search:
     """A search among effects, on models that have ``present`` others before them."""
@@ -110,9 +127,10 @@ class Search:
                 break
             self.progress(f"{best.effect.name} is missing; fitting the car with it")
             self._rivals[best.effect.name] = self._alike(now, best.gain, best.effect.name, tried)
-            now = self.refit(best)
-            earlier = [name for name in now.state.names[self.present:] if name != best.effect.name]
-            steps.append((best.effect.name, now.hold_out))
+            now = self._akin_instead(now, self.refit(best))
+            added = now.state.names[-1]
+            earlier = [name for name in now.state.names[self.present:] if name != added]
+            steps.append((added, now.hold_out))
             for name in earlier:
                 now, _ = self._reconsidered(now, name)
         now, gains = self.needed(before, now)
@@ -125,43 +143,51 @@ class Search:
         now, gains = self.needed(found.before, self.without(found.now, name))
         return replace(found, now=now, gains=gains)
 
-    def round(self, now: Baseline, effects: Sequence[Effect], enough: float = 0.0) -> Round:
+    def round(self, now: Baseline, effects: Sequence[Effect], enough: float = 0.0,
+              instead: Instead | None = None) -> Round:
         """Every effect tried on a model; those that realign runs beside these as they were recorded as well, where the
         model lies far from there: what such an effect does may have been taken for a start or a factor of the
         distance.
 
-        enough    what an effect has to gain to count
+        enough     what an effect has to gain to count
+        instead    of which effect; None: of none
         """
         effort = self.effort
         with ThreadPoolExecutor(self.workers) as pool:
-            promises = self._screened(pool, now, effects)
+            near = instead.one.values if instead is not None else {}
+            promises = self._screened(pool, now, effects, near)
             worth = [(now, one) for one in self._worth_fitting(promises, enough)]
+            if instead is not None:
+                there = taken_out(instead.now, instead.one.effect.name)
+                worth += [(there, one) for one in self._worth_fitting(
+                    self._screened(pool, there, effects, near), enough)]
             self._promising |= {one.effect.name for _, one in worth}
             aligning = [one for one in effects if one.realigns]
             if now.state.size.is_unusual and aligning:
                 there = as_recorded(now)
                 worth += [(there, one) for one in self._worth_fitting(self._screened(pool, there, aligning), enough)]
             self.progress(f"fitting {len(worth)} of them")
-            tries = [one for some in pool.map(lambda pair: roughly_fitted(now.score, *pair), worth) for one in some]
+            tries = _roughly_fitted(pool, now.score, worth)
             rough = _best_of_each(tries)
             best = {one.effect.name: one.gain for one in rough[: effort.refined]
                     if one.gain > effort.worth_refining * max(rough[0].gain, enough)}
-            near = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
-            if len(near) == 1 and self.accepted(now, near[0]):
-                near = []  # it stands alone, and is fitted in full where it is chosen
-            self.progress(f"refining {len(near)} of them")
-            fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), near))
+            good = [one for one in tries if one.gain > effort.as_good * best.get(one.effect.name, np.inf)]
+            if len(good) == 1 and self.accepted(now, good[0]):
+                good = []  # it stands alone, and is fitted in full where it is chosen
+            self.progress(f"refining {len(good)} of them")
+            fine = list(pool.map(lambda one: refined(now.score, one, effort.worth_a_round * now.explanation), good))
         # A fit that is much worse than the model without the effect went astray: its promise says more.
-        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in near)])
+        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
                 if one.gain > -least_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
         return Round(tuple(fits), tuple(one for one in promises if one.effect.name not in fitted))
 
-    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect]) -> list[Screened]:
+    def _screened(self, pool: ThreadPoolExecutor, base: Baseline, effects: Sequence[Effect],
+                  near: Mapping[str, float] = MappingProxyType({})) -> list[Screened]:
         """Effects tried beside a model, the most promising first."""
         seen = [self.seen, misalignment_of_record(base)] if base.state.size.is_unusual else [self.seen]
         found = []
-        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, seen), effects), 1):
+        for done, one in enumerate(pool.map(lambda effect: screened(base, effect, seen, near), effects), 1):
             self.progress(f"screened {done} of {len(effects)} effects")
             found.append(one)
         return sorted(found, key=lambda one: -one.gain)
@@ -185,12 +211,14 @@ class Search:
         return max(least_gain(len(self.effects)), IMITATION * without.explanation)
 
     def _simplest(self, now: Baseline, tried: Round) -> CandidateFit | None:
-        """Of those that are there and cannot be told from the likeliest, one that the records show anyhow, or the one
-        with the fewest numbers."""
+        """Of those that are there and cannot be told from the likeliest, the plainest."""
         there = [one for one in tried.fits if self.accepted(now, one)]
         return min((one for one in there if one.gain > there[0].gain - CONFUSED),
-                   key=lambda one: (not one.effect.is_seen(one.chosen.values, self.seen), len(moves_of([one.chosen]))),
-                   default=None)
+                   key=lambda one: self._complexity(one.chosen), default=None)
+
+    def _complexity(self, one: Chosen) -> tuple[bool, int]:
+        """What the records show anyhow is plainest, and then what has the fewest numbers."""
+        return not one.effect.is_seen(one.values, self.seen), len(moves_of([one]))
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """A model without one of its effects, fitted; kept as long as this is the model."""
@@ -215,16 +243,42 @@ class Search:
         posterior = one.found.posterior
         return Baseline.of(fit(aligned(posterior, one.found.state), one.found.numbers))
 
+    def _akin_instead(self, without: Baseline, now: Baseline) -> Baseline:
+        """The model, or one with another effect in the place of the one that was added last, where that has numbers in
+        common with it, and explains more, or as much and is plainer: a sharp resonance promises nothing beside the
+        place where it is, and hardly anything is screened there."""
+        here, gain = now.state.effects[-1], without.score - now.score
+        akin = [one for one in self.effects if one.name not in now.state.names and shared_numbers(one, here.values)]
+        if not akin:
+            return now
+        self.progress(f"is it {here.effect.name}, or {' or '.join(one.name for one in akin)}?")
+        with ThreadPoolExecutor(self.workers) as pool:
+            worth = self._worth_fitting(self._screened(pool, without, akin, here.values), gain)
+            rough = _best_of_each(_roughly_fitted(pool, without.score, [(without, one) for one in worth]))
+            fine = _best_of_each(list(pool.map(partial(refined, without.score), rough)))
+        best = self._simplest(without, Round(tuple(fine), ()))
+        if best is None or not self._outdoes(best, here, gain):
+            return now
+        self._rivals[best.effect.name] = (here.effect.name,) if abs(best.gain - gain) < CONFUSED else ()
+        return self.refit(best)
+
+    def _outdoes(self, other: CandidateFit, one: Chosen, gain: float) -> bool:
+        """Whether an effect in the place of one that gains so much explains more, or as much and is plainer."""
+        plainer = self._complexity(other.chosen) < self._complexity(one)
+        return other.gain > gain + (-CONFUSED if plainer else CONFUSED)
+
     def _reconsidered(self, now: Baseline, name: str) -> tuple[Baseline, float]:
-        """The model with whatever gains most in the place of an effect, of all that any round found worth a fit, which
-        may be the same effect elsewhere; and what it gains."""
+        """The model with whatever gains most in the place of an effect, or as much and is plainer, of all that any
+        round found worth a fit and all that is described by the same numbers, which may be the same effect elsewhere;
+        and what it gains."""
         self.progress(f"is {name} still what it was?")
-        without = self.without(now, name)
+        without, here = self.without(now, name), next(one for one in now.state.effects if one.effect.name == name)
         gain = without.score - now.score
-        tried = self.round(without, [one for one in self.effects if one.name in self._promising and (
-            one.name == name or one.name not in now.state.names)], gain)
+        may_be = [one for one in self.effects if one.name == name or (one.name not in now.state.names and (
+            one.name in self._promising or shared_numbers(one, here.values)))]
+        tried = self.round(without, may_be, gain, Instead(now, here))
         best = self._simplest(without, tried)
-        if best is not None and best.gain > gain + CONFUSED:
+        if best is not None and self._outdoes(best, here, gain):
             now, gain = self.refit(best), best.gain
             self._rivals.pop(name, None)
             name = best.effect.name
@@ -281,6 +335,12 @@ def _raises(now: Baseline, without: Baseline, name: str) -> bool:
 def out_of_sight(posterior: Posterior, one: Chosen) -> bool:
     """Whether an effect is at an end of its range, or resonates above all that the records hold."""
     return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in posterior.runs.runs))
+
+
+def _roughly_fitted(pool: ThreadPoolExecutor, score: float,
+                    worth: Sequence[tuple[Baseline, Screened]]) -> list[CandidateFit]:
+    """All that is worth a fit, each beside its model."""
+    return [one for some in pool.map(lambda pair: roughly_fitted(score, *pair), worth) for one in some]
 
 
 def _best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -36,9 +36,14 @@ NO_EFFECT: tuple[Chosen, ...] = ()
 @cache
 def driven(effects: tuple[str, ...] = (), lasts_s: float = 40.0) -> tuple[list[Run], list[Array]]:
     """Two drives of a car with effects at their usual strength, as a recorder leaves them; and the plain model's."""
+    return driven_with([hidden(name) for name in effects], lasts_s)
+
+
+def driven_with(effects: Sequence[Chosen], lasts_s: float = 40.0) -> tuple[list[Run], list[Array]]:
+    """The same of effects with values."""
     runs = [a_run(f"run{number}", speed, lasts_s, number) for number, speed in enumerate((9.0, 17.0))]
     simulated = SimulatedRuns(runs, 500.0)
-    there = compose(CAR, [hidden(name) for name in effects])
+    there = compose(CAR, list(effects))
     rng = np.random.default_rng(len(effects))
     measured = [measuring(run, one + rng.normal(0, NOISE, run.count))
                 for run, one in zip(runs, simulated.predict(there), strict=True)]
@@ -74,6 +79,16 @@ def test_what_a_car_does_is_no_filter(effects: tuple[str, ...]) -> None:
     runs, predictions = driven(effects)
     assert not [one for one in seen_low_passes(runs, predictions) if one is not None and is_steep(one)]
     assert all(run.facts.pass_band_hz is None for run in with_pass_bands(runs, predictions))
+
+
+@pytest.mark.parametrize("beside", [NO_EFFECT, (hidden("tire_enveloping", contact_patch_m=0.45),),
+                                    (hidden("cg_shift", shift_m=-0.2),)])
+@pytest.mark.parametrize("frequency_hz", [14.0, 20.0, 27.0])
+def test_a_sensor_that_rings_is_no_filter_though_it_falls_as_steeply(frequency_hz: float,
+                                                                     beside: Sequence[Chosen]) -> None:
+    rings = hidden("sensor_mount_resonance", frequency_hz=frequency_hz, damping_ratio=0.11)
+    runs, predictions = driven_with([*beside, rings])
+    assert not [one for one in seen_low_passes(runs, predictions) if one is not None and is_steep(one)]
 
 
 @pytest.mark.parametrize("cutoff_hz", [9.0, 15.0, 22.0, 30.0])

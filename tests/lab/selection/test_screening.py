@@ -11,7 +11,15 @@ from logger.lab.diagnosis import refitted
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.selection.candidate_fit import refined, roughly_fitted
 from logger.lab.selection.evidence import least_gain
-from logger.lab.selection.screening import Baseline, as_recorded, misalignment, scaled_by, screened
+from logger.lab.selection.screening import (
+    Baseline,
+    as_recorded,
+    misalignment,
+    scaled_by,
+    screened,
+    shared_numbers,
+    taken_out,
+)
 from logger.simulation.simulated_runs import SimulatedRuns
 from logger.vehicle.effect import Misalignment
 
@@ -157,3 +165,29 @@ def test_half_an_effect_is_half_way_to_where_it_does_nothing(
 def test_an_effect_that_is_there_or_not_has_no_half() -> None:
     assert scaled_by(hidden("wheel_lift"), 0.5) is None
     assert scaled_by(hidden("tire_enveloping", contact_patch_m=0.2), 0.5) is None
+
+
+def test_a_sharp_resonance_promises_something_only_where_it_is() -> None:
+    """Between two of the places at which it is tried; an effect with the same numbers has found the place."""
+    sharp = hidden("sensor_mount_resonance", frequency_hz=18.2, damping_ratio=0.03)
+    base = fitted(posterior_of(secret_runs([sharp])))
+    alone = screened(base, sharp.effect, [STILL])
+    near = screened(base, sharp.effect, [STILL], {"frequency_hz": 18.2, "damping_ratio": 0.03, "participation": -1.0})
+    assert near.gain > 1.5 * alone.gain and near.gain > 0.9 * base.explanation
+    assert near.trials[0].one.values == pytest.approx({"frequency_hz": 18.2, "damping_ratio": 0.03}, rel=0.05)
+
+
+def test_numbers_that_are_shared_stay_inside_the_range_of_the_effect_that_takes_them() -> None:
+    bending = EFFECTS["body_bending"]
+    assert shared_numbers(bending, {"frequency_hz": 300.0, "mass_kg": 3.0}) == {"frequency_hz": 60.0}
+    assert shared_numbers(EFFECTS["sensor_gain"], {"frequency_hz": 300.0}) == {}
+
+
+def test_a_model_without_one_of_its_effects_has_all_else_as_it_was() -> None:
+    there = [hidden("sensor_offset", offset_m=0.4), hidden("sensor_gain", gain=1.1)]
+    posterior = posterior_of(secret_runs(there))
+    now = refitted(posterior, posterior.start(there))
+    out = taken_out(now, "sensor_gain")
+    assert out.state.names == ("sensor_offset",) and np.array_equal(out.state.logs, now.state.logs)
+    assert out.state.effects[0].values == now.state.effects[0].values
+    assert screened(out, EFFECTS["sensor_gain"], [STILL]).gain > least_gain(len(EFFECTS))
