@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.drives import Run
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult, Shown, table
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.store.formats import record_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_record

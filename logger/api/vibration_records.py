@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.shown import Shown, line, table
+from logger.api.shown import Shown, table
 from logger.api.vehicles import Model
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.store.formats import channel_file
 
