@@ -317,9 +317,13 @@ class Chosen:
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_an_end(self.values[one.name]) for one in shapes)
 
-    def resonates_above(self, high_hz: float) -> bool:
-        """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing."""
-        return any(one.name == _RESONANCE and self.values[one.name] > high_hz for one in self.effect.parameters)
+    def resonates_above(self, high_hz: float, by_flank: bool = False) -> bool:
+        """Whether it is a resonance at a higher frequency than this, of which a record up to there shows nothing.
+
+        by_flank    one that does less the higher it lies, and nothing at last, is seen by what it does below
+        """
+        return any(one.name == _RESONANCE and self.values[one.name] > high_hz and not (by_flank and one.null == np.inf)
+                   for one in self.effect.parameters)
 
     @property
     def p(self) -> SimpleNamespace:

@@ -333,8 +333,11 @@ def _raises(now: Baseline, without: Baseline, name: str) -> bool:
 
 
 def out_of_sight(posterior: Posterior, one: Chosen) -> bool:
-    """Whether an effect is at an end of its range, or resonates above all that the records hold."""
-    return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in posterior.runs.runs))
+    """Whether an effect is at an end of its range, or resonates above all that the records hold; that is seen by what
+    it does below, if at all, and not where a record was filtered, which looks alike."""
+    runs = posterior.runs.runs
+    filtered = any(run.facts.pass_band_hz is not None for run in runs)
+    return one.at_an_end or one.resonates_above(max(run.pass_band_hz[1] for run in runs), by_flank=not filtered)
 
 
 def _roughly_fitted(pool: ThreadPoolExecutor, score: float,

