@@ -5,6 +5,10 @@
     '- CheckFailed     the check a command was asked to make found something wrong; exit 1
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 EXIT_DONE = 0
 EXIT_CHECK_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -26,3 +30,11 @@ class CheckFailed(RidelogError):
     """The check found something wrong."""
 
     exit_status = EXIT_CHECK_FAILED
+
+
+def did_you_mean(found: str, known: Iterable[str]) -> str:
+    """``; did you mean X?`` where a word is nearly one that is known; else nothing."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(found, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""

@@ -13,6 +13,11 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(map(_shown, text))
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things: ``1 file``, ``2,000 files``."""
+    return f"{number:,} {what}{'s' * (number != 1)}"
+
+
 def _shown(character: str) -> str:
     if character.isprintable():
         return character

@@ -9,6 +9,7 @@ from pathlib import Path
 from logger.api.outputs import check_out
 from logger.api.shown import Shown
 from logger.errors import BadInput
+from logger.printable import counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,11 +30,11 @@ class Conversion(Shown):
     damaged_lines: int
 
     def __repr__(self) -> str:
-        said = f"{self.path}: {_count(self.rows, 'window')}"
+        said = f"{self.path}: {counted(self.rows, 'window')}"
         if self.placed < self.rows:
             said += f", {self.rows - self.placed} of them without a position"
         if self.damaged_lines:
-            said += f"; {_count(self.damaged_lines, 'damaged line')} left out ('ridelog verify' lists them)"
+            said += f"; {counted(self.damaged_lines, 'damaged line')} left out ('ridelog verify' lists them)"
         return said
 
 
@@ -64,7 +65,3 @@ def convert(logs: Path | str | Sequence[Path | str], to: Path | str) -> Conversi
         raise BadInput(f"{', '.join(map(str, places))}: expected a log with at least one intact row")
     write_layer(layer, path)
     return Conversion(path, form.name, len(layer.features), layer.placed, sum(one.damaged_lines for one in files))
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"

@@ -13,8 +13,9 @@ import numpy.typing as npt
 from logger.api.bench import Tell, unsaid
 from logger.api.ranges import ADDED, NOISE, NOISE_MPS2, RATE, SPEED, WINDOW
 from logger.api.roads import Profile, read_profile, write_profile
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, car_on, model_of
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.profiles.excitation import Excitation
 from logger.runs import UNKNOWN

@@ -1,8 +1,8 @@
-"""Vibration records of many sensors, and the modes of the structure that they were on."""
+"""The modes of the structure, or the vehicle, that a record was made on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.ranges import COMMON_IRI, COMMON_SPEED_MPS, DECREMENT, IRI, MODAL_METHODS, RESPONSES, SPECTRUM, SPEED
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
+from logger.api.vibration_records import USUAL_METHOD, Channels, Found, Question, name_of, read_channels
 from logger.errors import BadInput
 from logger.store.formats import channel_file
 
@@ -23,91 +24,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-USUAL_METHOD, _SEGMENTS = "ssi", 8
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Channels(channel_file.ChannelRecord, Shown):
-    """A record of c sensors, evenly sampled.
-
-    names      of the channels
-    start_s    time of the first sample [s]; ``rate_hz`` samples a second
-    samples    (n, c), in any unit
-    """
-
-    def __repr__(self) -> str:
-        deviations = self.samples.std(axis=0).tolist()
-        return table("Channels", [
-            ("time", len(self.samples) / self.rate_hz, "s"), ("rate", self.rate_hz, "Hz"),
-            ("samples", len(self.samples), ""),
-            *((f"{name}, standard deviation", one, "") for name, one in zip(self.names, deviations, strict=True))])
-
-    def charts(self) -> Sequence[Chart]:
-        """The channels over time."""
-        from logger.chart_data import Curves
-
-        time_s = self.start_s + np.arange(len(self.samples)) / self.rate_hz
-        return [Curves("Channels", "time [s]", "reading", tuple(
-            line(name, time_s, one) for name, one in zip(self.names, self.samples.T, strict=True)))]
-
-
-def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
-    """Read a CSV record with ``t_s`` and one column per sensor: these columns, or all.
-
-    Raises BadInput (``file:line: expected ..., found ...``) for anything else, and for a column that never moves.
-
-    >>> read_channels(folder / "drive.csv", ["accel_z_mps2"]).samples.shape
-    (1115, 1)
-    """
-    return Channels(**vars(channel_file.read_channels(path, columns)))
-
-
-def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
-    """A record out of arrays (n,) by the names of their channels.
-
-    rate_hz    samples a second; the first was taken at ``start_s`` [s]
-
-    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
-
-    >>> make_channels({"top": [0.0, 1.0, 0.0], "middle": [0.0, 0.5, 0.0]}, rate_hz=100.0).samples.shape
-    (3, 2)
-    """
-    arrays = [np.asarray(one, dtype=np.float64) for one in samples.values()]
-    if not arrays or arrays[0].ndim != 1 or any(one.shape != arrays[0].shape for one in arrays):
-        raise BadInput("channels: expected arrays of one length and one axis")
-    if not (len(arrays[0]) > 1 and rate_hz > 0 and np.isfinite(start_s) and np.isfinite(arrays).all()):
-        raise BadInput("channels: expected two finite values or more in each, and a rate above 0 Hz")
-    return Channels(tuple(samples), start_s, rate_hz, np.stack(arrays, axis=1))
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is asked of a record; as of ``modes``.
-
-    said    how an option is written in a complaint
-    """
-
-    method: str = USUAL_METHOD
-    columns: Sequence[str] | None = None
-    input_column: str | None = None
-    order: int | None = None
-    response: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
-    segments: int | None = None
-    said: Callable[[str], str] = str
-
-    def wrong(self, option: str, words: str) -> BadInput:
-        """The complaint about an option."""
-        return BadInput(f"{self.said(option)}{words}")
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What was found; ``record``: of the sensors alone, the stretch that was looked at."""
-
-    result: ModalResult
-    record: Channels
+_SEGMENTS = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,19 +66,27 @@ def modes(
     record: Channels | Path | str, method: str = USUAL_METHOD, *, columns: Sequence[str] | None = None,
     input_column: str | None = None, order: int | None = None, response: str | None = None,
     from_s: float | None = None, to_s: float | None = None, segments: int | None = None,
+    vehicle: Model | Path | str | None = None, speed_mps: float | None = None,
 ) -> Modes:
     """Natural frequencies, damping ratios and mode shapes of a free decay or of a response to random forces, each with
     its standard deviation. The order and the modes are chosen by rule.
 
-    record          100 samples or more; or its CSV file, as ``read_channels``
+    A drive needs the ``vehicle``: what its sensor reads is coloured by the road, and by the second axle that follows
+    the first. Then the vehicle's springs, dampers and masses are fitted to the spectrum, and the modes are those of the
+    numbers found (``logger.modal.driven_car``).
+
+    record          100 samples or more; or its CSV file, as ``read_channels``; with a vehicle a drive or its folder, as
+                    ``read_run``, or a record of one sensor with ``speed_mps``
     method          era, for a free decay; ssi, ssi-cov, ar, for a random response; n4sid, arx, armax, beside a measured
-                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode
+                    input; fft, peaks of a spectrum; decrement (Eq 5.2 of Blum 2015), for one mode; none with a vehicle
     columns         of the sensors; None: all but the input
     input_column    of a force or motion that was measured, for n4sid, arx and armax
     order           states of the model (lags for ar, arx and armax), 2 or more; None: chosen by rule
     response        "decay" or "random"; None: the record is looked at
     from_s, to_s    stretch to be looked at [s]; None: as long as the record
     segments        of an fft; None: 8
+    vehicle         that was driven, as in ``read_vehicle``; its wheelbase, contact patch and sensor's place are held
+    speed_mps       of a record that does not say it
 
     Raises BadInput for what does not fit together, a record that is too short for it, and as ``read_channels``. Source:
     P. van Overschee and B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
@@ -173,7 +98,7 @@ def modes(
     >>> found.frequency_hz.round(2).tolist(), found.damping_ratio.round(3).tolist()
     ([1.5], [0.02])
     """
-    question = Question(method, columns, input_column, order, response, from_s, to_s, segments)
+    question = Question(method, columns, input_column, order, response, from_s, to_s, segments, vehicle, speed_mps)
     return modes_by(question, found_modes(record, question),
                     "record" if isinstance(record, Channels) else Path(record).name)
 
@@ -249,16 +174,30 @@ def vehicle_modes(
 
 def found_modes(given: channel_file.ChannelRecord | Path | str, question: Question) -> Found:
     """The modes of a record or of a file. BadInput as ``modes``."""
+    from logger.api.driven_modes import modes_of_drive
+
+    if question.vehicle is not None:
+        return modes_of_drive(given, question)
+    if question.speed_mps is not None:
+        raise question.wrong("speed", f": expected {question.said('vehicle')} with it")
     _check(question)
+    _check_stands(given, question)
     record, inputs = _asked(given, question)
     try:
         return Found(_find(question, record, inputs), record)
     except ValueError as error:
-        raise BadInput(f"{_name(given)}: {error}") from None
+        raise BadInput(f"{name_of(given)}: {error}") from None
 
 
-def _name(given: channel_file.ChannelRecord | Path | str) -> str:
-    return "record" if isinstance(given, channel_file.ChannelRecord) else str(given)
+def _check_stands(given: channel_file.ChannelRecord | Path | str, question: Question) -> None:
+    """BadInput for a drive, unless what moved it was measured, or it is said to be a free decay."""
+    drives = (bool({*given.names} & {*channel_file.NOT_SENSORS}) if isinstance(given, channel_file.ChannelRecord) else
+              channel_file.is_drive(given))
+    if drives and question.input_column is None and question.response != "decay":
+        raise BadInput(
+            f"{name_of(given)}: expected {question.said('vehicle')} with a drive: the road, and the second axle that "
+            "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
+            f"looked at with {question.said('response')} decay")
 
 
 def _check(question: Question) -> None:
@@ -287,7 +226,7 @@ def _check(question: Question) -> None:
 
 def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -> tuple[Channels, Array | None]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
-    pushed, name = question.input_column, _name(given)
+    pushed, name = question.input_column, name_of(given)
     at = name if isinstance(given, channel_file.ChannelRecord) else f"{name}:1"
     wished = () if question.columns is None else tuple(question.columns)
     if question.columns is not None and (

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.drives import Run
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult, Shown, table
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.store.formats import record_file
 from logger.store.formats.record_checks import Asked, EvenRecord, even_record
@@ -149,7 +150,7 @@ def comfort(
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
     return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, weighting,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
-                   summary["comfort"], used.weigh(ride.accel_mps2[record_file.VERTICAL], ride.rate_hz), ride.rate_hz,
+                   summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))
 
 

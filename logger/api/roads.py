@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.ranges import IRI, LENGTH, MOST_ROAD_SAMPLES, ROAD_WAVINESS, ROUGHNESS, SPACING
-from logger.api.shown import CommandResult, Shown, line, table
+from logger.api.shown import CommandResult, Shown, table
+from logger.chart_data import line
 from logger.errors import BadInput
 from logger.store.formats import drive_file, profile_file
 

@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from logger.chart_data import Chart, Line
+    from logger.chart_data import Chart
     from logger.report.html import Html
 
 Array = npt.NDArray[np.float64]
-MOST_POINTS = 4000
 Row = tuple[str, object, str]
 """What it is called, a number or words, its unit."""
 
@@ -60,21 +59,6 @@ class CommandResult(Shown):
     def as_json(self) -> dict[str, Any]:
         """The object that the command prints with ``--json``; a copy."""
         return deepcopy(self._json)
-
-
-def line(name: str, x: Array, y: Array) -> Line:
-    """A line of a chart through (n,), (n,); of very many points the lowest and the highest of each stretch, so that no
-    peak is lost and a notebook stays small."""
-    from logger.chart_data import Line
-
-    block = -(-2 * len(x) // MOST_POINTS)
-    if block < 2:
-        return Line(name, x, y)
-    whole = len(y) // block * block
-    rows = y[:whole].reshape(-1, block)
-    ends = np.stack([rows.argmin(axis=1), rows.argmax(axis=1)], axis=1)
-    kept = np.append((np.sort(ends, axis=1) + block * np.arange(len(rows))[:, None]).ravel(), np.arange(whole, len(y)))
-    return Line(name, x[kept], y[kept])
 
 
 def table(title: str, rows: Iterable[Row]) -> str:

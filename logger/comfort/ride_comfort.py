@@ -24,6 +24,7 @@ _RATE_ROUNDING = 1e-3
 class RideComfort:
     """Figures by axis, and what each was weighted by: ``z`` always, ``x`` and ``y`` where all three are combined.
 
+    weighted_mps2  (n,) the weighted vertical acceleration
     daily_hours    hours a day of such riding, for the health values
     left_out       an axis was recorded and not combined
     taken_hz       samples a second that were taken, where they were laid on another grid; None: ``rate_hz``
@@ -33,6 +34,7 @@ class RideComfort:
     daily_hours: float
     axes: dict[str, AxisFigures]
     by: dict[str, Weighting]
+    weighted_mps2: Array
     left_out: bool
     taken_hz: float | None = None
 
@@ -80,11 +82,12 @@ def ride_comfort(
         raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
     if duration_s < SHORTEST_S:
         raise ValueError(f"expected at least {SHORTEST_S:g} s, found {duration_s:.3g} s")
-    axes, by = {"z": axis_figures(weighting.weigh(vertical, rate_hz), rate_hz)}, {"z": weighting}
+    weighted_mps2 = weighting.weigh(vertical, rate_hz)
+    axes, by = {"z": axis_figures(weighted_mps2, rate_hz)}, {"z": weighting}
     others = {axis: accel for axis, accel in accel_mps2.items() if axis != "z" and accel is not None}
     combined = horizontal is not None and len(others) == len("xy")
     if horizontal is not None and combined:
         for axis, accel in others.items():
             axes[axis], by[axis] = axis_figures(horizontal.weigh(accel, rate_hz), rate_hz), horizontal
     hours = daily_hours if daily_hours is not None else duration_s / 3600.0
-    return RideComfort(rate_hz, hours, axes, by, bool(others) and not combined, taken_hz)
+    return RideComfort(rate_hz, hours, axes, by, weighted_mps2, bool(others) and not combined, taken_hz)

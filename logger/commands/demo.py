@@ -18,8 +18,9 @@ from pathlib import Path
 
 from logger.commands.replay import replay
 from logger.errors import EXIT_DONE, BadInput
+from logger.files import replace_bytes
 
-REPORT_NAME = "report.html"
+REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
 DRIVE_DIR, LAB_DIR, FIELD_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field"
 
 
@@ -59,12 +60,15 @@ def _drive(out: Path, as_json: bool) -> None:
     """The drive through the service."""
     from logger.commands.report import write_report
 
-    with resources.as_file(resources.files("logger.demo") / "drive.dump.gz") as dump:
-        outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
+    dump = out / DUMP_NAME
+    out.mkdir(parents=True, exist_ok=True)
+    replace_bytes(dump, (resources.files("logger.demo") / DUMP_NAME).read_bytes())
+    outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
     report = out / REPORT_NAME
     write_report([(log, None) for log in outcome.files], report)
     if as_json:
-        print(json.dumps(outcome.as_json() | {"report": str(report)}))
+        print(json.dumps(outcome.as_json() | {"report": str(report), "dump": str(dump)}))
     else:
         print(outcome.text())
+        print(f"Recording: {dump} (ridelog replay and ridelog extract read it)")
         print(f"Report: {report} (open it in a browser; it needs no network)")

@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bench_arguments(parser)
     parser.add_argument("--all", action="store_true", help=f"list all candidates, not the first {_SHOWN}")
     parser.add_argument("--same-road", action="store_true",
-                        help="no profile is known: two runs or more over one road, at different speeds; only effects "
-                             "that keep the car linear are tried")
+                        help="no profile is known: two runs or more (folders, or drive.csv files) over one road, at "
+                             "different speeds; only effects that keep the car linear are tried")
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="write a page with pictures")
 
 

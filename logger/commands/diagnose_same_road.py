@@ -1,7 +1,7 @@
 """``ridelog diagnose --same-road``: which effect is missing, from drives over one road that nobody measured.
 
-Each RUN is a folder with drive.csv; a profile.csv in it is not read. The runs are drives over the same road at
-different speeds, their distances counted from the same place (to about 3 m); those that were extracted without a
+Each RUN is a drive.csv, or a folder with one; a profile.csv in it is not read. The runs are drives over the same road
+at different speeds, their distances counted from the same place (to about 3 m); those that were extracted without a
 profile count from where each began, and are laid on one distance by their positions. Drives that are plainly over two
 roads are refused. An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives
 tell.
@@ -44,11 +44,13 @@ def run_same_road(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _drives(folders: Sequence[Path]) -> list[tuple[Drive, str]]:
-    """The drives in some folders, and the folders' names. BadInput for a folder that is named twice."""
+def _drives(runs: Sequence[Path]) -> list[tuple[Drive, str]]:
+    """The drives of folders and files, and their names. BadInput for one that is named twice."""
     from logger.store.formats.drive_file import DRIVE, read_drive
     from logger.store.formats.run_file import read_run_facts
 
-    if len({folder.resolve() for folder in folders}) != len(folders) or len(folders) < 2:
+    files = [run / DRIVE if run.is_dir() else run for run in runs]
+    if len({file.resolve() for file in files}) != len(files) or len(files) < 2:
         raise BadInput("--same-road: expected two runs or more, each once")
-    return [(replace(read_drive(folder / DRIVE), facts=read_run_facts(folder)), str(folder)) for folder in folders]
+    return [(replace(read_drive(file), facts=read_run_facts(run)) if run.is_dir() else read_drive(file), str(run))
+            for run, file in zip(runs, files, strict=True)]

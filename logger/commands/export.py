@@ -18,7 +18,7 @@ from pathlib import Path
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.files import read_bounded
-from logger.printable import printable
+from logger.printable import counted, printable
 from logger.service.config import Config, find_config, load_config, load_pairing
 from logger.store.export.export import ExportResult, Progress, export
 from logger.store.export.pairing import OFF, PAIRED_NAME, Pairing
@@ -111,14 +111,14 @@ def _may_be_paired(settings: Path, logs: Path) -> bool:
 
 def summary(result: ExportResult) -> str:
     """What happened, in one line."""
-    there = f"{len(result.copied)} files copied ({result.bytes_copied / 1e6:.1f} MB), " \
-            f"{len(result.already_there)} were there"
+    there = f"{counted(len(result.copied), 'file')} copied ({result.bytes_copied / 1e6:.1f} MB), " \
+            f"{len(result.already_there)} {'was' if len(result.already_there) == 1 else 'were'} there"
     if result.complete and result.unmarked is not None:
         return f"{there}, but the logger cannot remember it, and will not make room: {result.unmarked}"
     if result.complete:
         return there
     reason, _ = Counter(failure.reason for failure in result.failures).most_common(1)[0]
-    return f"{len(result.failures)} files NOT copied: {reason}. {there}"
+    return f"{counted(len(result.failures), 'file')} NOT copied: {reason}. {there}"
 
 
 def screen(result: ExportResult) -> list[str]:

@@ -40,9 +40,11 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from logger.api.outputs import check_out
 from logger.api.ranges import NOISE_MODELS, TRIES, WAVINESS
 from logger.commands.lab_model import add_anyway
 from logger.commands.numbers import add_number
+from logger.commands.pictures import parted, write_picture
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import write_text
 
@@ -92,7 +94,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--skip", type=float, default=SKIP_S, metavar="S",
                         help=f"beginning of each run that is left out [s] (default: {SKIP_S:g})")
     add_anyway(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the vehicle with the fitted values")
+    parser.add_argument("--out", type=Path, metavar="FILE", action="append",
+                        help="write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of what "
+                             "is left and of numbers that err together; once for each")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
@@ -101,6 +105,9 @@ def run(args: argparse.Namespace) -> int:
     from logger.identification.identifiability import NotIdentifiable
 
     _check_given(args)
+    picture, vehicle = parted(args.out)
+    if picture is not None:
+        check_out(picture, args.runs, ())
     try:
         found = _found(args)
     except NotIdentifiable as refusal:
@@ -109,11 +116,16 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(_refusal_json(refusal), allow_nan=False))
         print(f"ridelog: {refusal}", file=sys.stderr)
         return EXIT_CHECK_FAILED
-    if args.out is not None:
-        _write(args.out, found.model, found.fit)
+    if vehicle is not None:
+        _write(vehicle, found.model, found.fit)
+    if picture is not None:
+        from logger.report.identification_charts import charts
+
+        write_picture(picture, "Fitted numbers", ", ".join(map(str, args.runs)), "\n".join(found.lines),
+                      lambda: charts(found.fit))
     print(json.dumps(found.as_json, allow_nan=False) if args.json else "\n".join(found.lines))
-    if args.out is not None and not args.json:
-        print(f"Vehicle: {args.out}")
+    if vehicle is not None and not args.json:
+        print(f"Vehicle: {vehicle}")
     return EXIT_DONE if found.fit.converged else EXIT_CHECK_FAILED
 
 

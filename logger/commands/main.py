@@ -13,7 +13,7 @@ import sys
 from typing import NoReturn
 
 from drivers.errors import DriverError
-from logger.errors import EXIT_BAD_INPUT, RidelogError
+from logger.errors import EXIT_BAD_INPUT, RidelogError, did_you_mean
 from logger.printable import printable
 
 VERBS = {
@@ -24,7 +24,7 @@ VERBS = {
     "verify": "check logs, dumps and exported sticks for damage and gaps",
     "export": "copy finished logs to a USB stick",
     "install": "set up the service on this machine; --dry-run shows every step",
-    "uninstall": "undo install; logs and changed settings stay",
+    "uninstall": "stop the service and remove what install wrote; logs, changed settings and the user stay",
     "report": "make one web page of logs: map, plots, table",
     "sections": "logs in sections of 100 m, 0.1 mi or any length: IRI with its error, condition, comfort",
     "passes": "drives laid over each other: means by place and direction, what changed, places to visit",
@@ -123,5 +123,6 @@ def _without_verb(arguments: list[str]) -> int:
 
         print(f"ridelog {version()}")
         return 0
-    found = "" if options.command is None else f", found {options.command!r}"
+    word = options.command
+    found = "" if word is None else f", found {word!r}{did_you_mean(word, VERBS)}"
     return parser.error(f"expected a command out of {', '.join(VERBS)}{found}")

@@ -5,9 +5,14 @@ random forces; --input names a column with a force or motion that was measured b
 order and the modes are chosen by rule, and what the record does not support is listed as rejected, with the reason.
 
   ridelog modes push.csv --method era
+  ridelog modes drive.csv --vehicle mycar.yaml
   ridelog modes --vehicle mycar.yaml --iri 6 --speed 20
 
-With --vehicle instead of FILE they are those of a vehicle's file with its effects; the standard deviations follow from
+A drive needs the vehicle: the road, and the second axle that follows the first, put peaks into its spectrum that are
+no modes. Its springs, dampers and masses are fitted to the spectrum, and the modes are those of the numbers found;
+wheelbase, contact patch and the sensor's place stay as its file says. A record without speed_mps takes --speed.
+
+With --vehicle and no FILE they are those of a vehicle's file with its effects; the standard deviations follow from
 the standard errors that the file carries. Laws that are not linear are what they come to on a road at a speed.
 """
 
@@ -42,16 +47,19 @@ EXAMPLES = ("five-storey",)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog modes``."""
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="CSV with t_s and one column per sensor")
-    parser.add_argument("--vehicle", metavar="NAME|FILE", help="the modes of a vehicle's file, instead of FILE")
+    parser.add_argument("--vehicle", metavar="NAME|FILE",
+                        help="the modes of a vehicle's file; with a FILE, the vehicle that was driven")
     add_number(parser, "--iri", *IRI, metavar="M_PER_KM",
                help=f"with --vehicle: road for laws that are not linear (default: {COMMON_IRI:g})")
     add_number(parser, "--speed", *SPEED, metavar="MPS",
-               help=f"with --vehicle: speed on it (default: {COMMON_SPEED_MPS:g})")
+               help=f"with --vehicle: speed on it (default: {COMMON_SPEED_MPS:g}); with a FILE: at which it was "
+                    "driven, if it does not say so")
     parser.add_argument("--method", choices=MODAL_METHODS, metavar="NAME",
                         help=f"{', '.join(MODAL_METHODS)} (default: ssi). era suits a free decay, ssi a random "
                              "response, n4sid a measured input; decrement is Eq 5.2, for one mode")
     parser.add_argument("--columns", metavar="A,B,...",
-                        help="columns of the sensors (default: all but t_s and the input)")
+                        help="columns of the sensors (default: all but t_s, the input, and a drive's speed, distance "
+                             "and place)")
     parser.add_argument("--input", metavar="COLUMN", help="column of the measured input, for n4sid, arx and armax")
     parser.add_argument("--order", type=int, metavar="N",
                         help="states of the model (lags for ar, arx and armax; for a free decay the most that are "
@@ -71,12 +79,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog modes``."""
-    from logger.api.modal import USUAL_METHOD, Question, found_modes, modes_by
+    from logger.api.modal import found_modes, modes_by
+    from logger.api.vibration_records import USUAL_METHOD, Question
 
-    if args.vehicle is not None:
+    if args.vehicle is not None and args.file is None:
         return _of_vehicle(args)
-    if args.iri is not None or args.speed is not None:
-        raise BadInput("--iri and --speed: expected --vehicle with them")
+    if args.iri is not None or (args.speed is not None and args.vehicle is None):
+        raise BadInput("--iri and --speed: expected --vehicle with them"
+                       + (", and no FILE with --iri" if args.vehicle is not None else ""))
     if args.example is not None:
         _check_example(args)
         example = _five_storey()
@@ -85,11 +95,12 @@ def run(args: argparse.Namespace) -> int:
     if args.file is None:
         raise BadInput("modes: expected a FILE (try 'ridelog modes --help')")
     method = args.method or USUAL_METHOD
-    if args.diagram is not None and method in (SPECTRUM, DECREMENT):
-        raise BadInput(f"--diagram: expected a method with poles, not --method {method}")
+    if args.diagram is not None and (method in (SPECTRUM, DECREMENT) or args.vehicle is not None):
+        raise BadInput("--diagram: expected a method with poles, not "
+                       + (f"--method {method}" if args.vehicle is None else "--vehicle"))
     columns = None if args.columns is None else [name.strip() for name in args.columns.split(",")]
     question = Question(method, columns, args.input, args.order, args.response, args.from_s, args.to_s, args.segments,
-                        _option)
+                        args.vehicle, args.speed, _option)
     check_picture(args.out, [args.file] + ([] if args.diagram is None else [args.diagram]))
     found = modes_by(question, found_modes(args.file, question), args.file.name)
     if args.diagram is not None:

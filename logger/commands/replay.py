@@ -16,6 +16,7 @@ from typing import Any
 
 from drivers.dump import open_dump
 from logger.errors import BadInput
+from logger.printable import counted
 from logger.service.config import Config, load_config
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 1e6
@@ -83,8 +84,7 @@ class Outcome:
         if self.torn_tail:
             lines.append("The recording was cut short; everything before the cut was played.")
         lines += drive_words(self.receiver, self.known)
-        files = "1 file" if len(self.files) == 1 else f"{len(self.files)} files"
-        lines.append(f"Logs: {self.directory} ({files}, {self.rows} rows)")
+        lines.append(f"Logs: {self.directory} ({counted(len(self.files), 'file')}, {counted(self.rows, 'row')})")
         return "\n".join(lines)
 
 

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import replace_bytes
+from logger.printable import counted
 from logger.report.maps import Way
 from logger.report.page import page
 from logger.report.summary import summarise, summary_json
 from logger.store.formats.road_lines import read_road_lines
-from logger.store.log.log_reader import LoggedFile, find_logs_in, read_logged
+from logger.store.log.log_reader import LoggedFile, find_logs_in, read_found
 
 STREETS = "https://tile.openstreetmap.org/{z}/{x}/{y}.png"
 """Where pictures of streets come from when they are asked for: OpenStreetMap's standard tiles."""
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
                           "summary": summary_json(summarise(records))}))
     else:
-        print(f"Report: {args.out} ({len(records)} windows from {len(files)} file{'s' * (len(files) != 1)})")
+        print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})")
     return EXIT_DONE
 
 
@@ -63,7 +64,7 @@ def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: S
     """
     if out.exists() and not out.is_file():
         raise BadInput(f"{out}: expected the name of a file to write")
-    files = [logged for log, place in logs if (logged := read_logged(log, place)) is not None]
+    files = read_found(logs)
     if not any(file.records for file in files):
         raise BadInput(f"{', '.join(str(log) for log, _ in logs)}: expected a log with at least one intact row")
     try:

@@ -50,9 +50,10 @@ def run(args: argparse.Namespace) -> int:
     picture, table = parted(args.out)
     if table is not None:
         format_of(table)
-    for path in (picture, table):
-        if path is not None:
-            check_out(path, (), [log for log, _ in find_logs_in(args.logs)])
+    if written := [path for path in (picture, table) if path is not None]:
+        read = [log for log, _ in find_logs_in(args.logs)]
+        for path in written:
+            check_out(path, (), read)
     found = sections(args.logs, args.length, args.units, args.route)
     if table is not None:
         write_layer(found.layer(), table)

@@ -25,7 +25,7 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.files import naming, write_text
 
 if TYPE_CHECKING:
-    from logger.chart_data import Curves, Field
+    from logger.chart_data import Chart
     from logger.studies.study import Cell, Result, Study, Table
 
 QUICK_SHARE = 0.1
@@ -83,7 +83,7 @@ def _one(study: Study, args: argparse.Namespace) -> int:
     if args.out is not None:
         from logger.report.study_page import page
 
-        write_text(args.out, page(study, result))
+        write_text(args.out, page(study, result, share=QUICK_SHARE if args.quick else 1.0))
     if args.json:
         print(json.dumps(as_json(study, result), allow_nan=False))
     else:
@@ -109,7 +109,7 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
     for study, found in carry_out_all(chosen, QUICK_SHARE if args.quick else 1.0):
         carried[study.called] = found
         if found.result is not None:
-            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html"))
+            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", QUICK_SHARE if args.quick else 1.0))
         print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
               f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
     write_text(args.out / "index.html", index(known, carried))
@@ -188,9 +188,11 @@ def as_json(study: Study, result: Result) -> dict[str, Any]:
     }
 
 
-def _figure(one: Curves | Field) -> dict[str, Any]:
-    from logger.chart_data import Field
+def _figure(one: Chart) -> dict[str, Any]:
+    from logger.chart_data import Bars, Field
 
+    if isinstance(one, Bars):
+        return {"title": one.title, "value": one.value_name, "bars": [list(bar) for bar in one.bars]}
     told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):
         return {**told, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),

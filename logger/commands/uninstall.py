@@ -1,4 +1,7 @@
-"""Undo 'ridelog install'. Logs, and files that were changed since, stay where they are."""
+"""Stop the service and take away the files that 'ridelog install' wrote, but for those that were changed since.
+
+The logs, the user ridelog who owns them and the program itself stay; --dry-run prints every step and takes none.
+"""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ _NEIGHBOURS, _MUST_HAVE_IT = 4, 3
 _SAME_SD, _SAME_SHARE, _SAME_WIDTH = 3.0, 0.01, 0.3  # standard deviations; of its frequency; of half its width
 _KNOWN_WELL = 6.0
 _MOST_DAMPING = 0.9
-_LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
-_LARGEST_DAMPING_ERROR = 0.15
+LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
+LARGEST_DAMPING_ERROR = 0.15
 _HUM_DAMPING, _NO_DAMPING = 5e-4, 1e-6
 
 
@@ -83,9 +83,9 @@ def _why_not(frequency_hz: float, ratio: float, frequency_std_hz: float, damping
         return "damped so heavily that it hardly swings"
     if ratio < _NO_DAMPING or ratio < min(_HUM_DAMPING, 2 * damping_std):
         return "no damping to be seen: a hum, not a mode"
-    if frequency_std_hz > _LARGEST_FREQUENCY_ERROR * frequency_hz:
+    if frequency_std_hz > LARGEST_FREQUENCY_ERROR * frequency_hz:
         return f"its frequency is uncertain by {frequency_std_hz / frequency_hz:.0%}"
-    if damping_std > _LARGEST_DAMPING_ERROR:
+    if damping_std > LARGEST_DAMPING_ERROR:
         return f"its damping ratio is uncertain by {damping_std:.2f}"
     return ""
 

@@ -20,7 +20,7 @@ from logger.api.lab import AddedEffect, Candidate, Comparison, Diagnosis, Shifte
 from logger.api.lab_loop import LabStory, lab
 from logger.api.learning import LearnedLaw, learn
 from logger.api.logs import Dump, Log, Samples, read_dump, read_log
-from logger.api.modal import Channels, Modes, make_channels, modes, read_channels
+from logger.api.modal import Modes, modes
 from logger.api.passes import RepeatedDrives, passes
 from logger.api.plan import NextDrive, Plan, plan
 from logger.api.rides import Comfort, Record, comfort, read_record
@@ -28,6 +28,7 @@ from logger.api.roads import Iri, Profile, RoadClass, classify, iri, random_road
 from logger.api.same_road import SameRoadDiagnosis, diagnose_same_road
 from logger.api.sections import Sections, sections
 from logger.api.vehicles import EffectInfo, Effects, Model, effects, read_vehicle, vehicles, write_vehicle
+from logger.api.vibration_records import Channels, make_channels, read_channels
 from logger.errors import BadInput
 from logger.identification.identifiability import NotIdentifiable
 

@@ -1,4 +1,4 @@
-"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, falling steps.
+"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, bars, falling steps.
 
 A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
 are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground.
@@ -14,12 +14,12 @@ from textwrap import wrap
 
 import numpy as np
 
-from logger.chart_data import SERIES, Array, Chart, Curves, Field, Line
+from logger.chart_data import SERIES, Array, Bars, Chart, Curves, Field, Line
 from logger.report.html import EMPTY, Html, concatenated, html
 
 WIDTH = 1000
 _ABOUT = 6
-_KEY_PX = 20
+_KEY_PX, _BAR_PX = 20, 24
 _LINE_PX, _LETTER_PX, _MOST_LINES = 15, 7.0, 3
 
 Point = tuple[float, float]
@@ -137,7 +137,28 @@ def nice_step(least: float) -> float:
 
 def chart(one: Chart) -> Html:
     """The figure element of a chart."""
+    if isinstance(one, Bars):
+        return _bars(one)
     return _figure(_CHART, one.title, _field(one) if isinstance(one, Field) else _curves(one))
+
+
+def _bars(one: Bars) -> Html:
+    longest = max((len(name) for name, _ in one.bars), default=0)
+    box = _Box(height=70 + _BAR_PX * len(one.bars), left=min(24 + ceil(_LETTER_PX * longest), 2 * WIDTH // 3), right=90,
+               top=26, bottom=44)
+    values = [0.0, *(value for _, value in one.bars), *([] if one.level is None else [one.level[0]])]
+    low, high = min(values), max(values)
+    frame = _Frame(box, low, high if high > low else low + 1.0, 0.0, 1.0)
+    parts = [frame.columns(_ABOUT), _words(box.right_px, box.height - 6, one.value_name, "end")]
+    for number, (name, value) in enumerate(one.bars):
+        y, ends = box.top + _BAR_PX * number, sorted((frame.x(0.0), frame.x(value)))
+        parts += [_cell(ends[0], y + 3, max(ends[1] - ends[0], 1.0), _BAR_PX - 6, 1.0),
+                  _words(box.left - 8, y + 16, name, "end"), _words(ends[1] + 6, y + 16, f"{value:.3g}")]
+    if one.level is not None:
+        x = frame.x(one.level[0])
+        parts += [html('<path class="level" d="M{:.1f} {}V{}"/>', x, box.top, box.bottom_px),
+                  _words(x, box.top - 8, one.level[1], "middle")]
+    return _figure(box, one.title, parts)
 
 
 def _curves(one: Curves) -> list[Html]:

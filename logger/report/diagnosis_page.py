@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from logger.chart_data import Curves, Line
+from logger.chart_data import Bars, Curves, Line
 from logger.lab.diagnosis import Diagnosis
 from logger.lab.residuals.unexplained import Shape
 from logger.report.charts import Steps, chart, steps_figure
@@ -15,7 +15,7 @@ from logger.report.lab_page import forces_section, spectra_section
 from logger.report.removed_text import drift_tile, removed_section
 from logger.report.residual_text import error_text
 
-_LEAST_SHARE = 0.01
+_LEAST_SHARE, _MOST_BARS = 0.01, 12
 
 
 def page(found: Diagnosis, vehicle: str) -> Html:
@@ -80,7 +80,10 @@ def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Htm
 
 
 def _candidates(found: Diagnosis) -> Html:
-    return (grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
+    bars = Bars("The error with each candidate", "error", tuple(
+        (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
+        (found.baseline_error, "as it stands"))
+    return (chart(bars) + grid(("Effect", "Error", "Chance in noise", "Numbers"), table(found), words=(0, 3))
             + hint("Each tried alone on the model of its round, those that are missing first, then the least likely to "
                    f"be chance. The error is on {JUDGED_ON}; the chance holds for all candidates together."))
 

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from logger.chart_data import CLASS_COLOURS, SERIES, Chart, Curves
+from logger.chart_data import CLASS_COLOURS, SERIES, Bars, Chart, Curves
 from logger.errors import BadInput
 
 ENDINGS = (".png", ".svg", ".pdf")
 _WIDTH_IN, _HEIGHT_IN, _DPI = 8.0, 3.6, 150
+_LEAST_BARS = 5  # fewer leave room below, and are no thicker
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
 
 
@@ -30,9 +31,11 @@ def draw(charts: Sequence[Chart], path: Path) -> None:
     FigureCanvasAgg(figure)
     for one, axes in zip(charts, np.atleast_1d(figure.subplots(len(charts), squeeze=False)[:, 0]), strict=True):
         axes.set_title(one.title, loc="left", fontsize=10, fontweight="bold")
-        axes.set_xlabel(one.x_name)
-        axes.set_ylabel(one.y_name)
-        if isinstance(one, Curves):
+        axes.set_xlabel(one.value_name if isinstance(one, Bars) else one.x_name)
+        axes.set_ylabel("" if isinstance(one, Bars) else one.y_name)
+        if isinstance(one, Bars):
+            _bars(axes, one)
+        elif isinstance(one, Curves):
             _curves(axes, one)
         else:
             shades = axes.pcolormesh(one.x, one.y, np.asarray(one.values), vmin=0.0, vmax=one.top, cmap="Blues_r",
@@ -41,6 +44,16 @@ def draw(charts: Sequence[Chart], path: Path) -> None:
     # A date in the file would make the same result another file.
     about = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[path.suffix.lower()]
     figure.savefig(path, metadata=about)
+
+
+def _bars(axes: Any, one: Bars) -> None:
+    places = np.arange(len(one.bars))
+    axes.barh(places, [value for _, value in one.bars], color=_LINE_COLOURS[0], height=0.7)
+    axes.set_yticks(places, [name.replace(", ", ",\n") for name, _ in one.bars], fontsize=8)
+    axes.set_ylim(max(len(one.bars), _LEAST_BARS) - 0.5, -0.5)
+    if one.level is not None:
+        axes.axvline(one.level[0], color="0.5", linestyle=":", linewidth=1, label=one.level[1])
+        axes.legend(frameon=False, fontsize=8)
 
 
 def _curves(axes: Any, one: Curves) -> None:

@@ -8,6 +8,8 @@ from logger.roads.profile_iri import ProfileIri
 from logger.roads.roughness_words import ride_words, road_kinds
 from logger.store.formats.profile_file import Profile
 
+ROUGHEST_M_PER_KM = 100.0
+"""No road that a car can drive on is as rough: the scale of the World Bank's Technical Paper 46 ends at 24."""
 _HEADS = {"iri_m_per_km": "IRI", "iri_right_m_per_km": "IRI right", "mri_m_per_km": "MRI", "hri_m_per_km": "HRI"}
 
 
@@ -20,7 +22,15 @@ def as_json(result: ProfileIri, profile: Profile) -> dict[str, Any]:
     ]
     resampled = {} if profile.widest_step_m is None else {
         "resampled_to_m": profile.spacing_m, "widest_step_m": profile.widest_step_m}
-    return {**result.row(0), "windows": windows, **resampled}
+    doubts = {"doubts": [{"what": "unit", "words": doubt}]} if (doubt := unit_doubt(result)) else {}
+    return {**result.row(0), "windows": windows, **resampled, **doubts}
+
+
+def unit_doubt(result: ProfileIri) -> str:
+    """What is to be suspected of a profile that is rougher than any road; else nothing."""
+    iri = max(result.row(0).values())
+    return "" if iri <= ROUGHEST_M_PER_KM else (
+        f"Elevation in mm? An IRI of {iri:.4g} m/km is more than any road has; expected elevation_m in metres.")
 
 
 def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
@@ -29,13 +39,15 @@ def lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     roughness = whole.get("mri_m_per_km", whole["iri_m_per_km"])
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
     printed = [f"{name}: {length_m:.2f} m, one sample every {profile.spacing_m * 1000:.4g} mm"]
+    if doubt := unit_doubt(result):
+        printed.append(doubt)
     if profile.widest_step_m is not None:
         printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
     printed += [
         "", ", ".join(f"{_HEADS[key]} {value:.3f}" for key, value in whole.items()) + " m/km",
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
         f"Ride: {ride_words(roughness)}", "",
-        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole),
+        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + "  m/km",
     ]
     for number, window in enumerate(result.windows, start=1):
         start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))

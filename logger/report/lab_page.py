@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from logger.chart_data import Curves, Line
+from logger.chart_data import Curves, Line, line
 from logger.lab.compare import Comparison, Standing
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
@@ -40,7 +40,8 @@ def page(found: Comparison) -> Html:
         heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found), paragraphs(headline(found)),
         section("After the refit", bullets(evidence(found)) + paragraphs([conclusion(found)])),
         removed_section(found.removed, found.band),
-        _worst_place(found.refitted), spectra_section(residuals), _tables(found), _places(found.refitted),
+        whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals), _tables(found),
+        _places(found.refitted),
         forces_section(found.tests.forces), _alignment(found), _tests(found), _numbers(found),
     ])
 
@@ -55,6 +56,17 @@ def _tiles(found: Comparison) -> Html:
 
 
 # --- pictures ---
+
+
+def whole_drives(residuals: ModelResiduals) -> Html:
+    """What was measured and what the model leaves of it, over the whole of each run."""
+    names, drawn = short_names(residuals.runs), []
+    for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
+        time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
+        lines = tuple(line(word, time_s, values[index]) for word, values in (
+            ("measured", residuals.measured), ("what is left", residuals.residual)))
+        drawn.append(chart(Curves(names[run.name], "time in the run [s]", "acceleration [m/s2]", lines)))
+    return section("The whole drive", concatenated(drawn))
 
 
 def _worst_place(standing: Standing) -> Html:

@@ -14,6 +14,7 @@ from importlib import resources
 from typing import Any
 from urllib.parse import urlsplit
 
+from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.document import bullets, data_block, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
@@ -40,6 +41,7 @@ from logger.report.track_views import rank, track_views, windows_table
 from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
+_WEB_MAP = "https://www.openstreetmap.org/"
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
 
@@ -170,8 +172,9 @@ def _numbers(records: Sequence[WindowRecord], places: Sequence[Place]) -> list[i
 def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    return html('<a href="geo:{:.6f},{:.6f}">{}</a>', place.lat_deg, place.lon_deg,
-                place_words(place))
+    lat_deg, lon_deg = f"{place.lat_deg:.6f}", f"{place.lon_deg:.6f}"
+    return html('<a href="geo:{},{}">{}</a> <a href="{}?mlat={}&mlon={}#map=18/{}/{}">map</a>', lat_deg, lon_deg,
+                place_words(place), _WEB_MAP, lat_deg, lon_deg, lat_deg, lon_deg)
 
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
@@ -196,7 +199,7 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
         notes.append(f"{span_words(summary.blind_s)} without any speed are in no distance, no map and no plot.")
     notes += [f"iri_m_per_km: {meaning}"
               for meaning in _different(_inside(file.sidecar or {}, "iri_m_per_km") for file in files)]
-    notes.append(f"{summary.windows} windows from {len(files)} log file{'s' * (len(files) != 1)}")
+    notes.append(f"{counted(summary.windows, 'window')} from {counted(len(files), 'log file')}")
     rows = [(flag, str(count), f"{count / summary.windows:.1%}", FLAG_MEANINGS.get(flag, ""))
             for flag, count in summary.flags.items()]
     flags = (grid(("Flag", "Windows", "Share", "Meaning"), rows, words=(0, 3)) if rows

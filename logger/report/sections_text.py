@@ -11,6 +11,7 @@ import numpy as np
 
 from logger.chart_data import Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
+from logger.printable import counted
 from logger.report.drive_sections import DriveSections
 from logger.roads.iso8608 import iri_class
 from logger.roads.roughness_words import FEDERAL_WORDS
@@ -60,7 +61,7 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: _Units) ->
                          for name in ("known_m", "iri_m_per_km", "iri_std_m_per_km"))
     driven_m = sum(float(one.figures.driven_m.sum()) for one in drives)
     name, unit_m = units.way
-    yield (f"{_count(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {_count(count, 'section')} of "
+    yield (f"{counted(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {counted(count, 'section')} of "
            f"{_length_words(length_m)}")
     total_m = float(known_m.sum())
     if total_m <= 0:
@@ -99,10 +100,6 @@ def _length_words(length_m: float) -> str:
         if abs(units - round(units, 1)) < 1e-6 * units and (name != "km" or units >= 1):
             return f"{units:g} {name}" if name != "ft" or length_m % 1 else f"{length_m:g} m"
     return f"{length_m:g} m"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"
 
 
 # --- for programs ---

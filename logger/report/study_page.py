@@ -24,15 +24,20 @@ _INDEX_STYLE = _STYLE + (
 """On a phone each study is a block, as a row of five columns does not fit."""
 
 
-def page(study: Study, result: Result, contents: str = "") -> Html:
-    """The study as one HTML document; ``contents``: the name of a page beside it that lists all."""
+def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -> Html:
+    """The study as one HTML document.
+
+    contents    the name of a page beside it that lists all
+    share       of its draws and grid points that was computed
+    """
+    quick = [] if share == 1.0 else [f"Quick: with {share:.0%} of the draws and grid points."]
     word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of {study.source}"),
-        paragraphs([word, result.verdict]), *map(_table, result.all_tables),
+        paragraphs([*quick, word, result.verdict]), *map(_table, result.all_tables),
         section("Pictures", concatenated(map(chart, result.pictures))),
         section("How it was made", paragraphs([
-            study.how, f"ridelog study {study.called}{' DIR' if study.data else ''}"])),
+            study.how, f"ridelog study {study.called}{' DIR' * bool(study.data)}{' --quick' * bool(quick)}"])),
         html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
 
 

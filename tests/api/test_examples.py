@@ -117,7 +117,7 @@ def test_each_record_shows_itself(names: dict[str, Any]) -> None:
              ridelog.comfort(run), ridelog.read_log(folder), ridelog.read_dump(names["recording"]),
              ridelog.effects(), ridelog.effects()["roll"], ridelog.compare(names["car"], names["runs"]),
              ridelog.calibrate(names["car"]), ridelog.read_channels(folder / "drive.csv", ["accel_z_mps2"]),
-             ridelog.modes(folder / "drive.csv", columns=["accel_z_mps2"])]
+             ridelog.modes(folder / "drive.csv", columns=["accel_z_mps2"], response="decay")]
     for one in shown:
         assert 2 <= len(repr(one).splitlines()) <= 60
         html = one._repr_html_()
@@ -143,7 +143,7 @@ def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys:
     folder = names["folder"]
     file = {"iri": folder / "profile.csv", **dict.fromkeys(("comfort", "modes"), folder / "drive.csv")}.get(
         command, folder)
-    more = {"iri": [], "comfort": [], "modes": ["--columns", "accel_z_mps2"],
+    more = {"iri": [], "comfort": [], "modes": ["--columns", "accel_z_mps2", "--response", "decay"],
             "identify": ["--vehicle", "rav4-2009", "--free", "sprung_mass_kg"]}.get(command, ["--vehicle", "rav4-2009"])
     assert main([command, str(file), *more, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
@@ -151,7 +151,7 @@ def test_the_object_is_the_commands(command: str, names: dict[str, Any], capsys:
              "estimate": lambda: ridelog.estimate(file, "rav4-2009"),
              "identify": lambda: ridelog.identify("rav4-2009", file, ["sprung_mass_kg"]),
              "compare": lambda: ridelog.compare("rav4-2009", file),
-             "modes": lambda: ridelog.modes(file, columns=["accel_z_mps2"])}[command]()
+             "modes": lambda: ridelog.modes(file, columns=["accel_z_mps2"], response="decay")}[command]()
     assert json.loads(json.dumps(found.as_json())) == printed
     assert main([command, str(file), *more]) == 0
     assert capsys.readouterr().out.rstrip() == repr(found).rstrip()

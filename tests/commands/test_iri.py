@@ -89,7 +89,7 @@ def test_a_person_sees_a_table_and_words(
     assert [line.endswith("partial") for line in lines[-3:]] == [False, False, True]
     assert main(["iri", str(two_tracks[0])]) == 0
     heads = capsys.readouterr().out.splitlines()[6]
-    assert heads.split() == ["from", "m", "to", "m", "IRI", "IRI", "right", "MRI", "HRI"]
+    assert heads.split() == ["from", "m", "to", "m", "IRI", "IRI", "right", "MRI", "HRI", "m/km"]
 
 
 def uneven(path: Path, elevation: np.ndarray) -> Path:

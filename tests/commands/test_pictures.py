@@ -26,6 +26,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["road", "generate", "--class", "C", "--length", "300", "--out", str(place / "road.csv")]) == 0
     assert main(["simulate", "--vehicle", "rav4-2009", "--profile", str(place / "road.csv"), "--speed", "15",
                  "--out", str(place / "drive.csv")]) == 0
+    rows = (place / "drive.csv").read_text().splitlines()
+    (place / "record.csv").write_text("".join(",".join(row.split(",")[:2]) + "\n" for row in rows))
     return place
 
 
@@ -33,7 +35,7 @@ COMMANDS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
     "iri": (["iri", "road.csv"], ["Roughness", "25 ft, continuous", "Profile"]),
     "classify": (["road", "classify", "road.csv"], ["Spectrum of the road", "A | B", "G | H", "class      C"]),
     "comfort": (["comfort", "drive.csv"], ["Running r.m.s. over 1 s", "a_w", "Spectrum of the weighted acceleration"]),
-    "modes": (["modes", "drive.csv", "--columns", "accel_z_mps2"], ["Stabilisation diagram"]),
+    "modes": (["modes", "record.csv"], ["Stabilisation diagram"]),
     "estimate": (["estimate", "drive.csv", "--vehicle", "rav4-2009"], ["Roughness from acceleration", "estimate"]),
     "simulate": (["simulate", "--vehicle", "rav4-2009", "--profile", "road.csv", "--speed", "12", "--out", "again.csv"],
                  ["Simulated drive", "acceleration [m/s2]"]),
@@ -78,7 +80,7 @@ def test_the_same_result_is_the_same_file(folder: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(("words", "complaint"), [
     (["iri", "road.csv", "--out", "road.csv"], "--out road.csv: expected a file that ends in one of .html, .png, .svg"),
     (["iri", "road.csv", "--out", "nowhere/x.png"], "expected a file in a folder that there is"),
-    (["modes", "drive.csv", "--columns", "accel_z_mps2", "--method", "fft", "--out", "x.png"],
+    (["modes", "record.csv", "--method", "fft", "--out", "x.png"],
      "--out x.png: expected a result with pictures, found one without; .html holds its words"),
     (["estimate", "drive.csv", "--vehicle", "rav4-2009", "--out", "drive.csv.png", "--profile-out", "drive.csv.png"],
      "--profile-out drive.csv.png: expected every file to be another one"),
@@ -116,3 +118,28 @@ def test_a_logarithmic_axis_puts_powers_of_ten_at_even_steps() -> None:
     for label in (">0.1<", ">1<", ">10<", ">100<", ">0.01<"):
         assert label in drawn
 
+
+
+def test_a_fit_has_its_residuals_and_correlations(tmp_path: Path) -> None:
+    car = ridelog.read_vehicle("golden-car")
+    road = ridelog.random_road(iso_class="B", length_m=150.0)
+    ridelog.write_run(tmp_path / "run", ridelog.simulate(car, road, 15.0, noise_mps2=0.05))
+    out, vehicle = tmp_path / "fit.html", tmp_path / "fitted.yaml"
+    names = "front.suspension_stiffness_n_per_m,front.suspension_damping_n_s_per_m"
+    assert main(["identify", str(tmp_path / "run"), "--vehicle", "golden-car", "--free", names, "--out", str(out),
+                 "--out", str(vehicle)]) == 0
+    text = out.read_text("utf-8")
+    assert "Autocorrelation of the residuals" in text
+    assert "Numbers that err together" in text
+    assert names.replace(",", ", ") in text
+    assert "fitted by ridelog identify" in vehicle.read_text("utf-8")
+
+
+def test_white_residuals_stay_in_the_band() -> None:
+    from logger.report.identification_charts import _left
+
+    white = [np.random.default_rng(seed).standard_normal(4000) for seed in (1, 2)]
+    curves = _left(white)
+    found, band = curves.lines[0].y, curves.lines[1].y
+    assert 0.88 <= float((abs(found) < band).mean()) <= 1.0
+    assert band[0] == pytest.approx(1.96 / np.sqrt(8000), rel=1e-3)

@@ -60,9 +60,9 @@ def test_pictures_hold_finite_numbers_and_what_they_promise(found: Comparison) -
     html = page(found)
     assert not re.search(r"\b(nan|inf)\b", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html)
-    assert len(captions) == 7  # place in time, two spectra, the road, force by rate and by travel, alignment
+    assert len(captions) == 10  # three drives, two spectra, the road, force by rate and travel, alignment
     assert any("By speed of the suspensions: would explain" in one for one in captions)
-    assert html.count("<svg") == 7
+    assert html.count("<svg") == 10
     drawn = re.findall(r'<path class="thick[^"]*" d="M([^"]*)"', html)
     assert drawn and all(len(one.split()) >= 2 for one in drawn)
 

@@ -320,3 +320,14 @@ def test_streets_are_asked_for_only_where_they_were_wished(chromium: Any, tmp_pa
     requests = [line for line in asked if line.startswith("request")]
     assert requests
     assert all(re.fullmatch(r"request: https://tiles\.invalid/\d+/\d+/\d+\.png", line) for line in requests)
+
+
+def test_places_that_lie_close_together_share_a_mark(open_page: Open) -> None:
+    rough = {number: {"iri_m_per_km": 30.0 - number / 100} for number in (20, 30, 40, 50, 900)}
+    tab = open_page(rows_of_drive(1000, rough))
+    marks = tab.locator("#map").get_attribute("data-marks").split(", ")
+    numbers = [one.split(" +")[0].split() for one in marks]
+    more = sum(int(one.split(" +")[1]) for one in marks if " +" in one)
+    assert len(marks) < 5
+    assert sum(map(len, numbers)) + more == tab.locator("#places [data-window]").count()
+    assert numbers[-1][0] == "1"

@@ -34,13 +34,43 @@ function write(ink, text, x, y, {align = "left", colour = colours.soft, halo = c
   ink.fillText(text, x, y);
 }
 
-// A small disc with a number.
-function mark(ink, x, y, text) {
-  circle(ink, x, y, 8.5, colours.ground, colours.ink, 1.5);
+const MARK_PX = 8.5, MARK_NUMBERS = 3;
+
+// Numbered spots [{x, y, number}], the first the most important, as small discs. Those whose discs would touch share
+// one at the first of them, which says the first few numbers and how many more.
+function mark(ink, spots) {
   ink.font = '650 11px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif';
-  ink.textAlign = "center";
-  ink.fillStyle = colours.ground;
-  ink.fillText(text, x, y + 4);
+  const sized = ({x, y, numbers}) => {
+    const more = numbers.length - MARK_NUMBERS;
+    const text = numbers.slice(0, MARK_NUMBERS).join(" ") + (more > 0 ? ` +${more}` : "");
+    return {x, y, numbers, text, half: numbers.length > 1 ? ink.measureText(text).width / 2 - 3 : 0};
+  };
+  const touch = (a, b) => Math.abs(a.y - b.y) < 2 * MARK_PX && Math.abs(a.x - b.x) < a.half + b.half + 2 * MARK_PX;
+  const groups = [];
+  for (const {x, y, number} of spots) {
+    let group = sized({x, y, numbers: [number]});
+    for (let k; (k = groups.findIndex(one => touch(one, group))) >= 0;) {
+      const [one] = groups.splice(k, 1), first = one.numbers[0] < group.numbers[0] ? one : group;
+      group = sized({...first, numbers: [...one.numbers, ...group.numbers].sort((a, b) => a - b)});
+    }
+    groups.push(group);
+  }
+  groups.sort((a, b) => a.numbers[0] - b.numbers[0]);
+  for (const {x, y, half, text} of groups.reverse()) {  // the first comes last, on top
+    ink.beginPath();
+    ink.arc(x - half, y, MARK_PX, Math.PI / 2, 1.5 * Math.PI);
+    ink.arc(x + half, y, MARK_PX, 1.5 * Math.PI, Math.PI / 2);
+    ink.closePath();
+    ink.fillStyle = colours.ink;
+    ink.fill();
+    ink.strokeStyle = colours.ground;
+    ink.lineWidth = 1.5;
+    ink.stroke();
+    ink.textAlign = "center";
+    ink.fillStyle = colours.ground;
+    ink.fillText(text, x, y + 4);
+  }
+  return groups.map(({text}) => text);
 }
 
 function circle(ink, x, y, radius, edge, inside, width) {

@@ -173,10 +173,9 @@ class Curves {
 
   drawPlaces(ink, y) {
     const {windows, data} = this.report;
-    data.places.forEach((i, number) => {
-      const x = this.px(windows.middle(i));
-      if (x >= this.left && x <= this.right) mark(ink, x, y(windows.iri_m_per_km[i]), String(number + 1));
-    });
+    const spots = data.places.map((i, n) => (
+      {x: this.px(windows.middle(i)), y: y(windows.iri_m_per_km[i]), number: n + 1}));
+    mark(ink, spots.filter(({x}) => x >= this.left && x <= this.right));
   }
 
   // A strip below: what carries a flag, and what has no value.

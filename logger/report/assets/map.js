@@ -96,8 +96,8 @@ class TrackMap {
     clearTimeout(this.resting);
     if (grown !== 1) this.resting = setTimeout(() => this.repaint(), REST_MS);
     this.drawEnds(ink);
-    this.drawPlaces(ink);
     this.drawWorst(ink);
+    this.drawPlaces(ink);
     this.drawScale(ink, width, height);
   }
 
@@ -274,10 +274,8 @@ class TrackMap {
 
   drawPlaces(ink) {
     const {windows, data} = this.report;
-    for (let number = data.places.length; number > 0; number--) {  // the worst comes last, on top
-      const i = data.places[number - 1];
-      if (windows.hasPlace(i)) mark(ink, this.left(windows.x[i]), this.top(windows.y[i]), String(number));
-    }
+    const spots = data.places.map((i, n) => ({x: this.left(windows.x[i]), y: this.top(windows.y[i]), number: n + 1}));
+    this.place.dataset.marks = mark(ink, spots.filter((_, n) => windows.hasPlace(data.places[n]))).join(", ");
   }
 
   drawScale(ink, width, height) {

@@ -13,6 +13,7 @@ from logger.dsp.repeated_samples import find_repeats
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.store.formats.csv_table import parse_columns
+from logger.store.formats.drive_file import DISTANCE, PLACE, SPEED, USABLE, header_of
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz
 
 Array = npt.NDArray[np.float64]
@@ -20,6 +21,9 @@ Array = npt.NDArray[np.float64]
 MAX_VALUE = 1e12  # beyond it, squares lose their digits
 MAX_CHANNELS = 64
 LONGEST_NAME = 100
+NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)
+"""Columns of a drive that say where and how the car went."""
+_STANDING_M = 1.0  # a receiver that stands wanders by more, a wheel's counter by less
 
 
 @dataclass(frozen=True)
@@ -33,15 +37,17 @@ class ChannelRecord:
 
 
 def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
-    """Read a CSV record: the named columns in that order, or all but ``t_s``.
+    """Read a CSV record: the named columns in that order, or all but ``t_s`` and what is no sensor of a drive.
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
     file = str(path)
     wished = ",".join(only) if only else "CHANNEL[,CHANNEL...]"
+    if no_sensors := [name for name in only if name in NOT_SENSORS]:
+        raise BadInput(f"{file}:1: expected columns of sensors, found {no_sensors[0]}, which says how the car went")
 
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
-        wanted = tuple(only) or tuple(name for name in names if name != TIME)
+        wanted = tuple(only) or tuple(name for name in names if name not in (TIME, *NOT_SENSORS))
         good = names.count(TIME) == 1 and wanted and all(_is_name(name) and names.count(name) == 1 for name in wanted)
         return (TIME, *wanted) if good and len(wanted) <= MAX_CHANNELS else None
 
@@ -61,6 +67,16 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     if repeats := find_repeats(samples):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
+
+
+def is_drive(path: Path | str) -> bool:
+    """Whether a CSV record is of a car that went somewhere: its speed or its distance says so. BadInput as above."""
+    how = tuple(name for name in header_of(Path(path)) if name in (SPEED, DISTANCE))
+    if not how:
+        return False
+    _, table = parse_columns(read_bounded(path, MAX_BYTES), str(path), lambda _: how, ",".join(how))
+    return any(float(np.ptp(one) if name == DISTANCE else one.max()) > _STANDING_M
+               for name, one in zip(how, table.T, strict=True))
 
 
 def _is_name(name: str) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.errors import BadInput
+from logger.errors import BadInput, did_you_mean
 from logger.plugins import blamed_on, catalogue, offered_by
 from logger.store.formats.yaml_nodes import Node
 from logger.vehicle.effect import Chosen, Effect, Parameter, VehicleEffect, chosen
@@ -114,7 +114,8 @@ def _read_effect(node: Node, vehicle: Vehicle) -> Chosen:
     for key, value in errors.items():
         if key not in parameters:
             raise BadInput(f"{value.file}:{value.line}: expected one of the parameters "
-                           f"{', '.join(parameters) or '(there are none)'}, found {key!r}")
+                           f"{', '.join(parameters) or '(there are none)'}, found {key!r}"
+                           f"{did_you_mean(key, parameters)}")
     return chosen(effect, values, file=file,
                   standard_errors={key: value.number(low=0.0) for key, value in errors.items()})
 

@@ -204,7 +204,8 @@ def _true_rate_hz(repeats: Repeats, t_s: Array) -> float:
 
 
 def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
-    """What makes one doubt that samples (n, axes) are in m/s2. BadInput where they are in g: gravity is in them."""
+    """What makes one doubt that samples (n, axes) are in m/s2. BadInput where they are in g, as gravity is in them, or
+    are all 0."""
     counted = samples if moving is None or not moving.any() else samples[moving]
     mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
     for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
@@ -212,6 +213,9 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
                            "has it: --unit g takes them as g, --unit mps2 as they are")
     if np.ptp(counted[:, 0]) == 0.0:
+        if counted[0, 0] == 0.0:
+            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
+                           "shows some noise at least; check that it was read")
         return [Doubt("constant", f"every sample is {counted[0, 0]:.4g} m/s2: a sensor that works shows some noise at "
                       "least; check that it was read", {"value_mps2": float(counted[0, 0])})]
     if moving is not None and not moving.any():

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import yaml
 
 from drivers.errors import shortened
 from drivers.plain_yaml import NotPlainError, compose_plain
-from logger.errors import BadInput
+from logger.errors import BadInput, did_you_mean
 from logger.files import read_bounded
 
 MAX_BYTES = 256 * 1024
@@ -33,7 +33,8 @@ class Node:
     """One value of a YAML file and the line where it stands (that of its key, inside a mapping).
 
     content is the text of a scalar as written, a tuple of nodes, or a dict from key to node (in the file's
-    order). ``plain`` tells an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``).
+    order). ``plain`` tells an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``). ``key`` is what it
+    stands under in the file; empty: it is the whole, or one of a list.
     Each asking method raises BadInput when the value is something else.
     """
 
@@ -41,10 +42,13 @@ class Node:
     line: int
     content: str | tuple[Node, ...] | Mapping[str, Node]
     plain: bool = False
+    key: str = ""
 
     def wrong(self, expected: str) -> BadInput:
-        """The error to raise for this node: ``file:line: expected <expected>, found <what stands there>``."""
-        return BadInput(f"{self.file}:{self.line}: expected {expected}, found {self._shown()}")
+        """The error to raise for this node: ``file:line: expected <expected>, found <what stands there>
+        [for <key>]``."""
+        key = f" for {shortened(self.key)}" if self.key else ""
+        return BadInput(f"{self.file}:{self.line}: expected {expected}, found {self._shown()}{key}")
 
     def _shown(self) -> str:
         if isinstance(self.content, str):
@@ -68,7 +72,7 @@ class Node:
         for key, node in self.content.items():
             if known and key not in known:
                 raise BadInput(f"{self.file}:{node.line}: expected one of the keys {', '.join(known)}, "
-                               f"found {shortened(key)}")
+                               f"found {shortened(key)}{did_you_mean(key, known)}")
         for key in required:
             if key not in self.content:
                 raise BadInput(f"{self.file}:{self.line}: expected the key {key!r} here, it is missing")
@@ -172,5 +176,5 @@ def _convert(node: yaml.Node, file: str, line: int) -> Node:
             raise BadInput(f"{file}:{key_line}: expected a word as key")
         if key.value in content:
             raise BadInput(f"{file}:{key_line}: expected each key once, {shortened(key.value)} stands here again")
-        content[key.value] = _convert(value, file, key_line)
+        content[key.value] = replace(_convert(value, file, key_line), key=key.value)
     return Node(file, line, content)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.disk import FileSystem
+from logger.printable import counted
 from logger.records import WindowRecord
 from logger.store.log.atomic_file import name_of_temporary, replace_file, write_temporary
 from logger.store.log.intact_rows import Hole, IntactRow, IntactRows, Tally, take_tally, without_utc
@@ -58,14 +59,10 @@ class Repaired:
         """What was done, in a sentence."""
         if self.problem:
             return f"{self.part.name} could not be repaired: {self.problem}"
-        damaged = _counted(self.tally.damaged_lines, "damaged line") + " and a torn one" * self.tally.torn_tail
+        damaged = counted(self.tally.damaged_lines, "damaged line") + " and a torn one" * self.tally.torn_tail
         if self.finished is None:
             return f"removed {self.part.name}: no intact row, {damaged}"
-        return f"finished {self.finished.name}: {_counted(self.tally.rows, 'row')}; left out {damaged}"
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
+        return f"finished {self.finished.name}: {counted(self.tally.rows, 'row')}; left out {damaged}"
 
 
 def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> list[Repaired]:

@@ -1,0 +1,282 @@
+"""Modes of a car out of its reading on roads that nobody measured: the car's numbers, fitted to the spectrum.
+
+Problem: what a sensor in a car reads is no response to white forces. Its spectrum is that of the road, which falls by
+w, seen through the car at two axles: where the wave of one axle meets that of the other half a turn late the reading is
+nearly nothing, at odd multiples of half the speed over the wheelbase. A method that knows neither takes the hills
+between these gaps for modes. Solution: wheelbase, contact patch and the sensor's place are known of the vehicle, so the
+spectrum of a reading at speed v is known but for the car's springs, dampers, masses and the road's two numbers,
+
+    S(f) = g |sum_a H_a(f) exp(-2 pi i f d_a / v)|^2 sinc^2(f c / v) (f / v)^-w / v + s^2
+
+These are fitted, and the modes are those of the car with the numbers found. Pieces of the record have a level g each;
+the speed within a piece is mixed as it was driven (R. Dahlhaus, Ann. Statist. 25, 1997, 1). Each periodogram is
+compared with its own expectation, which leakage is a part of (A. Sykulski et al., Biometrika 106, 2019, 251), by
+Whittle's likelihood. Tapered pieces that overlap tell less than they are many; the likelihood is weighted for that.
+
+Every number starts at the vehicle's and is believed to lie within a factor of some ``exp(0.5)`` of it, so that what the
+reading does not show keeps a large standard error, and its mode is not reported. Damping cannot come out negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from logger.modal.mode import FoundMode, ModalResult, Rejected
+from logger.modal.stabilisation import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR
+from logger.roads.iso8608 import HIGHEST_CPM
+from logger.vehicle.frequency_response import AxleResponse
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import modes as modes_of
+from logger.vehicle.modes import vibrating
+from logger.vehicle.named_parameters import AXLES, changed, free, read
+from logger.vehicle.named_parameters import names as names_of
+from logger.vehicle.vehicle import Vehicle
+
+Array = npt.NDArray[np.float64]
+
+# A piece holds some ten of a body's slowest swings; its lowest bins are those of drift and of the offset.
+_PIECE_S, _LOWEST_BIN = 10.0, 4
+_FLAT_TO, _HIGHEST_HZ = 0.38, 25.0  # of the rate: above, recorders' filters differ; wheels hop below 20 Hz
+LEAST_PIECES = 4
+_SPEED_STEP = 0.01  # speeds as near as this share one spectrum
+_STANDING_MPS = 2.0  # slower, engine and driver shake a car as much as the road does
+_KERNEL = 6  # half bins to each side that a Hann taper mixes
+_USUAL_WAVINESS, _WAVINESS_SPREAD, _PIVOT_CPM = 2.0, 0.5, 0.2
+_SPREAD, _NOISE_SPREAD = 0.5, 3.0  # of logarithms; the noise starts at the quietest bin
+_FLOORS = (0.0, -2.0)  # of logarithms, over the mean power
+_MOST_STEPS, _LONGEST_STEP, _AT_REST, _HALVINGS = 60, 0.3, 1e-3, 12
+_DERIVATIVE_STEP = 1e-4
+# Bands in which measured and fitted spectrum are compared, and what is no chance and no trifle.
+_BANDS, _MOST_MISFIT, _SURE = 12, 0.2, 4.0
+
+
+class UnlikeCar(ValueError):
+    """A reading whose spectrum is not that of the vehicle on a random road."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Periodograms of the pieces of a record.
+
+    power        (j, f) one-sided [unit^2/Hz]; ``bins`` (f,) whole numbers of ``step_hz``
+    shares       (j, c) of each piece's time at each of ``speeds_mps`` (c,)
+    kernel       (2 k + 1,) what a bin takes of the half bins around it
+    worth        (j, f) independent periodograms in each value; 0 where nothing is known of the road
+    """
+
+    power: Array
+    bins: npt.NDArray[np.int64]
+    step_hz: float
+    shares: Array
+    speeds_mps: Array
+    kernel: Array
+    worth: Array
+
+
+def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float) -> Pieces:
+    """Cut a record (n,) into tapered pieces that overlap by half, of which each has readings, and moves, all along.
+
+    ValueError for fewer than four.
+    """
+    count = 2 * round(_PIECE_S * rate_hz / 2)
+    taper = np.hanning(count + 1)[:count]
+    fit = usable & (speed_mps >= _STANDING_MPS)
+    starts = [at for at in range(0, len(samples) - count + 1, count // 2) if fit[at:at + count].all()]
+    if len(starts) < LEAST_PIECES:
+        raise ValueError(f"expected at least {LEAST_PIECES} stretches of {_PIECE_S:g} s, each half over the last, at "
+                         f"{_STANDING_MPS:g} m/s or faster, found {len(starts)}")
+    index = np.array(starts)[:, None] + np.arange(count)
+    cut = samples[index] - samples[index].mean(axis=1, keepdims=True)
+    power = np.abs(np.fft.rfft(cut * taper, axis=1)) ** 2 * 2 / (rate_hz * float(taper @ taper))
+    bins = np.arange(_LOWEST_BIN, int(min(_FLAT_TO * rate_hz, _HIGHEST_HZ) * count / rate_hz) + 1)
+    cells = np.round(np.log(speed_mps[index]) / _SPEED_STEP).astype(np.int64)
+    known, where = np.unique(cells, return_inverse=True)
+    where = where.reshape(cells.shape)
+    weights = taper**2 / float(taper @ taper)
+    shares = np.array([np.bincount(one, weights, len(known)) for one in where], dtype=np.float64)
+    kernel = np.abs(np.fft.fft(taper, 2 * count)) ** 2
+    kernel = np.concatenate([kernel[-_KERNEL:], kernel[:_KERNEL + 1]])
+    both = taper[:count // 2] ** 2 + taper[count // 2:] ** 2  # what two pieces make of an instant
+    worth = float(both.mean() ** 2 / (both**2).mean()) / 2
+    waves = bins * (rate_hz / count) / speed_mps[index].min(axis=1)[:, None]
+    return Pieces(power[:, bins], bins, rate_hz / count, shares,
+                  np.asarray(np.bincount(where.ravel(), speed_mps[index].ravel()) / np.bincount(where.ravel())),
+                  kernel / kernel.sum(), np.where(waves <= HIGHEST_CPM, worth, 0.0))
+
+
+class CarOnRoads:
+    """The expected periodograms by all numbers but the levels: logarithms (p,) of the car's, the waviness, ln s^2."""
+
+    def __init__(self, vehicle: Vehicle, pieces: Pieces, rate_hz: float) -> None:
+        free_numbers = [free(vehicle, name) for name in fitted_names(vehicle)]
+        self.car, self.pieces = AxleResponse(vehicle, free_numbers, rate_hz), pieces
+        self._half_hz = pieces.step_hz / 2 * np.arange(2 * pieces.bins[0] - _KERNEL, 2 * pieces.bins[-1] + _KERNEL + 1)
+        quietest = float(np.log(pieces.power.mean(axis=0).min()))
+        self.names = [one.name for one in free_numbers]
+        self.start = np.array([*np.log([one.start for one in free_numbers]), _USUAL_WAVINESS, quietest])
+        self.precision = np.array([*np.full(len(free_numbers), _SPREAD), _WAVINESS_SPREAD, _NOISE_SPREAD]) ** -2.0
+
+    def shapes(self, x: Array) -> tuple[Array, Array]:
+        """Spectra of the pieces for a level of 1 (j, f), and derivatives (q, j, f) by all of ``x`` but the noise."""
+        values, waviness, f_hz = np.exp(x[:-2]), x[-2], self._half_hz
+        gains, by_number = self.car.responses(values, f_hz)
+        waves = f_hz / self.pieces.speeds_mps[:, None]  # (c, h)
+        late = np.exp(-2j * np.pi * waves[:, None] * self.car.behind_m[:, None])  # (c, x, h)
+        whole = np.einsum("xh,cxh->ch", gains, late)
+        road = np.sinc(waves * self.car.contact_patch_m) ** 2 * (waves / _PIVOT_CPM) ** -waviness
+        road = road / self.pieces.speeds_mps[:, None]
+        spectra = np.empty((len(x), *whole.shape))
+        spectra[0] = np.abs(whole) ** 2 * road
+        for number, (value, one) in enumerate(zip(values, by_number, strict=True), 1):
+            spectra[number] = 2 * value * (whole.conj() * np.einsum("xh,cxh->ch", one, late)).real * road
+        spectra[-1] = -spectra[0] * np.log(waves / _PIVOT_CPM)
+        leaked = np.lib.stride_tricks.sliding_window_view(spectra, len(self.pieces.kernel), axis=-1)[..., ::2, :]
+        mixed = self.pieces.shares @ (leaked @ self.pieces.kernel)
+        return mixed[0], mixed[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class CarFit:
+    """The vehicle with the numbers found, their covariance (p, p) as logarithms, ``names`` (p,), the waviness, and what
+    the reading has of what is expected of it (b,) in bands that begin at ``bands_hz`` (b,)."""
+
+    vehicle: Vehicle
+    names: Sequence[str]
+    covariance: Array
+    waviness: float
+    bands_hz: Array
+    measured_share: Array
+
+
+def fitted_names(vehicle: Vehicle) -> list[str]:
+    """The numbers that shape a vehicle's modes, but for its geometry and one mass: against that all are counted."""
+    wanted = ("unsprung_mass_kg", "suspension_stiffness_n_per_m", "suspension_damping_n_s_per_m",
+              "tire_stiffness_n_per_m", "anti_roll_stiffness_n_m_per_rad")
+    whole = ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", *(f"{axle}.{one}" for axle in AXLES for one in wanted))
+    return [name for name in names_of(vehicle) if name in whole and read(vehicle, name) > 0]
+
+
+def fit_car(vehicle: Vehicle, pieces: Pieces, rate_hz: float) -> CarFit:
+    """The numbers that make the periodograms most probable: from the vehicle's own, and from those that fit
+    best where a floor of noise hides first all but the loudest parts of the spectrum, then fewer: with the deep gaps
+    between them in sight from the beginning, many sets of numbers are the best near them. ``UnlikeCar`` where the
+    spectra are not those of such a car."""
+    model = CarOnRoads(vehicle, pieces, rate_hz)
+    x, loudest = model.start, float(np.log(pieces.power.mean()))
+    for floor in _FLOORS:
+        x = _descend(model, np.append(x[:-1], loudest + floor), floor_is_known=True)[0]
+    starts = model.start, np.append(x[:-1], model.start[-1])
+    x, spectrum, information, _, settled = min((_descend(model, one) for one in starts), key=lambda found: found[3])
+    if not settled:
+        raise UnlikeCar("the numbers of this car do not settle on those of the reading")
+    bands_hz, share = _shares(pieces, spectrum)
+    covariance = np.asarray(np.linalg.inv(information)[:-2, :-2], dtype=np.float64)
+    return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance,
+                  float(x[-2]), bands_hz, share)
+
+
+def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[Array, Array, Array, float, bool]:
+    """Fisher's steps: where they end, the spectra (j, f) and the information there, what is to be least, and whether
+    they came to rest. The levels are eliminated from each step."""
+    pieces, power = model.pieces, model.pieces.power
+    x, (shapes, slopes), settled = start, model.shapes(start), False
+    level = np.log(power.mean(axis=1) / shapes.mean(axis=1))
+
+    def cost(x: Array, level: Array, shapes: Array) -> tuple[float, Array]:
+        spectrum = np.exp(level)[:, None] * shapes + np.exp(x[-1])
+        whittle = float((pieces.worth * (np.log(spectrum) + power / spectrum)).sum())
+        return whittle + 0.5 * float(model.precision @ (x - model.start) ** 2), spectrum
+
+    here, spectrum = cost(x, level, shapes)
+    for _ in range(_MOST_STEPS):
+        own = np.exp(level)[:, None] * shapes / spectrum  # d ln S / d ln g of each piece
+        by = np.concatenate([np.exp(level)[:, None] * slopes / spectrum, (np.exp(x[-1]) / spectrum)[None]])
+        off = pieces.worth * (power / spectrum - 1)
+        across, alone = np.einsum("qjf,jf->qj", by, pieces.worth * own), (pieces.worth * own**2).sum(axis=1)
+        slope, slope_level = np.einsum("qjf,jf->q", by, off), (own * off).sum(axis=1)
+        information = np.einsum("qjf,rjf->qr", pieces.worth * by, by) - (across / alone) @ across.T
+        information += np.diag(model.precision)
+        wanted = slope - (across / alone) @ slope_level - model.precision * (x - model.start)
+        if floor_is_known:
+            wanted[-1], information[-1, :-1], information[:-1, -1] = 0.0, 0.0, 0.0
+        step = np.linalg.solve(information, wanted)
+        if settled := float(wanted @ step) < _AT_REST:
+            break
+        level_step = (slope_level - across.T @ step) / alone
+        part = min(1.0, _LONGEST_STEP / np.abs(step).max())
+        for _ in range(_HALVINGS):
+            tried, tried_level = x + part * step, level + part * level_step
+            shapes, slopes = model.shapes(tried)
+            there, spectrum = cost(tried, tried_level, shapes)
+            if there < here:
+                break
+            part /= 2
+        else:
+            break
+        x, level, here = tried, tried_level, there
+    return x, spectrum, information, here, settled
+
+
+def _shares(pieces: Pieces, spectrum: Array) -> tuple[Array, Array]:
+    """Measured over expected power in bands. ``UnlikeCar`` where that is neither chance nor a trifle."""
+    f_hz, worth = pieces.bins * pieces.step_hz, pieces.worth.sum(axis=0)
+    edges = np.unique(np.searchsorted(f_hz, np.geomspace(f_hz[0], f_hz[-1], _BANDS + 1)[:-1]))
+    total = np.maximum(np.add.reduceat(worth, edges), 1e-9)
+    share = np.asarray(np.add.reduceat((pieces.worth * (pieces.power / spectrum - 1)).sum(axis=0), edges) / total + 1,
+                       dtype=np.float64)
+    chance = 1 / np.sqrt(total)
+    off = np.where(np.abs(share - 1) > _SURE * chance, np.abs(share - 1), 0.0)
+    worst = int(off.argmax())
+    if off[worst] > _MOST_MISFIT:
+        raise UnlikeCar(f"from {f_hz[edges[worst]]:.2g} Hz the reading has {share[worst]:.2f} times the power that "
+                        "this car has on a random road, whatever its springs, dampers and masses")
+    return np.asarray(f_hz[edges], dtype=np.float64), share
+
+
+def found_modes(fit: CarFit) -> tuple[list[FoundMode], list[Rejected]]:
+    """The modes that the reading tells, with standard errors, and those that it does not."""
+    base = _modes(fit.vehicle)
+    slopes = np.zeros((len(fit.names), *base.shape))
+    for number, name in enumerate(fit.names):
+        moved = _modes(changed(fit.vehicle, {name: read(fit.vehicle, name) * (1 + _DERIVATIVE_STEP)}))
+        near = np.abs(base[:, None, 0] / moved[None, :, 0] - 1) + np.abs(base[:, None, 1] - moved[None, :, 1])
+        slopes[number] = (moved[near.argmin(axis=1)] - base) / _DERIVATIVE_STEP
+    errors = np.sqrt(np.einsum("iab,ij,jab->ab", slopes, fit.covariance, slopes))
+    modes, rejected = [], []
+    for (frequency, ratio), (frequency_std, ratio_std) in zip(base.tolist(), errors.tolist(), strict=True):
+        reason = (f"the reading hardly shows it: its frequency is uncertain by {frequency_std / frequency:.0%}"
+                  if frequency_std > LARGEST_FREQUENCY_ERROR * frequency else
+                  f"its damping ratio is uncertain by {ratio_std:.2f}" if ratio_std > LARGEST_DAMPING_ERROR else "")
+        if reason:
+            rejected.append(Rejected(frequency, ratio, reason))
+        else:
+            modes.append(FoundMode(frequency, ratio, frequency_std, ratio_std, np.ones(1, dtype=np.complex128)))
+    return modes, rejected
+
+
+def _modes(vehicle: Vehicle) -> Array:
+    """Frequency [Hz] and damping ratio of what swings, (m, 2)."""
+    return np.array([(one.frequency_hz, one.damping_ratio) for one in vibrating(modes_of(structure_of(vehicle)))])
+
+
+def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float
+              ) -> ModalResult:
+    """The modes of a vehicle near this one, out of its reading (n,) on roads that nobody measured.
+
+    speed_mps    (n,) at each sample; ``usable`` (n,) whether it is a reading
+
+    ValueError for too few stretches at speed, ``UnlikeCar`` where the reading is not that of such a car.
+    """
+    pieces = pieces_of(samples, speed_mps, usable, rate_hz)
+    fit = fit_car(vehicle, pieces, rate_hz)
+    modes, rejected = found_modes(fit)
+    worst = int(np.abs(fit.measured_share - 1).argmax())
+    how = (f"drive on roads that nobody measured: springs, dampers and masses of {vehicle.name} fitted to the spectra "
+           f"of {len(pieces.power)} stretches of {_PIECE_S:g} s, the road (waviness {fit.waviness:.2f}) and the "
+           f"distance between the axles taken out; power off by {abs(fit.measured_share[worst] - 1):.0%} at most, "
+           f"from {fit.bands_hz[worst]:.2g} Hz")
+    return ModalResult(tuple(modes), tuple(rejected), 0, how)

@@ -1,0 +1,52 @@
+"""Sentences that people meet by mistake, or once: each says what it does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from logger.commands.main import main
+from logger.errors import BadInput, did_you_mean
+from logger.printable import counted
+
+
+def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["repot"])
+    assert "found 'repot'; did you mean report?" in capsys.readouterr().err
+    assert did_you_mean("zzz", ["report"]) == ""
+
+
+def test_settings_name_the_key_and_guess_it(tmp_path: Path) -> None:
+    file = tmp_path / "settings.yaml"
+    for text, words in (("log:\n  directry: x\n", "did you mean directory"),
+                        ("gps:\n  baud: nine\n", "'nine' for 'baud'")):
+        file.write_text(text)
+        with pytest.raises(BadInput, match=words):
+            main(["run", "--config", str(file)])
+
+
+def test_millimetres_are_suspected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for factor, doubts in ((1.0, 0), (1000.0, 1)):
+        file = tmp_path / f"{factor:g}.csv"
+        rows = [f"{i * 0.1:.1f},{factor * 0.01 * (i % 7):.4f}" for i in range(400)]
+        file.write_text("distance_m,elevation_m\n" + "\n".join(rows) + "\n")
+        assert main(["iri", str(file), "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert (told["iri_m_per_km"] > 100, len(told.get("doubts", []))) == (bool(doubts), doubts)
+        assert main(["iri", str(file)]) == 0
+        assert ("Elevation in mm?" in capsys.readouterr().out) == bool(doubts)
+
+
+def test_drives_over_one_road_may_be_files(tmp_path: Path) -> None:
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t_s,accel_z_mps2,speed_mps,distance_m\n0,0,1,0\n0.01,0.1,1,0.01\n")
+    files = [str(tmp_path / name) for name in ("a.csv", "b.csv")]
+    with pytest.raises(BadInput, match=r"a\.csv: (?!.*readable file)"):
+        main(["diagnose", "--same-road", "--vehicle", "golden-car", *files])
+
+
+def test_one_of_a_thing_is_not_several() -> None:
+    assert [counted(number, "file") for number in (0, 1, 2000)] == ["0 files", "1 file", "2,000 files"]
