@@ -105,11 +105,12 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
     with naming(args.out):
         args.out.mkdir(parents=True, exist_ok=True)
     chosen = [one for one in known if not one.data]
+    share = QUICK_SHARE if args.quick else 1.0
     carried = {}
-    for study, found in carry_out_all(chosen, QUICK_SHARE if args.quick else 1.0):
+    for study, found in carry_out_all(chosen, share):
         carried[study.called] = found
         if found.result is not None:
-            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", QUICK_SHARE if args.quick else 1.0))
+            write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", share))
         print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
               f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
     write_text(args.out / "index.html", index(known, carried))
