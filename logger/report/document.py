@@ -16,6 +16,7 @@ from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.style import STYLE
 
 _RIGHT = Html(" class=n")
+_WEB_MAP = "https://www.openstreetmap.org/"
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
@@ -89,3 +90,10 @@ def grid(heads: Iterable[str], rows: Iterable[Iterable[str]], words: Iterable[in
 
     body = concatenated(html("<tr>{}</tr>", cells(row, "td")) for row in rows)
     return html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', cells(heads, "th"), body)
+
+
+def map_links(lat_deg: float, lon_deg: float, words: str) -> Html:
+    """A place in words, for the reader's own map program and on a map of the web."""
+    lat, lon = f"{lat_deg:.6f}", f"{lon_deg:.6f}"
+    return html('<a href="geo:{},{}">{}</a> <a href="{}?mlat={}&mlon={}#map=18/{}/{}">map</a>', lat, lon, words,
+                _WEB_MAP, lat, lon, lat, lon)

@@ -16,7 +16,18 @@ from urllib.parse import urlsplit
 
 from logger.printable import counted
 from logger.records import WindowRecord
-from logger.report.document import bullets, data_block, document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.document import (
+    bullets,
+    data_block,
+    document,
+    grid,
+    heading,
+    hint,
+    map_links,
+    paragraphs,
+    section,
+    tiles,
+)
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.maps import Way
 from logger.report.summary import (
@@ -41,7 +52,6 @@ from logger.report.track_views import rank, track_views, windows_table
 from logger.store.log.log_reader import LoggedFile, along_m, split_drives, utc
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
-_WEB_MAP = "https://www.openstreetmap.org/"
 _MAX_SIDECARS = 10
 _MAX_SIDECAR_CHARS = 20_000
 
@@ -172,9 +182,7 @@ def _numbers(records: Sequence[WindowRecord], places: Sequence[Place]) -> list[i
 def _geo(place: Place) -> Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    lat_deg, lon_deg = f"{place.lat_deg:.6f}", f"{place.lon_deg:.6f}"
-    return html('<a href="geo:{},{}">{}</a> <a href="{}?mlat={}&mlon={}#map=18/{}/{}">map</a>', lat_deg, lon_deg,
-                place_words(place), _WEB_MAP, lat_deg, lon_deg, lat_deg, lon_deg)
+    return map_links(place.lat_deg, place.lon_deg, place_words(place))
 
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:

@@ -8,8 +8,8 @@ import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
 from logger.records import WindowRecord
-from logger.report.document import grid, hint, paragraphs, section
-from logger.report.html import Html, html
+from logger.report.document import grid, hint, map_links, paragraphs, section
+from logger.report.html import Html
 from logger.report.laid_drives import LaidDrives, chains
 from logger.report.page import page
 from logger.report.passes_text import compass, lines, visit_values
@@ -19,9 +19,6 @@ from logger.store.log.log_reader import LoggedFile, utc
 from logger.units import US_PER_S
 
 _GAP_M = 1.0
-_LINKS = ('<a href="geo:{0},{1}">{0}, {1}</a> '
-          '(<a href="https://www.openstreetmap.org/?mlat={0}&amp;mlon={1}#map=19/{0}/{1}" rel="noreferrer">web '
-          "map</a>)")
 
 
 def passes_page(found: LaidDrives) -> Html:
@@ -46,10 +43,11 @@ def _visits(found: LaidDrives) -> Html:
     rows = []
     for number, one in enumerate(found.visits, start=1):
         values = visit_values(found, one)
-        lat, lon = (f"{values[name]:.6f}" for name in ("lat_deg", "lon_deg"))
+        lat_deg, lon_deg = values["lat_deg"], values["lon_deg"]
         a_w = values["a_w_mps2"]
         rows.append((
-            str(number), one.kind, html(_LINKS, lat, lon), compass(values["heading_deg"]), f"{one.length_m:.0f}",
+            str(number), one.kind, map_links(lat_deg, lon_deg, f"{lat_deg:.6f}, {lon_deg:.6f}"),
+            compass(values["heading_deg"]), f"{one.length_m:.0f}",
             f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}", "" if a_w is None else f"{a_w:.2f}",
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives)))
     return grid(("#", "What", "Coordinates of the worst cell", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",

@@ -111,13 +111,9 @@ def test_a_ride_with_a_blow_says_what_to_use(tmp_path: Path, capsys: pytest.Capt
     assert "Health, 8 h a day like this:" in text
 
 
-def test_silence_has_no_crest_factor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = sine(tmp_path / "still.csv", 100.0, 5.0, {"z": 0.0})
-    result = as_json(capsys, path)
-    assert result["crest_factor"] is None
-    assert result["comfort"] == "not_uncomfortable"
-    assert result["health"]["hours_to_a8_limit"] is None
-    assert "Feels not uncomfortable." in on_screen(capsys, path)
+def test_silence_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(BadInput, match="expected accelerations that move, found 0 m/s2 all along"):
+        as_json(capsys, sine(tmp_path / "still.csv", 100.0, 5.0, {"z": 0.0}))
 
 
 def test_axes_that_cannot_be_combined_are_mentioned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

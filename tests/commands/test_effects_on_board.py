@@ -108,7 +108,6 @@ def test_a_gain_is_in_the_calibration_and_friction_in_the_modes(
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (["modes", "--iri", "3"], "--iri and --speed: expected --vehicle"),
-    (["modes", "x.csv", "--vehicle", "rav4-2009"], "expected no FILE beside it"),
     (["modes", "--vehicle", "rav4-2009", "--order", "4"], "--order: expected a FILE with it"),
     (["modes", "--vehicle", "rav4-2009", "--iri", "0"], "--iri 0: expected"),
 ])

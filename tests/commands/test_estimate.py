@@ -220,7 +220,7 @@ def test_more_in_the_readings_than_is_explained_is_said(
 @pytest.mark.parametrize("speed_mps", [0.0, 5.0])
 def test_a_drive_without_a_window(speed_mps: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     t = np.arange(100) / 100
-    drive = write(tmp_path, {"t_s": t, "accel_z_mps2": 0 * t, "speed_mps": 0 * t + speed_mps,
+    drive = write(tmp_path, {"t_s": t, "accel_z_mps2": 0.1 * np.sin(9 * t), "speed_mps": 0 * t + speed_mps,
                              "distance_m": speed_mps * t})
     result = told(capsys, drive)
     assert (result["window_count"], result["answered_count"], result["windows"]) == (0, 0, [])

@@ -79,10 +79,12 @@ def test_what_the_other_models_do_not_know_is_refused(tmp_path: Path) -> None:
     assert "expected one of the keys" in complaint(tmp_path, half)
     bar = FULL.replace("9000", "-9000")
     assert complaint(tmp_path, bar) == (
-        f"{line_of(bar, '  anti_roll')}: expected a number of at least 0, found '-9000'"
+        f"{line_of(bar, '  anti_roll')}: expected a number of at least 0, found '-9000' for "
+        "'anti_roll_stiffness_n_m_per_rad'"
     )
     quarter = QUARTER + "sensor:\n  left_m: 0\n  ahead_m: 0.2\n"
-    assert complaint(tmp_path, quarter) == "12: expected 0, because a quarter_car does not pitch, found '0.2'"
+    assert complaint(tmp_path, quarter) == (
+        "12: expected 0, because a quarter_car does not pitch, found '0.2' for 'ahead_m'")
 
 
 def test_a_sensor_at_the_centre_of_gravity_may_be_written_out(tmp_path: Path) -> None:
@@ -227,13 +229,13 @@ def test_numbers_that_no_car_has(tmp_path: Path, key: str, values: tuple[str, ..
         message = complaint(tmp_path, text)
         at = next(number for number, line in enumerate(text.splitlines(), 1) if key in line)
         assert message.startswith(f"{at}: expected a number ")
-        assert message.endswith(f"found '{value}'")
+        assert message.endswith(f"found '{value}' for '{key}'")
 
 
 def test_both_axles_at_the_centre_of_gravity_are_no_car(tmp_path: Path) -> None:
     text = TEXT.replace("cg_distance_m: 1.47", "cg_distance_m: 0")
     at = max(number for number, line in enumerate(text.splitlines(), 1) if "cg_distance_m" in line)
-    assert complaint(tmp_path, text) == f"{at}: expected axles at least 0.1 m apart, found '0'"
+    assert complaint(tmp_path, text) == f"{at}: expected axles at least 0.1 m apart, found '0' for 'cg_distance_m'"
 
 
 def test_missing_keys_are_named_with_the_place_they_belong(tmp_path: Path) -> None:
