@@ -12,6 +12,8 @@ from logger.fleet.pseudonyms import shown_car
 from logger.fleet.road_cells import SEGMENT_M
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
 from logger.fleet.tiles import DEEPEST, highest_level, names_of, projected
+from logger.fleet.words import error_words
+from logger.printable import counted
 from logger.report.document import data_block, document, grid, heading, hint, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.summary import IRI_CLASSES, class_limits_m_per_km
@@ -32,8 +34,8 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     """The page of figures by segment; ``sections``: the same by 0.1 mi, for the lists."""
     segments = figures.roads
     first, last = utc(int(segments.last_us.min())), utc(int(segments.last_us.max()))
-    under = (f"{figures.windows:,} windows of {len(figures.cars):,} cars · roads last seen {first:%Y-%m-%d} to "
-             f"{last:%Y-%m-%d}")
+    under = (f"{counted(figures.windows, 'window')} of {counted(len(figures.cars), 'car')} · roads last seen "
+             f"{first:%Y-%m-%d} to {last:%Y-%m-%d}")
     x, y = projected(segments.lat_deg, segments.lon_deg)
     level = highest_level(x, y)
     data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
@@ -94,7 +96,7 @@ def _place(sections: RoadTable, one: int) -> Html:
 def _rough(sections: RoadTable) -> Html:
     order = np.flatnonzero(sections.visit != "")
     order = order[np.argsort(-sections.iri_m_per_km[order], kind="stable")][:_SHOWN].tolist()
-    rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f} ± {sections.iri_std_m_per_km[one]:.2f}",
+    rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f} {error_words(sections.iri_std_m_per_km[one])}",
              f"{sections.length_m[one]:.0f}", str(sections.cars[one]), f"{sections.passes[one]:.0f}",
              f"{utc(int(sections.last_us[one])):%Y-%m-%d}", sections.visit[one].replace("|", ", ")) for one in order]
     heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")

@@ -11,6 +11,7 @@ from logger.fleet.ingest import Counts
 from logger.fleet.layer import FIELDS, roads_layer
 from logger.fleet.pseudonyms import shown_car
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
+from logger.printable import counted
 from logger.store.log.log_reader import utc
 
 _SHOWN_ROADS, _SHOWN_CARS = 15, 10
@@ -26,13 +27,13 @@ def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
 def ingest_words(counts: Counts, rows: int, place: str) -> str:
     """The same in lines."""
     lines = [f"{place}: {counts.added:,} rows added, {rows:,} in all"]
-    said = ((counts.known_logs, "logs were known already"), (counts.repeated, "rows were known already"),
-            (counts.contradictions, "rows contradict a known one of their number and time; the first one stays"),
-            (counts.damaged_lines, "damaged lines refused ('ridelog verify' lists them)"),
-            (counts.undated, "rows without a date left out"),
-            (counts.unplaced, "rows without a place or a direction left out"),
-            (counts.trimmed, "rows cut at the ends of drives"))
-    return "\n".join([*lines, *(f"  {number:,} {words}" for number, words in said if number)])
+    said = ((counts.known_logs, "log", "known already"), (counts.repeated, "row", "known already"),
+            (counts.contradictions, "row", "at odds with a known one of the same number and time; the first one stays"),
+            (counts.damaged_lines, "damaged line", "refused ('ridelog verify' lists them)"),
+            (counts.undated, "row", "without a date left out"),
+            (counts.unplaced, "row", "without a place or a direction left out"),
+            (counts.trimmed, "row", "cut at the ends of drives"))
+    return "\n".join([*lines, *(f"  {counted(number, what)} {words}" for number, what, words in said if number)])
 
 
 def figures_json(figures: FleetFigures) -> dict[str, Any]:
@@ -54,8 +55,8 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
 def figures_words(figures: FleetFigures) -> str:
     """A summary in lines: what it rests on, cars that read too high or too low, the roughest roads, and the changes."""
     roads, biases = figures.roads, figures.biases
-    lines = [f"{_count(figures.windows, 'window')} of {_count(len(figures.cars), 'car')}; "
-             f"{_count(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
+    lines = [f"{counted(figures.windows, 'window')} of {counted(len(figures.cars), 'car')}; "
+             f"{counted(len(roads.key), roads.by)}, {roads.length_m.sum() / 1000:,.1f} km"]
     if figures.withheld:
         lines.append(f"{figures.withheld:,} segments are withheld: too few cars have driven them")
     if isfinite(biases.pass_std):
@@ -90,8 +91,8 @@ def _roads(roads: RoadTable) -> list[str]:
     lines = [f"Roughest {roads.by}s",
              "  place                    IRI [m/km]      cars  passes  a_w [m/s2]  last seen   visit"]
     return lines + [
-        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} ± "
-        f"{_number(roads.iri_std_m_per_km[one], 2):5}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
+        f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} "
+        f"{error_words(roads.iri_std_m_per_km[one]):7}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
         f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
         f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
 
@@ -101,7 +102,7 @@ def _changes(roads: RoadTable) -> list[str]:
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
     if not order:
         return [f"No {roads.by} has become worse, as far as these drives tell"]
-    lines = [f"Became worse: {_count(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
+    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [
         f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
@@ -109,12 +110,14 @@ def _changes(roads: RoadTable) -> list[str]:
         f"{roads.p_value[one]:.1g}" for one in order]
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"
-
 
 def _known(value: float) -> float | None:
     return value if isfinite(value) else None
+
+
+def error_words(std: float) -> str:
+    """A standard error behind its value: "± 0.12"; nothing where it is not known."""
+    return f"± {std:.2f}" if isfinite(std) else ""
 
 
 def _number(value: float, decimals: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
+from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report.document import grid, hint, map_links, paragraphs, section
 from logger.report.html import Html
@@ -23,7 +24,7 @@ _GAP_M = 1.0
 
 def passes_page(found: LaidDrives) -> Html:
     """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
-    title = f"Road roughness, mean of {found.drives} drives", _days(found)
+    title = f"Road roughness, mean of {counted(found.drives, 'drive')}", _days(found)
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, first=(
         section("Drives laid over each other", paragraphs(lines(found)[:4]) + hint(
             "What follows shows each cell of road once, with the mean of all drives over it: its time is that of the "

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
+from logger.printable import counted
 from logger.report.laid_drives import LaidDrives
 from logger.report.terminal import comfort_words
 from logger.roads.places_to_visit import Place
@@ -31,10 +32,10 @@ def lines(found: LaidDrives) -> list[str]:
 def _summary(found: LaidDrives) -> Iterator[str]:
     drives, cells = found.iri.drives, len(found.iri.key)
     several = int((drives > 1).sum())
-    yield (f"{_count(found.drives, 'drive')}, {found.placed:,} of {_count(found.windows, 'window')} with a place, in "
-           f"{_count(cells, 'cell')} of {found.length_m:g} m by place and direction")
-    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells, median {np.median(drives):g} drives, "
-           f"{drives.max()} at most")
+    yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
+           f"{counted(cells, 'cell')} of {found.length_m:g} m by place and direction")
+    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells, by {np.median(drives):g} on the median, "
+           f"by {drives.max()} at most")
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
     yield f"IRI of the cells {mean:.2f} m/km on the mean, standard error of one cell {std:.2f}"
     if isfinite(found.scatter.drive):
@@ -76,7 +77,7 @@ def _changes(found: LaidDrives) -> Iterator[str]:
     sure = change.false_share <= SIGNIFICANT
     worse = int((sure & (change.change_m_per_km > 0)).sum())
     better = int(sure.sum()) - worse
-    yield (f"Changed between the two periods: {worse} of {_count(len(change.key), 'cell')} got worse, {better} better "
+    yield (f"Changed between the two periods: {worse} of {counted(len(change.key), 'cell')} got worse, {better} better "
            f"(at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
     cell = np.searchsorted(found.iri.key, change.key)
     order = np.flatnonzero(sure)[np.argsort(-np.abs(change.change_m_per_km[sure]))][:MOST_CHANGES]
@@ -84,16 +85,13 @@ def _changes(found: LaidDrives) -> Iterator[str]:
         yield (f"{found.lat_deg[cell[one]]:10.5f},{found.lon_deg[cell[one]]:10.5f} "
                f"{compass(found.heading_deg[cell[one]]):2}  {change.change_m_per_km[one]:+6.2f} ± "
                f"{change.change_std_m_per_km[one]:.2f} m/km, p {change.p_value[one]:.1e}, "
-               f"{_count(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
+               f"{counted(int(change.before[one]), 'drive')} before, {int(change.after[one])} after")
 
 
 def compass(heading_deg: float) -> str:
     """A heading clockwise from north in one of eight words."""
     return ("N", "NE", "E", "SE", "S", "SW", "W", "NW")[round(heading_deg / 45.0) % 8]
 
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"
 
 
 # --- for programs ---
