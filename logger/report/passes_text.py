@@ -34,8 +34,8 @@ def _summary(found: LaidDrives) -> Iterator[str]:
     several = int((drives > 1).sum())
     yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
            f"{counted(cells, 'cell')} of {found.length_m:g} m by place and direction")
-    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells, by {np.median(drives):g} on the median, "
-           f"by {drives.max()} at most")
+    yield (f"Passed by more than one drive: {several / cells:.0%} of the cells; median {np.median(drives):g}, "
+           f"{drives.max()} at most")
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
     yield f"IRI of the cells {mean:.2f} m/km on the mean, standard error of one cell {std:.2f}"
     if isfinite(found.scatter.drive):
