@@ -32,9 +32,13 @@ class CheckFailed(RidelogError):
     exit_status = EXIT_CHECK_FAILED
 
 
+_NEARLY = 0.7  # of the letters are the same, in the same order: one is missing, wrong or in another place
+"""Of ``difflib``: at its usual 0.6 "vehicle" would be nearly "hil"."""
+
+
 def did_you_mean(found: str, known: Iterable[str]) -> str:
     """``; did you mean X?`` where a word is nearly one that is known; else nothing."""
     from difflib import get_close_matches
 
-    near = get_close_matches(found, list(known), 1)
+    near = get_close_matches(found, list(known), 1, _NEARLY)
     return f"; did you mean {near[0]}?" if near else ""

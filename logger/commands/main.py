@@ -117,7 +117,9 @@ def _without_verb(arguments: list[str]) -> int:
         epilog=f"commands:\n{verbs}\n\n'ridelog COMMAND --help' explains one of them.", allow_abbrev=False)
     parser.add_argument("--version", action="store_true", help="print the version and leave")
     parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
-    options = parser.parse_args(arguments)
+    options, rest = parser.parse_known_args(arguments)  # of a command that nobody knows the rest is its own
+    if rest and options.command is None:
+        return parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if options.version:
         from logger.shipped import version  # reads the installation's records, which takes a while
 

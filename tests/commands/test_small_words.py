@@ -16,6 +16,12 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
     with pytest.raises(SystemExit):
         main(["repot"])
     assert "found 'repot'; did you mean report?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["repot", "logs/", "--out", "drive.html"])
+    assert "found 'repot'; did you mean report?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["vehicle"])
+    assert "did you mean" not in capsys.readouterr().err
     assert did_you_mean("zzz", ["report"]) == ""
 
 
