@@ -97,7 +97,7 @@ from pyarrow import parquet
 from logger.commands.main import main
 import logger.api.fleet, logger.fleet.ingest as ingest
 
-logs, out = sys.argv[1:]
+logs, out, every = sys.argv[1:]
 ingest.ingest_sessions.__kwdefaults__["batch_rows"] = 60
 left = [10**9]
 
@@ -122,7 +122,7 @@ def in_a_process(steps, dataset):
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 ends = []
-for point in range(10_000):
+for point in range(0, 10_000, int(every)):
     killed = f"{out}/{point}-killed"
     ends.append(in_a_process(point, killed))
     again = f"{out}/{point}-again"
@@ -139,19 +139,20 @@ print(json.dumps(ends))
 """Ingests in commits of a few rows, killed before the n-th step on the disk; again, killed sooner; and whole."""
 
 
-@pytest.mark.slow
-def test_an_ingest_that_is_killed_anywhere_loses_no_row_and_takes_none_twice(logs: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [pytest.param(8, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.release)])
+def test_an_ingest_that_is_killed_anywhere_loses_no_row_and_takes_none_twice(every: int, logs: Path,
+                                                                             tmp_path: Path) -> None:
     whole = tmp_path / "whole"
     assert main(["fleet", "ingest", str(logs / "car000"), "--to", str(whole), "--car", "a"]) == 0
     expected = [row[1:] for row in rows_of(whole)]
     script = tmp_path / "killed.py"
     script.write_text(KILLED)
-    done = subprocess.run([sys.executable, str(script), str(logs / "car000"), str(tmp_path)], capture_output=True,
-                          text=True, check=True)
+    done = subprocess.run([sys.executable, str(script), str(logs / "car000"), str(tmp_path), str(every)],
+                          capture_output=True, text=True, check=True)
     ends = json.loads(done.stdout)
     assert set(ends[:-1]) == {-signal.SIGKILL} and ends[-1] == 0
-    assert len(ends) > 50
-    for point in range(len(ends)):
+    assert len(ends) > 50 / every
+    for point in range(0, every * len(ends), every):
         killed, again = tmp_path / f"{point}-killed", tmp_path / f"{point}-again"
         if killed.exists() and Dataset(killed).manifest.rows:
             there = [row[1:] for row in rows_of(killed)]

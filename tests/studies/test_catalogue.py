@@ -44,7 +44,7 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
     stands_alone(page(study, result), pictures=len(result.pictures))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if not study.data])
 def test_a_study_is_as_it_states_with_a_fifth_of_its_effort_too(name: str) -> None:
     study = STUDIES[name]
