@@ -59,7 +59,8 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A chart of values (len(y), len(x)) over a grid, as shades from 0 to ``top``; what lies above is drawn as it."""
+    """A chart of values (len(y), len(x)) over a grid, as shades from 0 to ``top``, the most the darkest; what lies
+    above is drawn as it."""
 
     title: str
     x_name: str

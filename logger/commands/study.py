@@ -113,7 +113,7 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
             write_text(args.out / f"{study.called}.html", page(study, found.result, "index.html", share))
         print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
               f"{found.failure or study.word} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
-    write_text(args.out / "index.html", index(known, carried))
+    write_text(args.out / "index.html", index(known, carried, share))
     failed = [one for one in chosen if carried[one.called].failure]
     if args.json:
         print(json.dumps({"page": str(args.out / "index.html"), "studies": [

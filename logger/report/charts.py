@@ -245,15 +245,15 @@ def _field(one: Field) -> list[Html]:
     parts = []
     for (low, high), row in zip(pairwise(y_edges), one.values, strict=True):
         for (left, right), value in zip(pairwise(x_edges), row, strict=True):
-            share = 1.0 if not np.isfinite(value) else min(max(float(value) / one.top, 0.0), 1.0)
+            share = 0.0 if not np.isfinite(value) else min(max(float(value) / one.top, 0.0), 1.0)
             parts.append(_cell(frame.x(left), frame.y(high), frame.x(right) - frame.x(left),
-                               frame.y(low) - frame.y(high), 1 - share))
+                               frame.y(low) - frame.y(high), share))
     parts += _axes(frame, one.x_name, one.y_name)
     x = _CHART.right_px + 10
     for number in range(_ABOUT):
         share = number / (_ABOUT - 1)
         y = _CHART.top + 30 + _KEY_PX * number
-        parts.append(_cell(x, y - 9, 14, 14, 1 - share)
+        parts.append(_cell(x, y - 9, 14, 14, share)
                      + _words(x + 20, y + 2, f"{share * one.top:g}{' and more' if share == 1 else ''}"))
     return [*parts, _words(x, _CHART.top + 6, one.value_name)]
 

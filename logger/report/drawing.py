@@ -38,7 +38,7 @@ def draw(charts: Sequence[Chart], path: Path) -> None:
         elif isinstance(one, Curves):
             _curves(axes, one)
         else:
-            shades = axes.pcolormesh(one.x, one.y, np.asarray(one.values), vmin=0.0, vmax=one.top, cmap="Blues_r",
+            shades = axes.pcolormesh(one.x, one.y, np.asarray(one.values), vmin=0.0, vmax=one.top, cmap="Blues",
                                      shading="nearest")
             figure.colorbar(shades, ax=axes, label=one.value_name)
     # A date in the file would make the same result another file.

@@ -30,7 +30,7 @@ def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -
     contents    the name of a page beside it that lists all
     share       of its draws and grid points that was computed
     """
-    quick = [] if share == 1.0 else [f"Quick: with {share:.0%} of the draws and grid points."]
+    quick = _quick(share)
     word = study.differs(result) or f"{str(study.word).capitalize()}: {study.because}"
     return document(f"{study.where}: {study.title}", [
         heading(study.title, f"{study.where} of {study.source}"),
@@ -41,16 +41,20 @@ def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -
         html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
 
 
-def index(known: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
+def _quick(share: float) -> list[str]:
+    return [] if share == 1.0 else [f"Quick: with {share:.0%} of the draws and grid points."]
+
+
+def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float = 1.0) -> Html:
     """The table of contents of studies whose pages lie beside it, with the word of each; ``carried`` by the studies'
-    names, without those that were not run."""
+    names, without those that were not run; ``share`` of their draws and grid points that was computed."""
     words = {one.called: _word(one, carried.get(one.called)) for one in known}
     counts = [(word, str(list(words.values()).count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
         heading("Studies: printed results, made again", "Each with one word for how ours stands beside the print."),
-        tiles(tile for tile in counts if tile[1] != "0"),
+        paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, words, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)
 

@@ -123,7 +123,7 @@ STUDY = Study(
     "The segment goes the way of any recording: extract --csv with the receiver's places and speed, then estimate with "
     "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
     "middle, unless --vehicle names another car. This was run on the real minute.",
-    from_folder("comma2k19", _DOWNLOAD, run), ("comma2k19",), Word.AGREES,
-    "The receiver's speed is as much later and faster than the car's as was read before; of its IRI there is no "
-    "print.",
+    from_folder("comma2k19", _DOWNLOAD, run), ("comma2k19",), Word.NOT_REPRODUCIBLE,
+    "Of this minute no IRI is printed; the receiver's speed is later and faster than the car's, by the figures "
+    "above.",
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

@@ -111,6 +111,6 @@ STUDY = Study(
     "Nearest: each beside the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
     "over: means of two cells' parts, smoother than what was measured, which makes them more alike. The truth lies "
     "between. This was run on the real files.",
-    from_folder("LiRA-Map", _DOWNLOAD, run), ("LiRA-Map",), Word.AGREES,
+    from_folder("LiRA-Map", _DOWNLOAD, run), ("LiRA-Map",), Word.NOT_REPRODUCIBLE,
     "Run on the real files, it gives the ceiling that is printed beside every other set; no paper prints it.",
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

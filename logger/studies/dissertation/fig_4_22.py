@@ -40,4 +40,4 @@ STUDY = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4
               "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the fit does not know.", run,
               covers=("Fig 4.22",), word=Word.BETTER,
-              because="All starts end at one mass, where the printed ones scatter by up to 6 %.")
+              because="All starts end at one mass, nearer the true one than the 6 % within which the printed ones lie.")

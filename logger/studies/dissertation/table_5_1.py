@@ -33,7 +33,7 @@ def run(effort: Effort) -> Result:
                "source recorded, and how its push set off the higher modes, is not told, and both move the figure. "
                f"That two sensors differ by some per cent agrees ({min(differences):.1f} to {max(differences):.1f} % "
                f"over {len(compared)} draws of their noise). The unit of the print cannot be m/s2: peaks of 0.198 and "
-               "0.0855 g (Eq 5.3) and 1.34 % of damping make some 0.05 g, ten times as much as 0.05 m/s2.")
+               "0.085 g (Eq 5.3) and 1.34 % of damping make some 0.05 g, ten times as much as 0.05 m/s2.")
     records = tuple(Line(sensor.name, *_shown(number)) for number, sensor in reversed(list(enumerate(SENSORS))))
     return Result((apart,), verdict, (
         Curves("Fig 5.8: the first 15 s. Printed: both records, peaks and phases alike", "time [s]",

@@ -33,7 +33,7 @@ def run(effort: Effort) -> Result:
                "the frequencies of the model that was simulated, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the "
                "real building's second and third are 2 and 7 % lower. The decrement over all peaks gives back the "
                f"{100 * DAMPING_RATIO:.2f} % that were put in, with an error beside it; Eq 5.3 takes two of them (its "
-               "rounded peaks give 1.35). The table above Eq 5.3 has 0.8545 where it needs 0.0855 g.")
+               "rounded peaks give 1.35). The table above Eq 5.3 has 0.8545 where Eq 5.3 has 0.085 g.")
     values = (Value("mode 1 [Hz], which must be 0.7419", PRINTED_HZ[0], ps2119.peaks_hz[0], 0.05, Word.MISPRINT),
               Value("mode 2 [Hz]", PRINTED_HZ[1], ps2119.peaks_hz[1], 0.1, Word.NOT_REPRODUCIBLE),
               Value("mode 3 [Hz]", PRINTED_HZ[2], ps2119.peaks_hz[2], 0.4, Word.NOT_REPRODUCIBLE),
