@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, cell_keys
 from logger.geodesy import EARTH_RADIUS_M
+from logger.roads.road_network import on_sphere
 
 Array = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.int64]
@@ -81,7 +82,7 @@ class RoadMap:
 
         self.pieces = pieces
         self._heading_deg = pieces.heading_deg
-        self._tree = cKDTree(_on_sphere(pieces.lat_deg.mean(axis=1), pieces.lon_deg.mean(axis=1)))
+        self._tree = cKDTree(on_sphere(pieces.lat_deg.mean(axis=1), pieces.lon_deg.mean(axis=1)))
 
     def keys(self, lat_deg: Array, lon_deg: Array, heading_deg: Array, drive: npt.NDArray[np.intp]) -> Keys:
         """Keys (n,) of places and directions [degrees], in the order driven; ``drive`` tells drives apart."""
@@ -101,7 +102,7 @@ class RoadMap:
                     ) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.int64]]:
         """Pieces (n, k) near places, what speaks against them (infinity: too far), and 1 where driven forwards."""
         count = min(_CANDIDATES, len(self.pieces.road))
-        _, piece = self._tree.query(_on_sphere(lat_deg, lon_deg), k=list(range(1, count + 1)))
+        _, piece = self._tree.query(on_sphere(lat_deg, lon_deg), k=list(range(1, count + 1)))
         scale = np.pi / 180.0 * EARTH_RADIUS_M
         shrink = np.cos(np.radians(lat_deg))[:, None]
 
@@ -133,8 +134,3 @@ def _of_neighbours(way: npt.NDArray[np.int64], cost: Array, drive: npt.NDArray[n
         said += np.where(there[:, None], theirs, 0.0)
         votes += there[:, None]
     return said / np.maximum(votes, 1.0)
-
-
-def _on_sphere(lat_deg: Array, lon_deg: Array) -> Array:
-    lat, lon = np.radians(lat_deg), np.radians(lon_deg)
-    return EARTH_RADIUS_M * np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=1)

@@ -12,6 +12,7 @@ from logger.fleet.layer import FIELDS, roads_layer
 from logger.fleet.pseudonyms import shown_car
 from logger.fleet.summary import FALSE_SHARE, FleetFigures, RoadTable
 from logger.printable import counted
+from logger.report.quantities import known
 from logger.store.log.log_reader import utc
 
 _SHOWN_ROADS, _SHOWN_CARS = 15, 10
@@ -42,11 +43,11 @@ def figures_json(figures: FleetFigures) -> dict[str, Any]:
     biases = figures.biases
     return {
         "by": figures.roads.by, "windows": figures.windows, "withheld_segments": figures.withheld,
-        "growth_per_year": _known(biases.growth_per_year), "pass_std": _known(biases.pass_std),
-        "session_std": _known(biases.pass_std * figures.shared**0.5),
-        "cars": [{"car": shown_car(car), "passes": int(passes), "bias": _known(gain - 1.0 if known else np.nan),
-                  "bias_std": _known(gain * std if known else np.nan), "group": int(group)}
-                 for car, passes, gain, std, group, known in zip(
+        "growth_per_year": known(biases.growth_per_year), "pass_std": known(biases.pass_std),
+        "session_std": known(biases.pass_std * figures.shared**0.5),
+        "cars": [{"car": shown_car(car), "passes": int(passes), "bias": known(gain - 1.0 if estimated else np.nan),
+                  "bias_std": known(gain * std if estimated else np.nan), "group": int(group)}
+                 for car, passes, gain, std, group, estimated in zip(
                      figures.cars.tolist(), figures.car_passes.tolist(), biases.gain.tolist(), biases.log_std.tolist(),
                      biases.group.tolist(), biases.known.tolist(), strict=True)],
         "roads": [dict(zip(names, one.values, strict=True)) for one in roads_layer(figures.roads).features]}
@@ -108,11 +109,6 @@ def _changes(roads: RoadTable) -> list[str]:
         f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
         f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "
         f"{roads.p_value[one]:.1g}" for one in order]
-
-
-
-def _known(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 def error_words(std: float) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 from logger.comfort import exposure
@@ -16,6 +15,7 @@ from logger.comfort.iso2631 import (
     total,
 )
 from logger.comfort.ride_comfort import RideComfort
+from logger.report.quantities import known
 
 METHOD = "formula of the standard, magnitude and phase, by Fourier transform of the whole record"
 
@@ -42,15 +42,11 @@ def _axis_json(figures: AxisFigures) -> dict[str, Any]:
         "mtvv_mps2": figures.mtvv_mps2,
         "mtvv_exponential_mps2": figures.mtvv_exponential_mps2,
         "vdv_mps175": figures.vdv_mps175,
-        "crest_factor": _known(figures.crest_factor),
-        "mtvv_ratio": _known(figures.mtvv_ratio),
-        "vdv_ratio": _known(figures.vdv_ratio),
+        "crest_factor": known(figures.crest_factor),
+        "mtvv_ratio": known(figures.mtvv_ratio),
+        "vdv_ratio": known(figures.vdv_ratio),
         "report_beside_a_w": list(figures.beside_a_w()),
     }
-
-
-def _known(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 def _word(result: RideComfort, a_w_mps2: float) -> str | None:
@@ -83,11 +79,11 @@ def _health(result: RideComfort) -> dict[str, Any] | None:
     return {
         "daily_hours": hours,
         "a8_mps2": a8_mps2, "a8_axis": a_w_axis, "a8_verdict": a8_at.verdict(a8_mps2),
-        "hours_to_a8_action": _known(exposure.hours_to_a8(a_w_mps2, a8_at.action)),
-        "hours_to_a8_limit": _known(exposure.hours_to_a8(a_w_mps2, a8_at.limit)),
+        "hours_to_a8_action": known(exposure.hours_to_a8(a_w_mps2, a8_at.action)),
+        "hours_to_a8_limit": known(exposure.hours_to_a8(a_w_mps2, a8_at.limit)),
         "daily_vdv_mps175": dose, "vdv_axis": vdv_axis, "vdv_verdict": vdv_at.verdict(dose),
-        "hours_to_vdv_action": _known(exposure.hours_to_vdv(vdv, seconds, vdv_at.action)),
-        "hours_to_vdv_limit": _known(exposure.hours_to_vdv(vdv, seconds, vdv_at.limit)),
+        "hours_to_vdv_action": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.action)),
+        "hours_to_vdv_limit": known(exposure.hours_to_vdv(vdv, seconds, vdv_at.limit)),
         "caution_zone": {
             "n2": _zone(exposure.caution_zone(hours, 2), a_w_mps2, "mps2"),
             "n4": _zone(exposure.caution_zone(hours, 4), a_w_mps2, "mps2"),

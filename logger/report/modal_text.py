@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.modal.mode import FoundMode, ModalResult
+from logger.report.quantities import known
 from logger.store.formats.channel_file import ChannelRecord
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +23,7 @@ def as_json(result: ModalResult, record: ChannelRecord, method: str) -> dict[str
     """The agreed fields of each mode first, then its shape; null where the method cannot tell."""
     return {
         "modes": [mode_json(mode, record.names) for mode in result.modes],
-        "rejected": [{"frequency_hz": one.frequency_hz, "damping_ratio": _known(one.damping_ratio),
+        "rejected": [{"frequency_hz": one.frequency_hz, "damping_ratio": known(one.damping_ratio),
                       "reason": one.reason} for one in result.rejected],
         "method": method, "how": result.how, "order": result.order, "rate_hz": record.rate_hz,
         "samples": len(record.samples),
@@ -32,8 +33,8 @@ def as_json(result: ModalResult, record: ChannelRecord, method: str) -> dict[str
 def mode_json(mode: FoundMode, names: tuple[str, ...]) -> dict[str, Any]:
     """One mode; ``names`` of the channels."""
     return {
-        "frequency_hz": mode.frequency_hz, "damping_ratio": _known(mode.damping_ratio),
-        "frequency_std_hz": mode.frequency_std_hz, "damping_std": _known(mode.damping_std),
+        "frequency_hz": mode.frequency_hz, "damping_ratio": known(mode.damping_ratio),
+        "frequency_std_hz": mode.frequency_std_hz, "damping_std": known(mode.damping_std),
         "shape": [{"channel": name, "amplitude": float(abs(part)), "phase_deg": degrees(phase(part))}
                   for name, part in zip(names, mode.shape.tolist(), strict=True)],
     }
@@ -43,8 +44,8 @@ def vehicle_json(frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Ar
                  ) -> dict[str, Any]:
     """Modes (m,) of a vehicle's file; null where a standard deviation is not known."""
     rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, damping_ratio, damping_std)), strict=True)
-    return {"modes": [{"frequency_hz": hz, "damping_ratio": ratio, "frequency_std_hz": _known(hz_std),
-                       "damping_std": _known(ratio_std)} for hz, hz_std, ratio, ratio_std in rows]}
+    return {"modes": [{"frequency_hz": hz, "damping_ratio": ratio, "frequency_std_hz": known(hz_std),
+                       "damping_std": known(ratio_std)} for hz, hz_std, ratio, ratio_std in rows]}
 
 
 def vehicle_lines(title: str, frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
@@ -55,10 +56,6 @@ def vehicle_lines(title: str, frequency_hz: Array, frequency_std_hz: Array, damp
     return [title, "mode   frequency Hz           damping %",
             *(f"{number:4}   {with_error(hz, hz_std):22} {with_error(percent, percent_std)}"
               for number, (hz, hz_std, percent, percent_std) in enumerate(rows, start=1))]
-
-
-def _known(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
 from logger.report.laid_drives import LaidDrives
+from logger.report.quantities import known
 from logger.report.terminal import comfort_words
 from logger.roads.places_to_visit import Place
 from logger.store.log.log_reader import iso_utc
@@ -93,14 +94,13 @@ def compass(heading_deg: float) -> str:
     return ("N", "NE", "E", "SE", "S", "SW", "W", "NW")[round(heading_deg / 45.0) % 8]
 
 
-
 # --- for programs ---
 
 
 def as_json(found: LaidDrives) -> dict[str, Any]:
     """The figures; null where nothing is known."""
     return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
-            "scatter_drive": _known(found.scatter.drive), "scatter_pass": _known(found.scatter.passes),
+            "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
             "cells": [cell_values(found, index) for index in range(len(found.iri.key))],
             "visits": [visit_values(found, one) for one in found.visits]}
 
@@ -111,7 +111,7 @@ def cell_values(found: LaidDrives, index: int) -> dict[str, Any]:
     change, trend = found.change, found.trend
     values = {
         "cell": int(key), "drives": int(found.iri.drives[index]), "iri_m_per_km": float(found.iri.iri_m_per_km[index]),
-        "iri_std_m_per_km": float(found.iri.iri_std_m_per_km[index]), "a_w_mps2": _known(found.a_w_mps2[index]),
+        "iri_std_m_per_km": float(found.iri.iri_std_m_per_km[index]), "a_w_mps2": known(found.a_w_mps2[index]),
         "lat_deg": float(found.lat_deg[index]), "lon_deg": float(found.lon_deg[index]),
         "heading_deg": float(found.heading_deg[index]), "first_utc": _utc(found.iri.first_s[index]),
         "last_utc": _utc(found.iri.last_s[index])}
@@ -140,7 +140,3 @@ def visit_values(found: LaidDrives, one: Place) -> dict[str, Any]:
 
 def _utc(time_s: float) -> str | None:
     return iso_utc(round(time_s * US_PER_S)) if isfinite(time_s) else None
-
-
-def _known(value: float) -> float | None:
-    return float(value) if isfinite(value) else None

@@ -82,3 +82,8 @@ def signal_errors(errors: Mapping[str, Sequence[float]], words: str) -> list[str
     """A sentence on the errors of other signals, by name, as many of each as ``words`` has places; none for none."""
     each = "; ".join(f"{name} {words.format(*(f'{one:.3f}' for one in some))}" for name, some in errors.items())
     return [f"Errors of the other signals: {each}."] if each else []
+
+
+def known(value: float) -> float | None:
+    """A number for a program; None (null) where it is not known."""
+    return float(value) if isfinite(value) else None

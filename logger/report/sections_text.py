@@ -13,6 +13,7 @@ from logger.chart_data import Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
 from logger.report.drive_sections import DriveSections
+from logger.report.quantities import known
 from logger.roads.iso8608 import iri_class
 from logger.roads.roughness_words import FEDERAL_WORDS
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, MILE_M, MPH_MPS
@@ -116,17 +117,13 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
     """The sections of a drive by the names of their columns; None where nothing is known."""
     figures = one.figures
     for index, word in enumerate(one.condition):
-        numbers = {name: _known(getattr(figures, name)[index]) for name in (
+        numbers = {name: known(getattr(figures, name)[index]) for name in (
             "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps", "worst_m_per_km", "worst_at_m")}
         iri, a_w = numbers["iri_m_per_km"], numbers["a_w_mps2"]
         yield {"distance_start_m": float(figures.edges_m[index]), "distance_end_m": float(one.ends_m[index]),
                "known_m": float(figures.known_m[index]), **numbers, "condition": word or None,
                "iri_class": None if iri is None else iri_class(iri),
                "comfort": None if a_w is None else comfort_word(a_w)}
-
-
-def _known(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
 
 
 def charts(drives: Sequence[DriveSections]) -> list[Chart]:

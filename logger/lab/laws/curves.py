@@ -70,10 +70,10 @@ class CurveFamily(Family):
     force: str
     source: str
     signature: str
-    usual_share: float
-    reach_share: float
-    powers: tuple[float, ...]
-    power_ends: tuple[float, float]
+    usual_share: float = 0.98
+    reach_share: float = 0.9999
+    powers: tuple[float, ...] = (2.0, 3.0)
+    power_ends: tuple[float, float] = (0.3, 8.0)
     ends: tuple[tuple[int, str], ...]
 
     @abstractmethod

@@ -125,12 +125,16 @@ def as_recorded(base: Baseline) -> Baseline:
     return Baseline.of(LinearModel(posterior, there, numbers), as_recorded=True)
 
 
+def others(state: State, name: str) -> tuple[Chosen, ...]:
+    """The effects of a model but one."""
+    return tuple(one for one in state.effects if one.effect.name != name)
+
+
 def taken_out(now: Baseline, name: str) -> Baseline:
     """A model without one of its effects, all else as it was with it: whatever belongs in the place of that effect is
     found beside others that have not yet moved to make up for it."""
     posterior, state = now.posterior, now.state
-    rest = tuple(one for one in state.effects if one.effect.name != name)
-    there = posterior.at(rest, state.logs, state.record, state.size)
+    there = posterior.at(others(state, name), state.logs, state.record, state.size)
     return Baseline.of(LinearModel(posterior, there, posterior.number_slopes(there, posterior.prior.steps)))
 
 

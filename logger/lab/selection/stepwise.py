@@ -27,6 +27,7 @@ from logger.lab.selection.screening import (
     Screened,
     as_recorded,
     misalignment_of_record,
+    others,
     screened,
     shared_numbers,
     taken_out,
@@ -230,7 +231,7 @@ class Search:
         return kept[name]
 
     def _fitted_without(self, now: Baseline, name: str) -> Baseline:
-        rest = tuple(one for one in now.state.effects if one.effect.name != name)
+        rest = others(now.state, name)
         away = next(one for one in now.state.effects if one.effect.name == name)
         posterior = now.posterior
         if away.effect.realigns:
@@ -303,15 +304,15 @@ class Search:
         while names:
             self.progress(f"are all of {', '.join(names)} needed?")
             with ThreadPoolExecutor(self.workers) as pool:
-                others = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
-            gains = {name: other.score - now.score for name, other in others.items()}
+                without = dict(zip(names, pool.map(partial(self.without, now), names), strict=True))
+            gains = {name: other.score - now.score for name, other in without.items()}
             least = min(gains, key=lambda name: gains[name])
-            raising = [name for name in names if _raises(now, others[name], name)]
+            raising = [name for name in names if _raises(now, without[name], name)]
             if raising:
                 least = min(raising, key=lambda name: gains[name])
-            elif len(names) == 1 or self._is_evident(others[least], gains[least]):
+            elif len(names) == 1 or self._is_evident(without[least], gains[least]):
                 break
-            now = others[least]
+            now = without[least]
             names.remove(least)
             gains.pop(least)
         return now, self._findings(now, dict(sorted(gains.items(), key=lambda pair: -pair[1])))

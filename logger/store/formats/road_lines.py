@@ -19,17 +19,27 @@ MAX_BYTES = 256 << 20
 Array = npt.NDArray[np.float64]
 
 
-def read_road_lines(path: Path | str) -> list[tuple[Array, Array]]:
-    """Latitudes and longitudes (n,) [degrees] of each line of a file, n > 1; what is no line is left out.
-
-    Raises BadInput for a file that cannot be read, is not GeoJSON, or holds no line.
-    """
+def read_geojson(path: Path | str) -> dict[str, Any]:
+    """A file's object, which has a type. BadInput for a file that cannot be read or is not GeoJSON."""
     try:
         content = json.loads(read_bounded(path, MAX_BYTES))
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{path}: expected GeoJSON, found what is no JSON ({error})") from None
     if not isinstance(content, dict) or not isinstance(content.get("type"), str):
         raise BadInput(f"{path}: expected GeoJSON, an object with a type, such as a FeatureCollection")
+    return content
+
+
+def read_road_lines(path: Path | str) -> list[tuple[Array, Array]]:
+    """Latitudes and longitudes (n,) [degrees] of each line of a file, n > 1; what is no line is left out.
+
+    Raises BadInput for a file that cannot be read, is not GeoJSON, or holds no line.
+    """
+    return road_lines_of(read_geojson(path), path)
+
+
+def road_lines_of(content: dict[str, Any], path: Path | str) -> list[tuple[Array, Array]]:
+    """The same of an object that was read from ``path``."""
     lines = [_line(path, points) for geometry in _geometries(content) for points in _points(geometry)]
     if not lines:
         raise BadInput(f"{path}: expected roads as LineString or MultiLineString, found none")

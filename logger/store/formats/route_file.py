@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.files import read_bounded
-from logger.store.formats.road_lines import MAX_BYTES, read_road_lines
+from logger.store.formats.road_lines import read_geojson, road_lines_of
 
 Array = npt.NDArray[np.float64]
 
@@ -42,11 +41,11 @@ def read_route(path: Path | str) -> Route:
 
     Raises BadInput for a file that cannot be read, is not GeoJSON, or holds another number of lines.
     """
-    lines = read_road_lines(path)
+    content = read_geojson(path)
+    lines = road_lines_of(content, path)
     if len(lines) != 1:
         raise BadInput(f"{path}: expected one LineString, the route, found {len(lines)} lines")
-    content = json.loads(read_bounded(path, MAX_BYTES))
-    features = content.get("features") if content.get("type") == "FeatureCollection" else [content]
+    features: Any = content.get("features") if content.get("type") == "FeatureCollection" else [content]
     features = [one for one in features if isinstance(one, dict)] if isinstance(features, list) else []
     posts: list[tuple[float, float, float]] = []
     begin_m = end_m = None

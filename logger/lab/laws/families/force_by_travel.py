@@ -20,8 +20,6 @@ class ForceByTravel(CurveFamily):
     force = "spring force"
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), chapter 5: springs, stops"
     signature = "large motions meet another spring than small ones"
-    usual_share, reach_share = 0.98, 0.9999
-    powers, power_ends = (2.0, 3.0), (0.3, 8.0)
     ends = ((0, "in deep compression"), (-1, "in extension"))
 
     def usual_force_n(self, look: Look, usual: float) -> float:

@@ -21,8 +21,6 @@ class TireForce(CurveFamily):
     force = "tire force"
     source = "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: stiffness grows with the load"
     signature = "wheels hop at another frequency where the road is rough"
-    usual_share, reach_share = 0.98, 0.9999
-    powers, power_ends = (2.0, 3.0), (0.3, 8.0)
     ends = ((0, "where it is pressed most"), (-1, "where it is let go"))
 
     def usual_force_n(self, look: Look, usual: float) -> float:
