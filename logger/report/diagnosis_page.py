@@ -102,8 +102,8 @@ def car_sections(found: Diagnosis) -> Html:
     numbers = chart(bars) + grid(("Number", "Refitted by", "Usual", ""), rows, words=(0, 3)) + hint(
         "A number that has to move far may stand in for an effect that is not among the candidates.")
     curves = concatenated(map(_force, found.car.curves))
-    said = hint("Over what the model's suspensions reach in these runs, but for 0.1 % of the time. Forces with a memory "
-                "are not in it.") if curves else EMPTY
+    said = hint("Over what the model's suspensions reach in these runs, but for 0.1 % of the time. Forces with a "
+                "memory are not in it.") if curves else EMPTY
     return (section("The car's own numbers", numbers if rows else EMPTY)
             + section("Its springs and dampers", curves + said))
 

@@ -38,8 +38,8 @@ def _choice(drives: Sequence[str]) -> Html:
         return EMPTY
     options = concatenated(html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)
                            for number, when in enumerate(drives))
-    return html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select></label>',
-                options)
+    return html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select>'
+                "</label>", options)
 
 
 def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
@@ -47,8 +47,8 @@ def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Htm
                                 "true" if name == "iri" else "false", words) for name, words in _MODES)
     trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
     repeated = hint("Where several drives came by, the colour is that of their mean.") if len(drives) > 1 else EMPTY
-    return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
-                "{}</div>"
+    return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
+                "{}</div>{}</div>"
                 '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the way. '
                 "Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
                 'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'

@@ -12,8 +12,8 @@ import time
 
 import numpy as np
 
+from logger.roads.laid_traces import lay
 from logger.roads.repeated_drives import Passes, means, passes_of, scatter_of
-from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork
 
 from ..support.drives.parallel_town import WINDOW_M, judged, road_values, town_drives
