@@ -54,8 +54,8 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     common to a drive (``scatter``) does not fall with the cells that it passed.
     """
     if not len(passes.key):
-        none, zero = np.zeros(0, np.intp), np.zeros(0)
-        return WayMeans(none, zero, none, zero, zero)
+        none = np.zeros(0, np.intp)
+        return WayMeans(none, np.zeros(0), none, np.zeros(0), np.zeros(0))
     _, cell = np.unique(passes.key, return_inverse=True)
     own = variances(passes, Scatter(0.0, scatter.passes))
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
@@ -66,7 +66,7 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     first = np.unique(cell, return_index=True)[1]
     np.add.at(covered_m, of[first], length_m)
     share = weight / np.bincount(cell, weight)[cell] * length_m[cell] / covered_m[of]
-    mean = np.bincount(of, share * passes.iri_m_per_km)
+    mean: Array = np.asarray(np.bincount(of, share * passes.iri_m_per_km), dtype=np.float64)
     pair, which = np.unique(np.stack([of, passes.drive]), axis=1, return_inverse=True)
     by_drive = np.bincount(which.ravel(), share)
     common = np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
