@@ -83,8 +83,11 @@ _READOUT = Html(
 
 
 def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
-    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(share.name, names), words_of(share.name))
-                     for share in shares)
+    shown = {share.name for share in shares}
+    ranks = [number for number, one in enumerate(names) if one in shown]
+    shown |= set(names[min(ranks): max(ranks)]) if ranks else set()  # a mean of windows may lie between their classes
+    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(one, names), words_of(one))
+                           for one in sorted(shown, key=lambda one: names.index(one) if one in names else len(names)))
     return html('<ul class="legend {}">{}</ul>', name, entries)
 
 
