@@ -34,7 +34,7 @@ _CHANGE = log(0.1)  # to leave a street that goes on beside
 _WORST = 25.0  # how much less likely than the best a chain may be and still be followed
 _MOST_CHAINS = 16
 _MOST_EACH = 3  # of them to one street, by different errors of the receiver
-_SURE = 0.5  # a street that is less likely than all others together is none to be believed
+_SURE = 0.8  # as of places to visit: a street that is less likely than this is not to be believed
 GAP_M = 50.0  # between windows: what lay beside before says nothing after
 _STREET_M, _STRAIGHT = 5.0, 0.9  # aside, and cosine: so near the next way continues the one before
 

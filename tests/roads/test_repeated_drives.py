@@ -64,7 +64,7 @@ def test_a_drive_that_passes_a_place_twice_is_laid_over_itself() -> None:
 
 
 def test_lanes_of_a_town_are_told_apart() -> None:
-    drives = town_drives(6, 400, seed=4)
+    drives = town_drives(8, 400, seed=4)
     network = RoadNetwork()
     seen = judged(drives, lay(network, [one.trace for one in drives]), network)
     assert len(seen.wrong) > 1000
