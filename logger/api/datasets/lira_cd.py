@@ -27,7 +27,8 @@ from logger.roads.agreement import best_shift_m, matching_cells, mean_between
 from logger.shipped import vehicle_path
 from logger.store.formats.semicolon_table import read_semicolons
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.study import Effort, Result, Study, Table, Word
+from logger.studies.checks import Word
+from logger.studies.study import Effort, Item, Picture, Result, Study, Table
 from logger.units import KMH_MPS
 
 Array = npt.NDArray[np.float64]
@@ -79,7 +80,7 @@ def run(folder: Path, effort: Effort) -> Result:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
     tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
     tables.append(Table("The profilers beside each other", REPEAT_COLUMNS, tuple(repeats)))
-    pictures = tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
+    pictures = tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
     return Result(tuple(tables), verdict_of(parts, refused, _CEILING), pictures)
 
 
@@ -225,5 +226,5 @@ STUDY = Study(
     "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
     "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. "
     "The reader is tested on small files of the same layout.",
-    from_folder("LiRA-CD", _DOWNLOAD, run), ("LiRA-CD",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")

@@ -21,7 +21,8 @@ from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, v
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.study import Effort, Result, Study, Word
+from logger.studies.checks import Word
+from logger.studies.study import Effort, Item, Picture, Result, Study
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def run(folder: Path, effort: Effort) -> Result:
         raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {(refused + elsewhere)[0]}")
     tables = tuple(compared_table(parts, window_m) for window_m in WINDOWS_M)
     return Result(tables, verdict_of(parts, refused, _ceiling()),
-                  tuple(along(one) for one in parts if one.window_m == WINDOWS_M[-1]))
+                  tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1]))
 
 
 def _ceiling() -> str:
@@ -150,5 +151,5 @@ STUDY = Study(
     "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
     "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested "
     "on small files of the same layout.",
-    from_folder("Zenodo 4386256", _DOWNLOAD, run), ("Zenodo 4386256",), Word.NOT_REPRODUCIBLE, NOT_RUN,
+    from_folder("Zenodo 4386256", _DOWNLOAD, run), (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")
