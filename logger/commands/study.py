@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 QUICK_SHARE = 0.1
 SHELF_NAMES = ("dissertation", "field", "roads")
-_WIDTH = 118
+_WIDTH, _NARROWEST = 118, 24
 _BAR = 30
 
 
@@ -168,17 +168,26 @@ def lines(study: Study, result: Result) -> list[str]:
 
 
 def _table_lines(table: Table) -> list[str]:
-    """Columns as wide as what is in them; a heading that is wider is broken into lines."""
+    """Columns as wide as what is in them; headings, and words where the line would be too long, are broken."""
     cells = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
     widths = [max(max((len(row[index]) for row in cells), default=0), max(map(len, column.name.split())))
               for index, column in enumerate(table.columns)]
-    heads = [fill(column.name, width, break_long_words=False).split("\n")
-             for column, width in zip(table.columns, widths, strict=True)]
-    deep = max(map(len, heads))
-    rows = [*zip(*([""] * (deep - len(head)) + head for head in heads), strict=True), *cells]
     left = [index in table.words for index in range(len(widths))]
+    while sum(widths) + 2 * len(widths) > _WIDTH and max(widths) > _NARROWEST:
+        widths[widths.index(max(widths))] -= 1
+    heads = _broken([column.name for column in table.columns], widths, lowest=True)
     return ["  ".join(f"{cell:<{width}}" if words else f"{cell:>{width}}"
-                      for cell, width, words in zip(row, widths, left, strict=True)).rstrip() for row in rows]
+                      for cell, width, words in zip(row, widths, left, strict=True)).rstrip()
+            for rows in (heads, *(_broken(row, widths) for row in cells)) for row in rows]
+
+
+def _broken(cells: list[str], widths: list[int], lowest: bool = False) -> list[tuple[str, ...]]:
+    """The lines of a row whose cells are as wide; of heads, which stand ``lowest``, the last ones are full."""
+    parts = [fill(cell, width, break_long_words=False).split("\n") for cell, width in zip(cells, widths, strict=True)]
+    deep = max(map(len, parts))
+    empty = [[""] * (deep - len(part)) for part in parts]
+    return list(zip(*(blank + part if lowest else part + blank for part, blank in zip(parts, empty, strict=True)),
+                    strict=True))
 
 
 def as_json(study: Study, result: Result) -> dict[str, Any]:

@@ -6,7 +6,6 @@ Self-contained, in the style of the report.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import zip_longest
 
 from logger.report.charts import chart
 from logger.report.document import document, grid, heading, hint, paragraphs, section, tiles
@@ -74,8 +73,8 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
-        heading("Studies: printed results, made again", "Each printed item with one word for how ours stands beside "
-                                                        "it."),
+        heading("Studies: printed results, made again",
+                "Each printed item has one word for how ours stands beside it."),
         paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)
@@ -88,10 +87,10 @@ def _contents(title: str, part: Sequence[Study], carried: Mapping[str, Carried])
 
 def _rows(study: Study, found: Carried | None) -> list[tuple[str, Html, str, str, str]]:
     """A row for each word and reason of a study; its time stands in the first."""
-    times = [f"{found.seconds:.1f} s" if found is not None else "-"]
+    seconds = f"{found.seconds:.1f} s" if found is not None else "-"
     by_source = "" if study.source == DISSERTATION else f" ({study.source})"
-    return [(_joined(names) + by_source, _link(study, found), _word(item, found), _because(study, item, found), time)
-            for (names, item), time in zip_longest(study.groups, times, fillvalue="")]
+    return [(_joined(names) + by_source, _link(study, found), _word(item, found), _because(study, item, found),
+             "" if place else seconds) for place, (names, item) in enumerate(study.groups)]
 
 
 def _word(item: Item, found: Carried | None) -> str:

@@ -131,15 +131,16 @@ class Result:
 
 def _of_numbers(title: str, values: Sequence[Value]) -> Table:
     ours = "from the print" if values[0].of_print else "ours"
-    rows = tuple((one.name, *_items(one, values), one.printed, one.ours, one.difference, one.tolerance, _stands(one))
-                 for one in values)
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (one.name, *_items(one, values), one.printed, one.ours, one.difference, one.tolerance, _stands(one))
+        for one in values)
     return Table(title, (Column("value"), *_of(values), Column("printed", ".6g"), Column(ours, ".6g"), Column(
         "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
 
 
 def _of_statements(statements: Sequence[Statement]) -> Table:
-    rows = tuple((one.printed, *_items(one, statements), one.name, one.ours, one.bounds, _stands(one))
-                 for one in statements)
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (one.printed, *_items(one, statements), one.name, one.ours, one.bounds, _stands(one)) for one in statements)
     return Table("Printed in words, and ours", (Column("printed"), *_of(statements), Column("figure"), Column(
         "ours", ".4g"), Column("true for"), Column("word")), rows)
 

@@ -34,7 +34,8 @@ def run(effort: Effort) -> Result:
         values += about((PROFILES[name], SPECTRA[name]), [
             Value(f"class {name} road, Gd(n0) [cm3]", gd, found.gd_n0_cm3, gd / 2)])
         values += about(SPECTRA[name], [
-            Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15),
+            Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15)])
+        values += about(SPECTRA[name], [
             Statement(f"class {name}: scatter of the smoothed over that of the raw spectrum", "smoothed, it is easier "
                       "to put into a class", scatter[1] / scatter[0], most=0.5)])
         levels.append(bands.psd_m3)

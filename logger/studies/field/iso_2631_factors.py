@@ -40,11 +40,11 @@ def run(effort: Effort) -> Result:
                "they "
                "are those of the formula at the nominal frequencies. Wd at 10 Hz is printed 212; the formula "
                "has 202, and so has a smooth curve through its neighbours.")
-    hz = np.array(HZ, dtype=float)
+    at_hz = np.array(HZ, dtype=float)
     picture = Picture(Curves("Factors of Wk and Wd", "frequency [Hz]", "factor times 1000", tuple(
         line for name, weighting in (("wk", WK), ("wd", WD)) for line in (
-            Line(f"{name}, ours", hz, 1000 * np.abs(weighting.response(hz))),
-            Line(f"{name}, printed", hz, np.array(PRINTED[name], dtype=float), dots=True))), log_x=True, log_y=True),
+            Line(f"{name}, ours", at_hz, 1000 * np.abs(weighting.response(at_hz))),
+            Line(f"{name}, printed", at_hz, np.array(PRINTED[name], dtype=float), dots=True))), log_x=True, log_y=True),
         "a table of factors from 0.02 to 400 Hz, of which those of 0.5 to 80 Hz are taken")
     return Result((table,), verdict, (picture,), tuple(values))
 
