@@ -2,8 +2,8 @@
 
 Layout as the readers of the set's own users have it (github.com/rreezN/CrackDetect, Apache 2.0; names and columns alone
 were taken from there). ``platoon_CPH1_HH.hdf5``: group GM, below it trips, below those passes, each with signals (n, 2
-or more), seconds in the first column: ``acc.xyz`` [g], ``gps`` (latitude, longitude), ``spd_veh`` [km/h].
-``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for 10 m each, from ``Distance [m]``
+or more), seconds in the first column: ``acc.xyz`` (gravity in it, whose size tells the unit), ``gps`` (latitude,
+longitude), ``spd_veh`` [km/h]. ``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for 10 m each, from ``Distance [m]``
 on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of another profiler, ARAN, with
 places. HH and VH are the two carriageways: two roads.
 """
@@ -18,7 +18,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, each_pass, on_line, runs_of, windows_of
+from logger.api.road_passes import (
+    WINDOWS_M,
+    DrivenWindows,
+    Recording,
+    each_pass,
+    on_line,
+    runs_of,
+    unit_by_gravity,
+    windows_of,
+)
 from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_COLUMNS, Compared, along, compared_table, repeat_row, verdict_of
 from logger.errors import BadInput
@@ -126,7 +135,7 @@ def _recording(name: str, group: Any) -> Recording:
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
     inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
     gps = gps[inside]
-    return Recording(name, accel[:, 0], accel[:, 1:4], "g", gps[:, 0],
+    return Recording(name, accel[:, 0], accel[:, 1:4], unit_by_gravity(accel[:, 1:4]), gps[:, 0],
                      np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
 
 

@@ -15,7 +15,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_passes import WINDOWS_M, DrivenWindows, Recording, driven_windows, each_pass
+from logger.api.road_passes import (
+    WINDOWS_M,
+    DrivenWindows,
+    Recording,
+    driven_windows,
+    each_pass,
+    unit_by_gravity,
+)
 from logger.api.road_sets import NOT_RUN, expected_files, from_folder
 from logger.api.road_tables import REPEAT_R2, Compared, along, compared_table, verdict_of
 from logger.errors import BadInput
@@ -126,12 +133,11 @@ def trip(file: Path) -> Recording:
         raise BadInput(f"{file}: expected {', '.join(_TRIP)} of one length, found "
                        f"{', '.join(str(len(one)) for one in columns)}")
     time_s, x, y, z, speed_mps, lat_deg, lon_deg = columns
-    size = float(np.median(np.sqrt(x**2 + y**2 + z**2)))
-    unit = "g" if size < 5 else "m/s2"  # what gravity is in them
+    accel = np.column_stack([x, y, z])
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
     second = np.floor((time_s - time_s[0]) / _FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
-    return Recording(file.stem, time_s, np.column_stack([x, y, z]), unit, time_s[kept], speed_mps[kept], lat_deg[kept],
+    return Recording(file.stem, time_s, accel, unit_by_gravity(accel), time_s[kept], speed_mps[kept], lat_deg[kept],
                      lon_deg[kept])
 
 
