@@ -17,7 +17,9 @@ from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Tab
 _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
-_STYLE = "td:first-child{white-space:normal;min-width:9em}"
+_STYLE = "td:first-child{white-space:normal;min-width:9em}figure+.hint{margin-bottom:2em}"
+_UNBROKEN = ("of", "word", "true for")
+"""Columns of short words, which break between items only."""
 _INDEX_STYLE = _STYLE + (
     "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(3),td:nth-child(5){white-space:nowrap}"
     "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
@@ -44,7 +46,7 @@ def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -
 
 def _items(study: Study, result: Result) -> Html:
     """Each printed item with the word that its checks come to."""
-    rows = [(_joined(names), str(word_of(study.checks_of(item.name, result))), item.because,
+    rows = [(_joined(names), _joined([word_of(study.checks_of(item.name, result))]), item.because,
              str(max(len(study.checks_of(name, result)) for name in names))) for names, item in study.groups]
     return section("How ours stands beside the print", grid(("printed", "word", "because", "checks of each"), rows,
                                                             range(3)))
@@ -112,5 +114,6 @@ def _link(study: Study, found: Carried | None) -> Html:
 
 
 def _table(table: Table) -> Html:
-    rows = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
+    rows = [[_joined(column.text(cell).split(", ")) if column.name in _UNBROKEN else column.text(cell)
+             for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
     return section(table.title, grid([column.name for column in table.columns], rows, table.words))

@@ -3,9 +3,9 @@
 Layout as the readers of the set's own users have it (github.com/rreezN/CrackDetect, Apache 2.0; names and columns alone
 were taken from there). ``platoon_CPH1_HH.hdf5``: group GM, below it trips, below those passes, each with signals (n, 2
 or more), seconds in the first column: ``acc.xyz`` (gravity in it, whose size tells the unit), ``gps`` (latitude,
-longitude), ``spd_veh`` [km/h]. ``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for 10 m each, from ``Distance [m]``
-on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of another profiler, ARAN, with
-places. HH and VH are the two carriageways: two roads.
+longitude), ``spd_veh`` [km/h]. ``cph1_iri_mpd_rut_hh.csv``: IRI of the left and right wheel track of profiler P79 for
+10 m each, from ``Distance [m]`` on. ``cph1_zp_hh.csv``: its places by the same distance. ``cph1_aran_hh.csv``: IRI of
+another profiler, ARAN, with places. HH and VH are the two carriageways: two roads.
 """
 
 from __future__ import annotations
