@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from logger.report.charts import chart
-from logger.report.document import document, grid, heading, hint, paragraphs, section, tiles
+from logger.report.document import bullets, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.studies.all_studies import Carried
 from logger.studies.checks import Word, word_of
@@ -46,10 +46,12 @@ def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -
 
 def _items(study: Study, result: Result) -> Html:
     """Each printed item with the word that its checks come to."""
-    rows = [(_joined(names), _joined([word_of(study.checks_of(item.name, result))]), item.because,
-             str(max(len(study.checks_of(name, result)) for name in names))) for names, item in study.groups]
-    return section("How ours stands beside the print", grid(("printed", "word", "because", "checks of each"), rows,
-                                                            range(3)))
+    lines = []
+    for names, item in study.groups:
+        checks = max(len(study.checks_of(name, result)) for name in names)
+        counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
+        lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
+    return section("How ours stands beside the print", bullets(lines))
 
 
 def _picture(picture: Picture) -> Html:

@@ -63,7 +63,7 @@ class Effort:
         return [items[place] for place in kept]
 
     def each(self, items: Sequence[T]) -> Iterator[T]:
-        """The items, one after the other, told to ``progress``."""
+        """The items, one after the other; ``progress`` is called with each."""
         for done, item in enumerate(items):
             self.progress(done, len(items))
             yield item

@@ -80,7 +80,7 @@ def _row(what: str, found: RoadFit) -> tuple[Cell, ...]:
 
 
 def _profile(drive: Run, road: Track) -> tuple[float, float, Array, Array, RoadProfile]:
-    """Start and spacing [m], the true road in the band that is told, and that of the estimate [m]."""
+    """Start and spacing [m], the true road in the band that is known, and that of the estimate [m]."""
     sensor = Sensor(PS_2119.noise_mps2, PS_2119.step_mps2)
     _, found = estimated(known_vehicle(rav4()), sensor, WINDOW_M, drive.measured_mps2, drive.distance_m)
     assert found is not None

@@ -99,7 +99,7 @@ def run(effort: Effort) -> Result:
 
 
 def _percent(error: str) -> float:
-    """A standard error as the tables have it; infinite where it is above what is told."""
+    """A standard error as the tables have it; infinite where the tables only have a bound."""
     return float("inf") if error.startswith("above") else float(error)
 
 
