@@ -6,7 +6,7 @@ from logger.chart_data import Curves, Line
 from logger.roads.gd_iri import iri_of_road
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD, generate
-from logger.studies.checks import Value, Word
+from logger.studies.checks import Value, Word, about
 from logger.studies.study import Column, Effort, Picture, Result, Study, Table, alike
 
 PRINTED_POWER = 0.5
@@ -26,8 +26,9 @@ def run(effort: Effort) -> Result:
     spread = iri_of_road(1.0, _LENGTH_M).std / iri_of_road(1.0, _LENGTH_M).value
     terms = np.column_stack([np.ones(_SETS * roads), np.log(np.tile(gd, _SETS))])
     factor_std, power_std = (spread * np.sqrt(np.diag(np.linalg.inv(terms.T @ terms)))).tolist()
-    values = (Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
-              Value("b of IRI = c Gd^b", PRINTED_POWER, power, 3 * power_std))
+    values = about(("Fig 4.16", "Fig 4.17"), [
+        Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
+        Value("b of IRI = c Gd^b", PRINTED_POWER, power, 3 * power_std)])
     table = Table(f"Power laws through {roads} roads each", (
         Column("set"), Column("c", ".4f"), Column("b", ".4f")),
         (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
