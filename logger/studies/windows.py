@@ -88,10 +88,18 @@ def _rms(values: Array, distance_m: Array, edges_m: Array) -> Array:
     return np.sqrt(np.diff(sums[at]) / np.diff(at))
 
 
-def whole_road_by_rms(record: Run, vehicle: Vehicle | None = None, low_pass_hz: float | None = None) -> float:
-    """IRI of a whole drive at one speed by the dissertation's relation [m/km], its record low-passed or as it is."""
-    sensed = record.measured_mps2 if low_pass_hz is None else in_band(record.measured_mps2, RATE_HZ, 0.0, low_pass_hz)
-    return _factor(vehicle or rav4(), float(record.speed_mps[0])) * float(np.sqrt(np.mean(sensed**2)))
+def whole_road_by_rms(record: Run, vehicle: Vehicle | None = None) -> float:
+    """IRI of a whole drive at one speed by the dissertation's relation [m/km]."""
+    return _factor(vehicle or rav4(), float(record.speed_mps[0])) * float(np.sqrt(np.mean(record.measured_mps2**2)))
+
+
+def mean_window_by_rms(record: Run, edges_m: Array, low_pass_hz: float) -> float:
+    """IRI of windows between edges (w + 1,) by the dissertation's relation, the record low-passed: their mean [m/km].
+
+    Windows of one road differ, and the mean of roots is below the root of the mean: less than ``whole_road_by_rms``.
+    """
+    sensed = in_band(record.measured_mps2, RATE_HZ, 0.0, low_pass_hz)
+    return _factor(rav4(), float(record.speed_mps[0])) * float(_rms(sensed, record.distance_m, edges_m).mean())
 
 
 def rms_error(estimate: Array, exact: Array) -> float:

@@ -125,5 +125,8 @@ STUDY = Study(
     "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
     "middle, unless --vehicle names another car. This was run on the real minute.",
     from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE, "Of this minute no IRI is "
-         "printed; the receiver's speed is later and faster than the car's, by the figures above."),),
+                                                                                        "printed; the receiver's "
+                                                                                        "speed is later and faster "
+                                                                                        "than the car's, by the "
+                                                                                        "figures above."),),
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

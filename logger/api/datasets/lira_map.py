@@ -74,16 +74,13 @@ def run(folder: Path, effort: Effort) -> Result:
         (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
     spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]
     verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m, the lower "
-               "ones where its cells lie up to 5 m apart; two passes differ by up to "
-               f"{off_m_per_km[0]:.2f} and {off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than "
-               "that against one pass: it is the ceiling of every comparison on real roads. The figures of 0.85 per 10 "
-               "m "
-               "and 0.955 per 100 m that are quoted of these files are another thing: the squared correlation, which a "
-               "pass that reads 4 % more does not spoil, and after each stretch of road has been moved along by up to "
-               "4 m "
-               f"to where it fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on the mean of "
-               "the "
-               "three pairs; moving so many pieces fits some of the noise as well.")
+               f"ones where its cells lie up to 5 m apart; two passes differ by up to {off_m_per_km[0]:.2f} and "
+               f"{off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than that against one pass: it "
+               "is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per 100 m "
+               "that are quoted of these files are another thing: the squared correlation, which a pass that reads 4 "
+               "% more does not spoil, and after each stretch of road has been moved along by up to 4 m to where it "
+               f"fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on the mean of the three "
+               "pairs; moving so many pieces fits some of the noise as well.")
     return Result((*tables, length), verdict, (Picture(_picture(passes)),))
 
 

@@ -62,8 +62,7 @@ def run(effort: Effort) -> Result:
                 Picture(Curves("Their spectra (Fig 2.7, 2.9)", "wave number [cycle/m]", "displacement spectrum [m3]",
                                tuple(lines), log_x=True, log_y=True),
                         "a picture each, raw and smoothed: falling towards short waves, the rough road's shifted "
-                        "upward "
-                        "at all wave numbers"))
+                        "upward at all wave numbers"))
     return Result((table,), verdict, pictures, tuple(values))
 
 

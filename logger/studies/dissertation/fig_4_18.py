@@ -30,11 +30,10 @@ def run(effort: Effort) -> Result:
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
     spread = relative_spread(_LENGTH_M)
     verdict = (f"As printed, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
-               f"{slopes[0]:.3f} "
-               f"and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within {100 * spread:.0f} "
-               "% r.m.s., which is why the source shows two sets; the tolerance is three standard errors of the slope, "
-               "and 1 % for Eq 4.40. In place of ProVAL's IRI stands the exact one of ASTM E1926, which "
-               "agrees with the published check profile.")
+               f"{slopes[0]:.3f} and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within "
+               f"{100 * spread:.0f} % r.m.s., which is why the source shows two sets; the tolerance is three standard "
+               "errors of the slope, and 1 % for Eq 4.40. In place of ProVAL's IRI stands the exact one of ASTM "
+               "E1926, which agrees with the published check profile.")
     picture = Picture(Curves("IRI of roads generated for an IRI", "IRI wanted [m/km]", "IRI [m/km]", (
         Line("as wanted", wanted, wanted), *(Line(f"set {number + 1}", wanted, one, dots=True)
                                              for number, one in enumerate(found)))),

@@ -54,8 +54,7 @@ def run(effort: Effort) -> Result:
                             "height taken [mm]", np.array(widths), 1000 * np.array(heights), np.abs(errors),
                             "error [%]", PRINTED_LIMIT_PERCENT),
                       "errors up to 50 % over heights of 3 to 9 in and widths of 6 to 11 ft, from two sides: a dark "
-                      "blue "
-                      "region of right masses that slants")
+                      "blue region of right masses that slants")
     right_m = [float(np.interp(0.0, -row, widths)) for row in errors]  # the wider, the lighter the car
     return Result((Table("Their way: error of the mass, fitted alone (printed as a picture only)",
                          columns, rows), ours),

@@ -60,8 +60,9 @@ def run(effort: Effort) -> Result:
                   Statement("correlation of mass and height taken, their way", "linearly proportional",
                             float(np.corrcoef(heights, white)[0, 1]), 0.99),
                   Statement("error of the mass with the height estimated, over its standard error", "the mass cannot "
-                                                                                                    "be "
-                            "predicted without the height",
+                                                                                                    "be predicted "
+                                                                                                    "without the "
+                                                                                                    "height",
                             (both.parameters[MASS] - TRUTH[MASS]) / both.standard_errors[MASS], -3.0, 3.0, Word.BETTER),
                   Statement("standard error of that mass [%]", "large amounts of error",
                             100 * both.standard_errors[MASS]

@@ -39,8 +39,7 @@ def run(effort: Effort) -> Result:
     picture = Picture(Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m", "distance [m]",
                              "a_w [m/s2]", lines),
                       "a_w of each metre, up to nearly 1.5 m/s2 (Fig 4.34), and of each 10 m, in which the step is "
-                      "still "
-                      "clear (Fig 4.35)")
+                      "still clear (Fig 4.35)")
     each, tens = (float(one.max()) for one in found[0])
     quiet = float(np.delete(found[0][1], int(found[0][1].argmax())).max())
     return Result((table,), verdict, (picture,), (

@@ -44,8 +44,7 @@ def run(effort: Effort) -> Result:
                    for limit, word in _LIMITS)
     picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
                       "dots for heights and speeds, and two lines across: comfortable below the green one, a "
-                      "noticeable "
-                      "discomfort above the red one")
+                      "noticeable discomfort above the red one")
     return Result((table,), verdict, (picture,), values)
 
 

@@ -14,7 +14,7 @@ from logger.studies.checks import Statement, Value, Word, about
 from logger.studies.dissertation.table_2_3 import PRINTED_RANGES
 from logger.studies.drives import PS_2119, Array, Conditions, drive_over, random_road
 from logger.studies.study import Cell, Column, Effort, Item, Picture, Result, Study, Table, alike
-from logger.studies.windows import Figures, comfort_shares, per_window, rms_error, whole_road_by_rms
+from logger.studies.windows import Figures, comfort_shares, mean_window_by_rms, per_window, rms_error
 from logger.units import KMH_MPS, MPH_MPS, WINDOW_M
 
 PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 30), **dict.fromkeys((5, 8, 9), 25),
@@ -66,15 +66,11 @@ def run(effort: Effort) -> Result:
                "so the maps cannot be made again; on simulated roads the same steps give maps of the same kind. The "
                f"text finds the IRI overestimated below {PRINTED_SLOW_KMH:g} km/h. By Table D.1 that is "
                f"{sum(counts[mph] for mph in few)} segments, {counts[20]} at 20 mph and one alone at 15; {counts[25]} "
-               "are "
-               f"driven at 25 and {counts[30]} at 30 mph. So many roads scatter by more than the effect: over "
+               f"are driven at 25 and {counts[30]} at 30 mph. That is few to be sure of a mean: over "
                f"{len(slow)} further roads of waviness {_WAVINESS:g} at the slow speeds the relation reads "
-               f"{slow_mean:+.1f}"
-               f" +- {slow_std:.1f} %, at the fast ones {fast.mean():+.1f} +- {_standard_error(fast):.1f} %. The cause "
-               "is "
-               "that of Fig 6.11, and the 15 Hz low-pass takes a part of it away. The waviness was chosen: on roads of "
-               "2 "
-               "there would be no such error (Fig 6.9). That a "
+               f"{slow_mean:+.1f} +- {slow_std:.1f} %, at the fast ones {fast.mean():+.1f} +- "
+               f"{_standard_error(fast):.1f} %. The cause is that of Fig 6.11, and the 15 Hz low-pass takes a part of "
+               "it away. The waviness was chosen: on roads of 2 there would be no such error (Fig 6.9). That a "
                f"majority of windows is comfortable agrees: {shares['not_uncomfortable']:.0f} % here, for roads of a "
                f"median IRI of {_MEDIAN_IRI:g} m/km. Better: each window's IRI has a standard error, and of drives "
                "with GPS ridelog report draws both maps on the ground.")
@@ -118,7 +114,8 @@ def run(effort: Effort) -> Result:
 
 
 def _biases_percent(mph: int, segments: Sequence[int], effort: Effort) -> Array:
-    """Errors of the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
+    """Errors of the windows' mean by the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
+    edges_m = WINDOW_M * np.arange(_WINDOWS + 1)
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
     roads = max(2, effort.count(_ROADS * len(segments)), _FEWEST * slow * (len(segments) > 1))
     found = []
@@ -126,7 +123,7 @@ def _biases_percent(mph: int, segments: Sequence[int], effort: Effort) -> Array:
         segment, draw = segments[number % len(segments)], 1 + number // len(segments)
         road, drive, _ = _drive(segment, draw)
         inside = road.elevation_m[round(-road.start_m / road.spacing_m):][: round(_LENGTH_M / road.spacing_m) + 1]
-        found.append(whole_road_by_rms(drive, low_pass_hz=LOW_PASS_HZ) / iri(inside, road.spacing_m))
+        found.append(mean_window_by_rms(drive, edges_m, LOW_PASS_HZ) / iri(inside, road.spacing_m))
     return 100 * (np.array(found) - 1)
 
 

@@ -38,8 +38,7 @@ def run(effort: Effort) -> Result:
                "real building's second and third are 2 and 7 % lower. The decrement over all peaks gives back the "
                f"{100 * DAMPING_RATIO:.2f} % that were put in, with an error beside it; Eq 5.3 takes two of them (its "
                "rounded peaks give 1.35). The table above Eq 5.3 has 0.8545 m/s2 where Eq 5.3 has 0.085 g; with "
-               "0.08545 "
-               "g the ratio is 1.34 %.")
+               "0.08545 g the ratio is 1.34 %.")
     (begin_s, first), (end_s, last) = PRINTED_ROWS
     values = (*about("Table 5.2", [
         Value("mode 1 [Hz]", PRINTED_HZ[0], ps2119.peaks_hz[0], 0.05, Word.MISPRINT),

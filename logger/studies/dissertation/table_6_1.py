@@ -55,15 +55,13 @@ def run(effort: Effort) -> Result:
     by_trial = {f"Table 6.{trial}": _rms(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
     per_percent = _per_percent_of_speed(cases)
     verdict = ("A width or a speed that is 5 % off moves the source's mass by some 5 and 11 %, a height by little; "
-               f"with all three off by 5 % r.m.s. its errors are {_rms(theirs):.0f} % r.m.s. Of the printed trials the "
-               f"second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
-               f"({by_trial['Table 6.1']:.0f} "
-               f"%) asks for twice as much, or for a speed that is {by_trial['Table 6.1'] / per_percent:.0f} % off, "
-               f"while a speedometer may be {100 * SPEEDOMETER:.0f} % off at 16 km/h (UNECE R39). Bumps 3 and 4 are "
-               "too "
-               "light in both trials, so they differ from the first two. "
-               f"Estimating bump and speed together with the mass leaves {_rms(ours):.1f} %, which is the road's "
-               "roughness, and its standard error says so.")
+               f"with all three off by 5 % r.m.s. its errors are {_rms(theirs):.0f} % r.m.s. Of the printed trials "
+               f"the second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
+               f"({by_trial['Table 6.1']:.0f} %) asks for twice as much, or for a speed that is "
+               f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * SPEEDOMETER:.0f} "
+               "% off at 16 km/h (UNECE R39). Bumps 3 and 4 are too light in both trials, so they differ from the "
+               f"first two. Estimating bump and speed together with the mass leaves {_rms(ours):.1f} %, which is the "
+               "road's roughness, and its standard error says so.")
     values: tuple[Check, ...] = (*(one for item, rms in by_trial.items() for one in about(item, [
         Statement("speed that would have to be off for the printed r.m.s. error [%]", "changes in speed are a possible "
                   "source of error", rms / per_percent, 0.0, 100 * SPEEDOMETER, Word.NOT_REPRODUCIBLE)])),

@@ -47,12 +47,10 @@ def run(effort: Effort) -> Result:
     worst = 100 * float(max(abs(one / PRINTED_TRUE_DAMPING - 1) for one in PRINTED_DAMPING))
     ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / PRINTED_TRUE_DAMPING - 1).max(axis=1)))
     verdict = (f"All five come out of each of {len(numbers)} records, none that is not there, without a person who "
-               "names "
-               f"them; the example is given their frequencies. The worst damping is {ours:.0f} % off on the median, "
-               f"{worst:.0f} % in the print, and here a standard error stands beside each: 300 s of random shaking "
-               "tell a "
-               "damping no better. Of the printed record's length the versions of the example differ; that of the one "
-               "that is stored now is taken.")
+               f"names them; the example is given their frequencies. The worst damping is {ours:.0f} % off on the "
+               f"median, {worst:.0f} % in the print, and here a standard error stands beside each: 300 s of random "
+               "shaking tell a damping no better. Of the printed record's length the versions of the example differ; "
+               "that of the one that is stored now is taken.")
     table = Table("The first record", (
         Column("mode", ".0f"), Column("true [Hz]", ".3f"), Column("printed [Hz]", ".3f"), Column("ours [Hz]", ".3f"),
         Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),
@@ -82,8 +80,7 @@ def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours
 STUDY = Study(
     "five_modes", "Five modes at 20 dB", "Example 1: getting started",
     "The example's building: five floors of 25.91 kg, storeys of 10,000 N/m, 2 % of damping, a white force on each "
-    "floor, "
-    "a tenth of noise (20 dB); 300 s at 20 Hz, to which the example decimates.", run,
+    "floor, a tenth of noise (20 dB); 300 s at 20 Hz, to which the example decimates.", run,
     items=(Item("five modes at 20 dB", Word.BETTER,
                 "All five come out without being named, each with a standard error."),),
     source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, printed January 2025")

@@ -37,8 +37,7 @@ def run(effort: Effort) -> Result:
     table = Table("The misprint", (Column("frequency [Hz]"), Column("printed", ".0f"), Column("ours", ".1f"),
                                    Column("neighbours, printed")), (("10", wrong.printed, wrong.ours, "253 and 161"),))
     verdict = (f"Of {len(values)} factors all but one agree to the printed digit, {np.mean(off):.2f} off on the mean; "
-               "they "
-               "are those of the formula at the nominal frequencies. Wd at 10 Hz is printed 212; the formula "
+               "they are those of the formula at the nominal frequencies. Wd at 10 Hz is printed 212; the formula "
                "has 202, and so has a smooth curve through its neighbours.")
     at_hz = np.array(HZ, dtype=float)
     picture = Picture(Curves("Factors of Wk and Wd", "frequency [Hz]", "factor times 1000", tuple(

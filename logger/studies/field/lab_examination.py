@@ -52,12 +52,9 @@ def run(effort: Effort) -> Result:
         Column("asked"), Column("goal"), Column("true of"), Column("share [%]", ".1f"), Column("at least [%]", ".1f"),
         Column("at most [%]", ".1f")), tuple(rows))
     verdict = (f"{counts['cases']} of {counts['asked']} cases were put before the lab, {seeds}, made by a simulator "
-               "that "
-               f"shares nothing with it. By their shares {met} of {len(rows)} goals are met; by the far end of the 95 "
-               "% "
-               f"interval, {surely} are. It is our own examination: nobody else has printed one, and as it takes hours "
-               "it "
-               "was not repeated here, so nothing is compared with a print.")
+               f"that shares nothing with it. By their shares {met} of {len(rows)} goals are met; by the far end of "
+               f"the 95 % interval, {surely} are. It is our own examination: nobody else has printed one, and as it "
+               "takes hours it was not repeated here, so nothing is compared with a print.")
     at = np.arange(1.0, len(rows) + 1)
     shares, lows, highs = (np.array([row[place] for row in rows], dtype=np.float64) for place in (3, 4, 5))
     picture = Picture(Curves("Shares with their 95 % intervals", "row of the table", "cases [%]", (

@@ -40,11 +40,10 @@ def run(effort: Effort) -> Result:
     table = Table("The mass from one bump (nothing of it is printed)", (
         Column("package, run by us"), Column("error [%]", "+.2f"), Column("its standard error [%]", ".2f")),
         (*PEERS, (f"ridelog, mean of {len(errors)} records", float(errors.mean()), float(given.mean()))))
-    verdict = (f"The mass comes out {rms:.2f} % off (r.m.s. over {len(errors)} records), as near as the record's noise "
-               f"lets anybody come, and its standard error says so: the truth lies within two of them in {inside:.0%}. "
-               "Packages that are given the car's equations do as well; those without find frequencies and no mass. "
-               "The paper "
-               "finds all of a car's numbers by a genetic algorithm.")
+    verdict = (f"The mass comes out {rms:.2f} % off (r.m.s. over {len(errors)} records), as near as the record's "
+               "noise lets anybody come, and its standard error says so: the truth lies within two of them in "
+               f"{inside:.0%}. Packages that are given the car's equations do as well; those without find frequencies "
+               "and no mass. The paper finds all of a car's numbers by a genetic algorithm.")
     picture = Picture(Curves("Error of the mass, record by record", "record", "error [%]", (
         Line("ours", np.arange(1.0, len(errors) + 1), errors, given, dots=True),)))
     return Result((table,), verdict, (picture,), values)
