@@ -105,13 +105,10 @@ def _wander(rng: np.random.Generator, count: int, windows: int) -> Array:
     return PLACE_STD_M * (0.9 * rng.normal(size=(count, 1)) + 0.3 * rng.normal(size=(count, windows)))
 
 
-def write_logs(found: Drives, folder: Path) -> None:
-    """A folder for each car with a log for each drive, named as a logger does."""
-    sessions: dict[int, int] = {}
+def write_logs(found: Drives, folder: Path, first_session: int = 1) -> None:
+    """A folder for each car with a log for each drive, named as a logger does; sessions count over all cars."""
     for number in range(len(found.car)):
-        car = int(found.car[number])
-        sessions[car] = sessions.get(car, 0) + 1
-        log = folder / f"car{car:03d}" / f"{sessions[car]:05d}-001.csv"
+        log = folder / f"car{found.car[number]:03d}" / f"{first_session + number:05d}-001.csv"
         log.parent.mkdir(parents=True, exist_ok=True)
         rows = [format_row(record) for record in records(found, number)]
         log.write_text("\n".join([HEADER, *rows, ""]), "ascii")
