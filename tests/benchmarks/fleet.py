@@ -30,10 +30,11 @@ from logger.fleet.pseudonyms import pseudonym, shown_car
 from logger.fleet.road_cells import cell_keys, cells
 from logger.units import WINDOW_M
 
-from ..support.drives.fleet_town import BLOCK_M, Town, drives, town, write_logs
+from ..support.drives.fleet_town import BLOCK_M, Drives, Town, drives, town, write_logs
 from .figures import Figures
 
 STREET_M = 2_000.0
+CARS = 200
 MANY = 1_000_000
 LOG_ROWS = 100_000
 
@@ -49,7 +50,7 @@ print(json.dumps({{"seconds": time.monotonic() - begin,
 def place(rows: int) -> Town:
     """The town for so many rows: 200 km of streets and 200 cars; of few rows a tenth."""
     scale = 10 if rows >= MANY else 1
-    return town(10 * scale, STREET_M, 20 * scale, years=2.0, seed=11)
+    return town(10 * scale, STREET_M, CARS * scale // 10, years=2.0, seed=11)
 
 
 def step(code: str) -> dict[str, float]:
@@ -60,20 +61,27 @@ def step(code: str) -> dict[str, float]:
 
 
 def file_rows(dataset: Path, rows: int) -> None:
-    """Rows of drives, keyed and filed; cars are called as the key of this benchmark says."""
+    """Rows of drives, keyed and filed in the order of time; cars are called as the key of this benchmark says."""
     here = place(rows)
-    per_drive = here.iri.shape[1]
-    found, left, session = Dataset(dataset), -(-rows // per_drive), 0
+    found, session = Dataset(dataset), 0
+    batches = batches_of(here, rows)
     with found.writing():
-        while left > 0:
-            count = min(left, BATCH_ROWS // per_drive)
-            commit_drives(here, found, count, session)
-            session, left = session + count, left - count
+        for number, count in enumerate(batches):
+            commit_drives(drives(here, count, (7, session), (number / len(batches), (number + 1) / len(batches))),
+                          found, session)
+            session += count
 
 
-def commit_drives(here: Town, found: Dataset, count: int, session: int) -> None:
+def batches_of(here: Town, rows: int) -> list[int]:
+    """Drives of each commit."""
+    per_drive = here.iri.shape[1]
+    drives_in_all, most = -(-rows // per_drive), BATCH_ROWS // per_drive
+    return [min(most, drives_in_all - start) for start in range(0, drives_in_all, most)]
+
+
+def commit_drives(made: Drives, found: Dataset, session: int) -> None:
     """One batch of drives."""
-    made = drives(here, count, seed=(7, session))
+    count = len(made.car)
     windows = made.lat_deg.shape[1]
     drive = np.repeat(np.arange(count), windows)
     at = np.tile(np.arange(windows), count)
@@ -86,7 +94,7 @@ def commit_drives(here: Town, found: Dataset, count: int, session: int) -> None:
         "distance_end_m": (at + 1) * WINDOW_M, "flags": np.full(count * windows, "", dtype=object),
         "crc32": np.random.default_rng(session).integers(2**32, size=count * windows)}
     filed = filed_rows(columns, lambda lat, lon, heading, _: cell_keys(lat, lon, heading), 0.0).columns
-    car = np.array([pseudonym(f"car{one:03d}", b"benchmark") for one in range(len(here.log_gain))])
+    car = np.array([pseudonym(f"car{one:03d}", b"benchmark") for one in range(CARS)])
     rows = {name: values for name, values in filed.items() if name in ROW_TYPES}
     rows["car"], rows["session"] = car[made.car[filed["drive"]]], session + filed["drive"] + 1
     names = ("car", "session", "log", "sha256", "rows", "damaged_lines", "undated", "unplaced", "trimmed", "repeated")

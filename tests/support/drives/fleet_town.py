@@ -75,12 +75,14 @@ class Drives:
     speed_mps: float = 12.0
 
 
-def drives(place: Town, count: int, seed: int | tuple[int, int] = 2) -> Drives:
-    """Drives at random times, cars and streets, in either direction."""
+def drives(place: Town, count: int, seed: int | tuple[int, int] = 2, within: tuple[float, float] = (0.0, 1.0)
+           ) -> Drives:
+    """Drives at random times ``within`` a part of the town's, with random cars and streets, in either direction."""
     rng = np.random.default_rng(seed)
     windows = place.iri.shape[1]
     car, street = rng.integers(len(place.log_gain), size=count), rng.integers(place.streets, size=count)
-    when_s = np.sort(rng.uniform(0.0, place.years * YEAR_S - 3600.0, count))
+    first_s, last_s = (part * (place.years * YEAR_S - 3600.0) for part in within)
+    when_s = np.sort(rng.uniform(first_s, last_s, count))
     back = rng.random(count) < 0.5
     along_m = (np.arange(windows) + 0.5) * WINDOW_M
     along_m = np.where(back[:, None], along_m[::-1], along_m) + _wander(rng, count, windows)
