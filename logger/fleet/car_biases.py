@@ -91,10 +91,10 @@ def car_biases(passes: Passes, cars: int) -> CarBiases:
     variances = Variances(0.0, 0.0, 0.0)
     for _ in range(_ROUNDS):
         design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
-        effects, growth, residual = _fitted(design)
+        _, residual = _fitted(design)
         variances = _variances(design, residual)
     design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
-    effects, growth, residual = _fitted(design)
+    effects, _ = _fitted(design)
     spread = design.covariance(variances.of_pass, variances.of_session, variances.of_growth)
     log_std = np.sqrt(np.maximum(np.diag(spread)[:-1], 0.0))
     log_gain, group = effects[:-1], design.group
@@ -105,9 +105,8 @@ def car_biases(passes: Passes, cars: int) -> CarBiases:
                      float(np.sqrt(variances.of_pass + variances.of_session)), float(np.sqrt(variances.of_session)))
 
 
-def _fitted(design: Elimination) -> tuple[Array, Array, Array]:
-    """The effects (c + 1,), each road's own growth beyond the common one (r,), and what is left of each pass and its
-    road's own growth (n,), relative."""
+def _fitted(design: Elimination) -> tuple[Array, Array]:
+    """The effects (c + 1,), and what they and the roads' levels leave of each pass (n,), relative."""
     road, iri, weight = design.passes.road, design.passes.iri, design.weight
     total = design.by_road(weight)
     effects, growth = np.zeros(design.cars + 1), np.zeros(design.roads)
@@ -124,7 +123,7 @@ def _fitted(design: Elimination) -> tuple[Array, Array, Array]:
         growth = design.slopes(working - design.of_effects(effects))
         if change < _CLOSE:
             break
-    return effects, growth, residual
+    return effects, residual
 
 
 def _variances(design: Elimination, residual: Array) -> Variances:

@@ -1,9 +1,9 @@
 """The figures of a dataset as relational expressions, written once in Ibis for any engine it knows.
 
 Three groupings. ``passes_by_car``: of each piece of road and car the number of passes and the sums of their IRI and
-time. ``passes_by_session``: the same by session, of a part of the roads, from which the biases of cars follow. ``roads``:
-the sums of each piece of road over all cars, each car's readings divided by its gain. What follows from the sums is
-arithmetic over as many rows as there are pieces of road.
+time. ``passes_by_session``: means by session, of a part of the roads, from which the biases of cars follow.
+``roads``: the sums of each piece of road over all cars, each car's readings divided by its gain. What follows from the
+sums is arithmetic over as many rows as there are pieces of road.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, ze
 
 
 def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Table:
-    passes = rows.filter(rows.pass_iri_m_per_km.notnull())
+    # Errors go with the IRI: one that is not above zero is none.
+    passes = rows.filter(rows.pass_iri_m_per_km > 0)
     if since_us is not None:
         passes = passes.filter(passes.utc_us >= since_us)
     return passes if until_us is None else passes.filter(passes.utc_us < until_us)
@@ -45,14 +46,14 @@ def cars(by_car: ir.Table) -> ir.Table:
     return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
 
 
-def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int, one_in: int) -> ir.Table:
+def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int, one_in: int
+                      ) -> ir.Table:
     """Means over passes by road, car and session, of one road in so many: by the remainder of the key, first by a
     prime, as the last bits of a key are a direction."""
     passes = _passes(rows, since_us, until_us)
     if one_in > 1:
         passes = passes.filter((passes.road % _PRIME) % one_in == 0)
-    years = (passes.utc_us - zero_us).cast("float64") / YEAR_US
-    passes = passes.mutate(years=years)
+    passes = passes.mutate(years=(passes.utc_us - zero_us).cast("float64") / YEAR_US)
     return passes.group_by(["road", "car", "session"]).aggregate(
         passes=passes.count(), iri=passes.pass_iri_m_per_km.mean(), years=passes.years.mean())
 

@@ -2,7 +2,8 @@
 
 Problem: the reader of logs makes a record of each row, some 50 us; a year of a fleet would take days. Solution: the
 check values are compared line by line, and where all fit, Arrow reads the numbers. Where a line does not fit, or
-holds what no column may, the reader of logs judges the file row by row, so that both give the same rows.
+holds what no column may, the reader of logs judges the file row by row, so that both give the same rows; but a number
+that fits its check value and is spelt otherwise than a logger does (1e3) is taken here.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ import numpy.typing as npt
 
 from drivers.regular_file import open_regular
 from logger.errors import BadInput
-from logger.store.log.row_format import COLUMNS, HEADER, scan
+from logger.store.log.row_format import COLUMNS, HEADER, LATEST_US, scan
 from logger.units import US_PER_S
 
 _COUNTS = ("segment", "drive")
 _NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km",
             "iri_std_m_per_km", "a_w_mps2", "duration_s")
+_LARGEST_COUNT = 2**31 - 1
+"""Of a dataset's column; no logger counts so far."""
 _LARGEST = {column.name: column.largest for column in COLUMNS}
 
 
@@ -100,6 +103,8 @@ def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, np
     if len(table) != len(checks) or any(table[name].null_count for name in (*_COUNTS, "t_s", "duration_s")):
         return None
     columns: dict[str, npt.NDArray[Any]] = {name: table[name].to_numpy() for name in _COUNTS}
+    if any((np.abs(columns[name]) > _LARGEST_COUNT).any() for name in _COUNTS):
+        return None
     for name in (*_NUMBERS, "t_s"):
         nulls = table[name].null_count
         values = table[name].to_numpy()
@@ -108,6 +113,8 @@ def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, np
         columns[name] = values
     columns["t_us"] = np.round(columns.pop("t_s") * US_PER_S).astype(np.int64)
     columns["utc_us"] = table["t_utc"].cast(pyarrow.int64()).fill_null(0).to_numpy()
+    if ((columns["utc_us"] < 0) | (columns["utc_us"] >= LATEST_US)).any():
+        return None
     columns["flags"] = table["flags"].to_numpy(zero_copy_only=False)
     columns["crc32"] = checks
     return columns
@@ -116,7 +123,7 @@ def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, np
 def _row_by_row(data: bytes) -> tuple[dict[str, npt.NDArray[Any]], int]:
     records, checks, damaged = [], [], 0
     for row in scan(io.BytesIO(data)):
-        if row.record is None:
+        if row.record is None or any(abs(getattr(row.record, name)) > _LARGEST_COUNT for name in _COUNTS):
             damaged += 1
         else:
             records.append(row.record)

@@ -14,8 +14,8 @@ from logger.fleet.engine import Engine
 from logger.fleet.expressions import cars as car_sums
 from logger.fleet.expressions import passes_by_car, passes_by_session, roads
 from logger.fleet.road_cells import ON_MAP, SEGMENT_M, block_of, cell_keys, section_of
-from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
 from logger.fleet.road_elimination import Passes
+from logger.fleet.road_figures import RoadFigures, Sums, road_figures, significant
 from logger.fleet.road_map import Pieces
 from logger.roads.roughness_words import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M

@@ -23,7 +23,8 @@ YEAR_S = 365.25 * 86400
 BLOCK_M = 100.0
 START_US = 1_704_067_200_000_000  # 2024-01-01
 PLACE_STD_M = 1.5
-WINDOW_STD = 0.15
+WINDOW_STD, DRIVE_STD = 0.15, 0.05
+"""Of the error of a window, and of what all windows of a drive share, relative."""
 STREET_IRI = (1.5, 4.0)
 
 
@@ -96,7 +97,7 @@ def drives(place: Town, count: int, seed: int | tuple[int, int] = 2, within: tup
     true = np.where(back[:, None], true[:, ::-1], true)
     age = when_s / YEAR_S - place.years / 2
     true = true * (1.0 + place.decay[street] * age)[:, None] * np.exp(place.log_gain[car])[:, None]
-    error = WINDOW_STD * rng.normal(size=true.shape) + 0.05 * rng.normal(size=(count, 1))
+    error = WINDOW_STD * rng.normal(size=true.shape) + DRIVE_STD * rng.normal(size=(count, 1))
     return Drives(car, street, START_US + (when_s * 1e6).astype(np.int64), place.lat0_deg + north_m * per_m,
                   place.lon0_deg + east_m * per_m / np.cos(np.radians(place.lat0_deg)),
                   np.maximum(true * (1.0 + error), 0.05))
