@@ -54,7 +54,7 @@ class Passes:
     @property
     def of_session(self) -> Array:
         """Passes of each session (s,)."""
-        return np.bincount(self.session, self.count, len(self.car_of_session))
+        return np.asarray(np.bincount(self.session, self.count, len(self.car_of_session)), np.float64)
 
 
 class Elimination:
@@ -80,7 +80,7 @@ class Elimination:
 
     def by_road(self, values: Array) -> Array:
         """Sums of values (n,) by road."""
-        return np.bincount(self.passes.road, values, self.roads)
+        return np.asarray(np.bincount(self.passes.road, values, self.roads), np.float64)
 
     def slopes(self, values: Array) -> Array:
         """The growth of each road that values (n,) show, drawn to zero."""
@@ -125,8 +125,8 @@ class Elimination:
         gauge = np.zeros(regular.shape)
         gauge[:-1, :-1] = one / (scale * size[:, None] * size[None, :])
         cars = np.linalg.inv(regular[:-1, :-1])
-        left = regular[-1, -1] - regular[-1, :-1] @ cars @ regular[:-1, -1]
-        is_timed = bool(left > _LEAST_INFORMATION * self.weight.sum())
+        remaining = regular[-1, -1] - regular[-1, :-1] @ cars @ regular[:-1, -1]
+        is_timed = bool(remaining > _LEAST_INFORMATION * self.weight.sum())
         if is_timed:
             return np.linalg.inv(regular) - gauge, True
         out = -gauge
@@ -138,23 +138,24 @@ class Elimination:
         with_time = np.bincount(self.car, weight * self.time, self.cars)
         out = np.diag(np.append(np.bincount(self.car, weight, self.cars), weight @ self.time**2))
         out[-1, :-1] = out[:-1, -1] = with_time
-        return out
+        return np.asarray(out, np.float64)
 
     def _sums_of_roads(self, weight: Array) -> tuple[Any, Any]:
         """R' diag(weight) X, of levels and of growths, each (r, c + 1) and sparse."""
         timed = weight * self.time
-        return tuple(_sparse(self.passes.road, self.car, one, self.by_road(one * self.time), self.roads, self.cars)
-                     for one in (weight, timed))  # type: ignore[return-value]
+        level, slope = (_sparse(self.passes.road, self.car, one, self.by_road(one * self.time), self.roads, self.cars)
+                        for one in (weight, timed))
+        return level, slope
 
     def _from_passes(self) -> Array:
         """U' diag(1 / count) U."""
         weight = self.weight**2 / self.passes.count
         level, slope = self._sums_of_roads(weight)
         total, timed, square = (self.by_road(weight * self.time**power) for power in (0, 1, 2))
-        level_left = level - _scaled(self._to_level, total) - _scaled(self._to_slope, timed)
-        slope_left = slope - _scaled(self._to_level, timed) - _scaled(self._to_slope, square)
+        level_rest = level - _scaled(self._to_level, total) - _scaled(self._to_slope, timed)
+        slope_rest = slope - _scaled(self._to_level, timed) - _scaled(self._to_slope, square)
         return (self._squares(weight) - _product(level, self._to_level) - _product(slope, self._to_slope)
-                - _product(self._to_level, level_left) - _product(self._to_slope, slope_left))
+                - _product(self._to_level, level_rest) - _product(self._to_slope, slope_rest))
 
     def _from_sessions(self) -> Array:
         """U'ZZ'U, Z the columns of the sessions."""

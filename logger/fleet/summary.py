@@ -25,6 +25,7 @@ Keys = npt.NDArray[np.int64]
 
 FALSE_SHARE = 0.05
 """Of false ones among the changes that are called significant."""
+_POWER = 0.8
 _CERTAIN = 1.645
 """Standard errors from a mean to where it lies with 95 % certainty on one side."""
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
@@ -153,6 +154,20 @@ def _segments(sums: Mapping[str, npt.NDArray[Any]], pass_std: float, pieces: Pie
     heading_deg = np.degrees(np.arctan2(sums["east"], sums["north"])) % 360.0
     return _table("segment", sums["road"], sums["lat"] / passes, sums["lon"] / passes, heading_deg, length_m,
                   sums["cars"], passes, sums["years"] / passes, figures, a_w, sums["speed"] / passes, sums["last_us"])
+
+
+def change_found(roads: RoadTable) -> float:
+    """The change a year [m/km] that half of the roads would show as significant with the usual power of 80 % (J. Cohen,
+    Statistical Power Analysis, 1988, section 2.4); NaN: no road has a change."""
+    from scipy.stats import norm
+
+    known = np.isfinite(roads.trend_std_m_per_km_per_year) & (roads.trend_std_m_per_km_per_year > 0)
+    if not known.any():
+        return np.nan
+    called = significant(roads.p_value, FALSE_SHARE)
+    at_p = float(roads.p_value[called].max()) if called.any() else FALSE_SHARE / int(known.sum())
+    needed = float(norm.isf(at_p / 2) + norm.ppf(_POWER))
+    return needed * float(np.median(roads.trend_std_m_per_km_per_year[known]))
 
 
 def piece_of(key: Keys) -> npt.NDArray[np.intp]:
