@@ -196,8 +196,8 @@ class DumpWriter:
 
     Events are kept back until ``flush`` or until a block is full; a kill loses at most what came after the last flush.
     Each flush of a compressed file ends a gzip member, whose check value covers all that came since the one before:
-    so what is damaged in a file that was cut off can be told from what is not (``intact_bytes``). The price is a
-    fifth more bytes than one stream.
+    so what is damaged in a file that was cut off can be distinguished from what is not (``intact_bytes``). The price is
+    a fifth more bytes than one stream.
 
     Raises ``FileExistsError`` rather than overwrite a recording, and other ``OSError`` of the disk. After one of those
     nothing more can be recorded; ``abandon`` lets go of the file.

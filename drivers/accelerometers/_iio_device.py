@@ -165,7 +165,7 @@ class IioDevice:
                            f"found {self._of_axis('x', 'scale', 'none')}{may}")
 
     def _channels(self) -> list[list[str]]:
-        """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are told."""
+        """Name, index and type of the channels in a scan; where values are polled, of the axes, if they are named."""
         scans = self.path / "scan_elements"
         names = [switch.name.removesuffix("_en") for switch in sorted(scans.glob("*_en"))]
         if self.why_polled:

@@ -308,7 +308,7 @@ def _levelled(even: EvenSamples, asked: Asked, has_gravity: bool, notes: list[st
     heard = np.flatnonzero(present)
     turned = turns(time_s[heard], even.samples[heard]) if even.samples.shape[1] == 3 else []
     for at_s, words in turned:
-        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled anew")
+        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled again")
         present &= np.abs(time_s - at_s) > _CUT_S
     ends_s = [-np.inf, *(at_s for at_s, _ in turned), np.inf]
     tilts = []

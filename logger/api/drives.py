@@ -307,7 +307,7 @@ def estimate(
     """The IRI and the profile of the road, from the acceleration of a drive over it; compared with the exact IRI where
     the run has a profile.
 
-    run           as ``read_run``; its distance may go back by up to 1 m, and is then laid anew
+    run           as ``read_run``; its distance may go back by up to 1 m, and is then computed again from the speed
     vehicle       with its effects and its numbers' standard errors, if it has any; where its sensor sits is in it
     noise_mps2    r.m.s. noise of one reading before rounding, 1e-4 to 100 [m/s2]; "auto": learnt from the drive, with
                   its standard error as ``noise_mps2`` and ``noise_std_mps2`` of ``as_json``
@@ -363,7 +363,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
              warn: Tell = unsaid, anyway: bool = False) -> Assessment:
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
-    ``anyway`` (then ``warn`` is told)."""
+    ``anyway`` (then ``warn`` is called)."""
     from logger.estimation.assessment import Unusable, assess, estimable
 
     if run.excitation is not None:
@@ -385,7 +385,7 @@ def assessed(run: Run, model: vehicle_file.Model, sensor: Sensor, window_m: floa
 def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Model, warn: Tell,
                 anyway: bool) -> None:
     """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
-    left out: whether it is the road can be told without them, and some take long."""
+    left out: whether it is the road can be decided without them, and some take long."""
     from logger.api.model_checks import check_roads
     from logger.runs import SKIP_S
     from logger.runs import Run as Record

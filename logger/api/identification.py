@@ -208,7 +208,7 @@ def on_measured_roads(given: vehicle_file.Model, word: str, records: list[Record
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``.
 
     word    by which the user knows the vehicle
-    warn    told where it will take long
+    warn    called where it will take long
     """
     from logger.identification.identifiability import NotIdentifiable
     from logger.identification.session import UnusableRun, error_before

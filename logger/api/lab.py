@@ -143,7 +143,7 @@ def diagnose(
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     candidates      names of the effects to be tried; None: all
     effect_files    Python files, each with an effect of your own to be tried as well
-    progress        told what is under way, such as ``print``
+    progress        called with what is under way, such as ``print``
 
     Raises BadInput as ``compare``, for effects that there are not, and where the compiler is missing.
 
@@ -240,7 +240,7 @@ def add_effect(
     name         of an effect that comes with ridelog, or the path of a Python file with one of your own
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     start        where the fit of its parameters begins, by name; the rest is searched for
-    progress     told what is under way, such as ``print``
+    progress     called with what is under way, such as ``print``
 
     Raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot be there.
 

@@ -136,7 +136,7 @@ def _asking(ask: Callable[[str], str | None]) -> Ask:
 
 
 def unsaid_lines(_lines: Iterable[str]) -> None:
-    """Lines that nobody is told."""
+    """Drop the lines: a loop that prints nothing."""
 
 
 def make_ready(given: Bench, out: Path, option: str = "") -> None:
@@ -159,8 +159,8 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, expla
          ) -> tuple[Story, vehicle_format.Model]:
     """Go through the loop; write the vehicle files and the page into ``out``. The model that it ends with.
 
-    tell        told what was found
-    progress    around whatever takes its time, told what is under way
+    tell        called with what was found
+    progress    context around what takes long, called with what is under way
     explain     what to tell of each step beside what it finds
     """
     from logger.report.session_text import ending
@@ -210,7 +210,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
             tell(chapter("Compare again", explain("again", wanted, word)))
             tell(_comparison_lines(rounds[-1].comparison))
             given = replace(given, model=model)
-            if not same:  # what is missing beside another effect is to be found anew
+            if not same:  # what is missing beside another effect is searched again
                 going = True
                 break
     return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused)), given.model
@@ -248,7 +248,7 @@ def _compared(given: Bench, progress: Progress) -> compare.Comparison:
 
 
 def chapter(title: str, explained: str = "") -> list[str]:
-    """The lines of a heading, with what is told under it."""
+    """The lines of a heading, with what stands under it."""
     return ["", f"=== {title} ===", *([explained] if explained else []), ""]
 
 

@@ -83,7 +83,7 @@ def learn(vehicle: Model | Path | str, runs: Runs, *, effect_files: Sequence[Pat
 
     vehicle, runs, tolerance, low_pass_hz, anyway    as in ``compare``
     effect_files    Python files, each with an effect of your own that is known as well
-    progress        told what is under way, such as ``print``
+    progress        called with what is under way, such as ``print``
 
     Raises BadInput as ``diagnose``.
 

@@ -34,7 +34,8 @@ class Modes(CommandResult):
     channels              names of those
     frequency_hz          (m,) natural frequencies without regard to damping, ``frequency_std_hz`` (m,) their standard
                           deviations [Hz]
-    damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be told
+    damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be
+                          measured
     shapes                (m, c) motion of the channels, the largest 1; complex where they are not in step
     rejected              frequencies that were found and not believed [Hz], each with the reason
     how                   the way that it was done, in words; ``order`` of the model, 0 where there is none

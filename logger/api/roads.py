@@ -59,7 +59,7 @@ class Profile(profile_file.Profile, Shown):
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     """Read a road profile.
 
-    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line)
+    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line)
     resample_m    for one that is unevenly spaced: lay straight lines between its samples, and take one every so many
                   metres [m]
 

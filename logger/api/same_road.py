@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 
 _PLACES_EVERY_M = 10.0
 _LEAST_SHARED_M = 50.0
-"""Some seconds of a drive: over less road nothing is told (``lab.unknown_road.likelihood``)."""
+"""Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -142,7 +142,7 @@ def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
 
 
 def lines(source: Path, found: Extracted) -> list[str]:
-    """What a person is told of a recording."""
+    """The lines for a person about a recording."""
     printed = [f"{source}: {note}" for note in found.notes]
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"

@@ -216,7 +216,7 @@ def _agreement_text(agreement: Agreement) -> list[str]:
              f"expected, {agreement.repeated} twice, {agreement.flags_differ} with other flags."]
     if abs(agreement.moved_before_m) > _MOVED_M:
         lines.append(f"  The service had counted {agreement.moved_before_m:.0f} m before, so its windows begin "
-                     "elsewhere: start it anew for each play.")
+                     "elsewhere: restart it for each play.")
     for words, segments in (("missing", agreement.missing), ("not expected", agreement.surplus)):
         if segments:
             lines.append(f"  {words}: segments {', '.join(map(str, segments[:10]))}{' ...' if segments[10:] else ''}")

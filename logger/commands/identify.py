@@ -27,8 +27,8 @@ waviness that is said or, with road.waviness free, found. Drives over one road a
   ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
 
 Every estimate comes with its standard error. What the runs cannot tell is refused in words (exit status 1): numbers
-that leave no trace at the sensor, and numbers that can be told only together; masses, springs and dampers share one
-scale, so one of them has to be known.
+that leave no trace at the sensor, and numbers of which only a combination can be estimated; masses, springs and dampers
+share one scale, so one of them has to be known.
 """
 
 from __future__ import annotations

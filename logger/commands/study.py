@@ -194,11 +194,11 @@ def _figure(one: Chart) -> dict[str, Any]:
 
     if isinstance(one, Bars):
         return {"title": one.title, "value": one.value_name, "bars": [list(bar) for bar in one.bars]}
-    told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
+    named: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):
-        return {**told, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
+        return {**named, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
                 "values": [[_known(value) for value in row] for row in one.values.tolist()]}
-    return {**told, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
+    return {**named, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
                               for line in one.lines]}
 
 

@@ -74,7 +74,7 @@ def on_grid(
     return Sensor(noise_mps2, 0.0), readings, np.interp(place, np.arange(len(distance_m)), distance_m)
 
 
-def laid_anew(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
+def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> Array:
     """Distances (n,) [m] by the speed (n,) [m/s], not decreasing, that keep to those given: the integral of the speed
     plus the moving mean over 2 s of what they differ from it."""
     driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed_mps[1:] + speed_mps[:-1]))]) / rate_hz

@@ -108,7 +108,7 @@ class Limits:
 
 
 def pooled_r2(limits: Sequence[Limit]) -> float:
-    """R2 over as many windows of each kind, the mean of each kind being known: rough and smooth roads are told apart
+    """R2 over as many windows of each kind, the mean of each kind being known: rough and smooth roads are distinguished
     easily, so it is above that of each."""
     squared_error = np.mean([one.std_m_per_km**2 for one in limits])
     variance = np.mean([one.spread_m_per_km**2 for one in limits]) + np.var([one.iri_m_per_km for one in limits])

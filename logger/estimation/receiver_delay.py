@@ -56,7 +56,7 @@ SLOWEST_MPS = 1.0
 """Slower than this receivers hold their speed at zero, and have no sign for a car that backs up: such a fix counts only
 where those before and after it say as well that the car stands."""
 EARLY_BLOCKS = 8
-"""So many are kept, and weighed once more when all of them have told the delay: at first it is a guess."""
+"""So many are kept, and weighed once more when all of them have given the delay: at first it is a guess."""
 THINNED_S = 0.5
 """Fixes that come faster than this are averaged: their noise is not independent."""
 LONGEST_HOLE_S = 0.1
@@ -175,10 +175,10 @@ def with_block(known: Information, block: BlockInformation) -> Information:
     known = replace(_added(known, block), early=(*known.early, block) if known.blocks < EARLY_BLOCKS else ())
     if known.blocks != EARLY_BLOCKS:
         return known
-    anew = Information.none()
+    again = Information.none()
     for early in known.early:
-        anew = _added(anew, _weighed(known, early.rows, early.mean))
-    return anew
+        again = _added(again, _weighed(known, early.rows, early.mean))
+    return again
 
 
 def _added(known: Information, block: BlockInformation) -> Information:

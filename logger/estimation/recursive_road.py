@@ -44,7 +44,7 @@ _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 _MOST_DEVIATIONS = 3.0
 _SETTLED_SAMPLES = 1000  # behind those that tell of the noise: their bounds have gone through ten rounds by then
 # Solved with no less where the noise is learnt: below, a few rounds do not settle, and what they say of a smaller noise
-# leads astray (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
+# misleads (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
 _LEAST_SHARE_OF_STEP = 0.07
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 

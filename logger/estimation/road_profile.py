@@ -64,7 +64,8 @@ class RoadProfile:
 
 
 def road_profile(pieces: Sequence[RoadPiece], speed_mps: Array) -> RoadProfile | None:
-    """The profile that pieces make, in the order they came; None when no wavelength is told over enough of them.
+    """The profile that pieces make, in the order they came; None when the readings resolve no wavelength over enough of
+    them.
 
     speed_mps    (p,) mean speed over each piece [m/s]
     """

@@ -48,7 +48,7 @@ HOP_SAMPLES = 200
 LAG_S = 4.0
 FAINT_BELOW = 0.2
 VEHICLE_ERROR = 0.05
-SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be told from drift
+SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be distinguished from drift
 _LONGEST_PIECE_M = 10.0
 _REMEMBERED_M = 6.0
 _SPACING_M = 0.155
@@ -83,7 +83,7 @@ class RoadPiece:
     """Estimated elevations (p,) [m] at ``start_m + k spacing_m``; the last point is the next piece's first.
 
     The elevations of two pieces may differ by a slow wave that the readings do not tell. Waves from ``shortest_m`` to
-    ``longest_m`` are told by the readings for more than half of their variance; both are NaN if none is.
+    ``longest_m`` are resolved: the readings explain more than half of their variance; both are NaN if none is.
     """
 
     start_m: float
@@ -128,7 +128,7 @@ class RoadEstimator:
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
     noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
-    ride_response    of the comfort weighting at frequencies (n,) [Hz], and the figures of the ride are told; None: not
+    ride_response    of the comfort weighting at frequencies (n,) [Hz], to compute the figures of the ride; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
     off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
                      that have nothing to do with one another

@@ -7,8 +7,8 @@ linear in the readings, so means over passes are all it needs, and noise does no
 logarithms. Its information matrix does not change from step to step: Fisher scoring solves with one matrix, from
 which the roads, a diagonal block, are eliminated. What is left has as many rows as there are cars.
 
-The mean of all cars' ln g is zero: what all cars share cannot be told from the roads. Cars that share no road with
-others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias that
+The mean of all cars' ln g is zero: what all cars share cannot be distinguished from the roads. Cars that share no road
+with others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias that
 could be known. Growth is one rate for all roads: without it a car of the second year would be charged with a year's
 decay.
 """

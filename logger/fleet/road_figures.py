@@ -88,11 +88,11 @@ def _prior(variance: Array, freedom: Array, otherwise: float) -> tuple[float, fl
     """Degrees of freedom and value of the prior variance (Smyth 2004, section 6.2)."""
     from scipy.special import digamma, polygamma
 
-    told = (freedom > 0) & (variance > 0)
-    if told.sum() < 3:
+    known = (freedom > 0) & (variance > 0)
+    if known.sum() < 3:
         return (np.inf, otherwise) if np.isfinite(otherwise) else (0.0, np.nan)
-    half = freedom[told] / 2
-    level = np.log(variance[told]) - digamma(half) + np.log(half)
+    half = freedom[known] / 2
+    level = np.log(variance[known]) - digamma(half) + np.log(half)
     excess = level.var(ddof=1) - float(polygamma(1, half).mean())
     if excess <= 0:
         return np.inf, float(np.exp(level.mean()))

@@ -5,7 +5,7 @@ place it ends at is an accident that looks like a result. Solution: the predicti
 of each number and in units of the noise, are looked at before anything is believed:
 
 - a number whose derivative is nothing is silent;
-- numbers whose derivatives cancel in some combination can be told only together (a vanishing singular value of the
+- numbers whose derivatives cancel in some combination can be estimated only together (a vanishing singular value of the
   scaled derivatives), whatever the noise;
 - a direction whose standard error exceeds half a number's size, or half the width of its bounds, is too weak; of some
   numbers, such as a speed that was recorded, a rougher estimate than they came with is worth nothing.
@@ -45,7 +45,7 @@ class Finding:
 
     kind         silent, together, weak, unexplained, turned or apart
     direction    relative changes by name that the predictions do not feel, the largest 1; empty where it is no number
-                 that cannot be told
+                 that cannot be estimated
     words        a sentence
     """
 
@@ -143,8 +143,8 @@ def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:
         words = (f"{_listed(list(shares))} share one scale: all of them larger by one factor give the same record. "
                  "Hold one of them fixed at a value that is known.")
     else:
-        words = (f"{_listed(list(shares))} can be told only together: {_moves(shares)} gives the same record. Hold one "
-                 "of them fixed.")
+        words = (f"{_listed(list(shares))} can be estimated only together: {_moves(shares)} gives the same record. "
+                 "Hold one of them fixed.")
     return Finding(TOGETHER, shares, words)
 
 

@@ -99,7 +99,7 @@ class _Drive:
 
 
 def may_have_common(model: DriveModel) -> bool:
-    """Whether there are several drives whose roads are told to be alike."""
+    """Whether there are several drives that are given the same road."""
     roads = [one.track for one in model.records if isinstance(one.track, Track)]
     alike = [one.start_m == roads[0].start_m and np.array_equal(one.elevation_m, roads[0].elevation_m) for one in roads]
     return 1 < len(alike) == len(model.records) and all(alike)

@@ -5,9 +5,9 @@ sensor much more is known, the step that it was in; and at places that are some 
 noise at best, for other numbers of the car at worst, with standard errors that are far too small.
 
 Solution: as the lab's searches do it. Beside the model that was fitted, a rounded reading says by its bounds what it
-says (``likelihood.readings``), and the fit is made anew to that. Where a run says how far off its places are, its
+says (``likelihood.readings``), and the fit is repeated to that. Where a run says how far off its places are, its
 distance error is a curve of numbers with that prior (``likelihood.distance_error``). One step of Gauss and Newton for
-these and the free numbers together moves the run, and the fit is made anew there; both, until nothing moves. The
+these and the free numbers together moves the run, and the fit is repeated there; both, until nothing moves. The
 covariance that comes out is that of the free numbers with the distance errors integrated out (D. J. C. MacKay, Neural
 Computation 4, 1992).
 """
@@ -117,7 +117,7 @@ def _followed(model: DriveModel, errors: Sequence[RecordError | None]) -> list[A
 @dataclass(frozen=True, eq=False)
 class _Moved:
     """Numbers of the distance errors one step of Gauss and Newton farther; by which matrix (p, p) the information of
-    the free numbers falls when these errors are integrated out; and how many numbers the records told of them."""
+    the free numbers falls when these errors are integrated out; and how many numbers of them the records determine."""
 
     at: list[Array | None]
     lost: Array

@@ -57,8 +57,8 @@ class RoadMatch:
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the road is another one: the run could have told, and goes with it no better than by chance, either
-        way up."""
+        """Whether the road is another one: the run could have shown it, and correlates with it no better than by
+        chance, either way up."""
         return max(self.correlation, self.turned) < self.chance < self.expected
 
     @property

@@ -1,6 +1,6 @@
 """Free decays: which vibrations a record supports, and each with the smallest error that its noise allows.
 
-Problem: a method that reads poles off a decomposition (ERA, SSI, AR) has to be told the order. Too low, and poles are
+Problem: a method that reads poles off a decomposition (ERA, SSI, AR) has to be given the order. Too low, and poles are
 mixed; too high, and noise becomes poles; its damping can be 70 % off at 20 dB without a word about it.
 
 Solution: such a method only proposes poles. What is believed and reported comes from the model itself,

@@ -67,7 +67,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
     "stationary": "the car stood inside the window; that time is not in the averages",
-    "time_unset": "the GPS had not told the time yet",
+    "time_unset": "the GPS had not given the time yet",
     "partial": "cut short by the end of a drive or of the recording",
     "unsettled": "too near to a start, an end or a hole in the readings",
     "hidden": "the ride is below the sensor's own noise: no value, but it counts in means as what it can be",

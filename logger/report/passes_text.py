@@ -73,7 +73,7 @@ def _changes(found: LaidDrives) -> Iterator[str]:
         return
     yield ""
     if not len(change.key):
-        yield "No cell was passed in both periods: no change can be told."
+        yield "No cell was passed in both periods: no change can be measured."
         return
     sure = change.false_share <= SIGNIFICANT
     worse = int((sure & (change.change_m_per_km > 0)).sum())

@@ -2,8 +2,8 @@
 
 Where the estimated road under a window says what the car did, the figures are those of that ride: the model of the car
 is in the prior, the readings are bounds. Where there is none (no speed, the ends of a drive, a sensor whose noise blurs
-its steps), the power of the noise is taken off the readings, which needs no model. Where neither can tell, nothing is
-told but the word that a bound allows.
+its steps), the power of the noise is taken off the readings, which needs no model. Where neither is possible, the only
+figure is the word that a bound allows.
 """
 
 from __future__ import annotations

@@ -153,7 +153,7 @@ class Pipeline:
     def finish(self) -> list[WindowRecord]:
         """The end of the stream: what waits is released, the window being filled is closed where it stands.
 
-        The last second or two, for which the fix that would have told the motion can come no more, are left out.
+        The last second or two, for which the fix that would have given the motion can come no more, are left out.
         """
         self._pending += self._chain.flush()
         end_us = int(self._pending[-1].t_us[-1]) if self._pending else 0

@@ -3,7 +3,7 @@
 One vertical axis is taken, put on a uniform grid, decimated where the sensor was read faster, freed of gravity
 by a high-pass, low-passed if the settings ask for it, and weighted for comfort. Holes are never hidden: samples
 that the sensor did not deliver are `present = False`. Over a short hole the filters run on along a straight
-line, so that one loose contact does not cost seconds of road; after a long one they start anew and their output
+line, so that one loose contact does not cost seconds of road; after a long one they start from rest and their output
 is not `settled` until they have forgotten the start.
 """
 
@@ -134,7 +134,7 @@ class SignalChain:
         return out
 
     def flush(self) -> list[GridSamples]:
-        """What is still inside, up to the last sample; the filters start anew with the next one."""
+        """What is still inside, up to the last sample; the filters start from rest with the next one."""
         out = self._thinned(self._resampler.flush())
         out += self._filtered(self._decimator.flush())
         out += self._overdue()

@@ -101,7 +101,7 @@ class ServiceStatus:
     last_window     the newest row; None before the first
     notices         what the settings allow and somebody should know all the same
     counters        what the pipeline and the store counted: late samples, gaps, write errors ...
-    receiver_delay  how late fixes come, and how that is known; empty: not told; receiver_delay_s and
+    receiver_delay  how late fixes come, and how that is known; empty: not known; receiver_delay_s and
                     receiver_delay_std_s: as numbers, with the standard error [s]
     sensor_noise    of the accelerometer, and how that is known, likewise; sensor_noise_mps2 and
                     sensor_noise_std_mps2: as numbers where it was learnt [m/s2]
@@ -179,7 +179,7 @@ def _sensor(fields: Mapping[str, Any]) -> SensorStatus:
 
 
 def process_exists(pid: int) -> bool:
-    """Tell whether a process of this number runs, whoever owns it."""
+    """Whether a process of this number runs, of any owner."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -1,7 +1,7 @@
 """All that the service writes to the disk: rows, raw bytes if asked to, and the room for both.
 
-Nothing in here raises what the disk says; it is told by ``status`` and tried again. So the main loop goes on, and with
-it the sensors, the status file and the watchdog.
+Nothing in here raises what the disk says; ``status`` reports it and it is tried again. So the main loop goes on, and
+with it the sensors, the status file and the watchdog.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Many studies at once, on all cores; one that fails is told of, and the others still run.
+"""Many studies at once, on all cores; one that fails is reported, and the others still run.
 
 Each process has one study at a time and one thread of linear algebra, so that the cores are neither idle nor fought
 over.
@@ -62,5 +62,5 @@ def _ends_when_interrupted() -> None:
 
 
 def _told(error: BaseException) -> str:
-    """What a person is told: of an error of ours its sentence, of any other its kind, too."""
+    """The line for a person: of an error of ours its sentence, of any other its kind, too."""
     return str(error) if isinstance(error, RidelogError) else f"{type(error).__name__}: {error}"

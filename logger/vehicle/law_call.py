@@ -101,17 +101,17 @@ def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
     all_seen: Any = Seen
 
     @compiled
-    def told(given: Any, felt: Any) -> Any:
+    def arguments(given: Any, felt: Any) -> Any:
         p = numbers(*of_array(numba.carray(given, (count,)), count))
         felt = numba.carray(felt, (FELT,))
         return p, all_seen(*of_array(felt[:first], first), of_array(felt[first : first + memory], memory))
 
     def force_alone(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = told(given, felt)
+        p, seen = arguments(given, felt)
         answers[0] = own_force(p, seen)
 
     def force_and_rates(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = told(given, felt)
+        p, seen = arguments(given, felt)
         answers[0] = own_force(p, seen)
         found = own_rates(p, seen)
         for index in range(memory):

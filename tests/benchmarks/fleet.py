@@ -150,13 +150,14 @@ def measure(rows: int, figures: Figures, folder: Path) -> dict[str, float]:
     filed = step("from pathlib import Path\nfrom tests.benchmarks.fleet import file_rows\n"
                  f"file_rows(Path({str(dataset)!r}), {rows})")
     size = sum(path.stat().st_size for path in dataset.rglob("*.parquet"))
-    told = step(f"from logger.api.fleet import fleet_summarise; fleet_summarise({str(dataset)!r}).text")
+    reported = step(f"from logger.api.fleet import fleet_summarise; fleet_summarise({str(dataset)!r}).text")
     print(f"{rows:.0e} rows: filed in {filed['seconds']:.1f} s; {size / rows:.0f} bytes a row")
-    figures.at_most("summary, time", told["seconds"], max(20.0, 60.0 * rows / 1e8), "s")
-    figures.at_most("summary, peak memory", told["peak_mb"], 2048, "MB")
+    figures.at_most("summary, time", reported["seconds"], max(20.0, 60.0 * rows / 1e8), "s")
+    figures.at_most("summary, peak memory", reported["peak_mb"], 2048, "MB")
     figures.at_most("filing, peak memory", filed["peak_mb"], 2048, "MB")
     check_truth(place(rows), figures, fleet_summarise(dataset))
-    return {"rows": rows, "filed_s": filed["seconds"], "told_s": told["seconds"], "told_mb": told["peak_mb"]}
+    return {"rows": rows, "filed_s": filed["seconds"], "summary_s": reported["seconds"],
+            "summary_mb": reported["peak_mb"]}
 
 
 def through_logs(rows: int, figures: Figures, folder: Path) -> None:
@@ -190,9 +191,10 @@ def main() -> int:
         print("\n      rows  filed [s]  summary [s]  memory [MB]  exponent of the summary's time")
         for number, one in enumerate(table):
             before = table[number - 1] if number else None
-            grown = (f"{np.log(one['told_s'] / before['told_s']) / np.log(one['rows'] / before['rows']):.2f}"
+            grown = (f"{np.log(one['summary_s'] / before['summary_s']) / np.log(one['rows'] / before['rows']):.2f}"
                      if before else "")
-            print(f"{one['rows']:10.0e}  {one['filed_s']:9.1f}  {one['told_s']:11.1f}  {one['told_mb']:11.0f}  {grown}")
+            print(f"{one['rows']:10.0e}  {one['filed_s']:9.1f}  {one['summary_s']:11.1f}  {one['summary_mb']:11.0f}  "
+                  f"{grown}")
         print(f"all in {time.monotonic() - begin:.0f} s")
     return figures.missed
 

@@ -42,13 +42,13 @@ def test_one_for_a_person_and_its_page(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_one_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "fig-4-25", "--quick", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["study", "where", "title", "covers", "word", "because", "how", "source", "failure", "tables",
-                          "verdict", "figures"]
-    assert told["failure"] is None
-    table = told["tables"][0]
+    reported = json.loads(capsys.readouterr().out)
+    assert list(reported) == ["study", "where", "title", "covers", "word", "because", "how", "source", "failure",
+                          "tables", "verdict", "figures"]
+    assert reported["failure"] is None
+    table = reported["tables"][0]
     assert all(len(row) == len(table["columns"]) for row in table["rows"])
-    assert told["figures"][0]["lines"][0]["name"] == "102 mm"
+    assert reported["figures"][0]["lines"][0]["name"] == "102 mm"
 
 
 def test_all_with_one_that_fails(
@@ -61,8 +61,8 @@ def test_all_with_one_that_fails(
     out = tmp_path / "pages"
     assert main(["study", "all", "--quick", "--out", str(out), "--json"]) == 1
     shown = capsys.readouterr()
-    told = json.loads(shown.out)
-    assert [(one["name"], one["failure"]) for one in told["studies"]] == [
+    reported = json.loads(shown.out)
+    assert [(one["name"], one["failure"]) for one in reported["studies"]] == [
         ("table-9-9", "KeyError: 'table-9-9'"), ("table-4-1", None)]
     assert shown.err.count("of 2] table-") == 2
     page = (out / "index.html").read_text()

@@ -108,7 +108,7 @@ def test_splitting_the_readings_changes_nothing(coarse: list[WindowEstimate]) ->
     assert [one.ride for one in other] == [one.ride for one in coarse]
 
 
-def test_a_ride_far_below_a_step_is_not_told() -> None:
+def test_a_ride_far_below_a_step_is_not_reported() -> None:
     found = later(estimates(1.0, Sensor(0.05, 4 * STEP_MPS2)))
     assert all(isnan(one.ride.a_w.value) for one in found)
 

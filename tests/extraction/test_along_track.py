@@ -68,7 +68,7 @@ def test_places_pin_the_distance_down() -> None:
 
 
 def test_the_banded_solution_is_the_dense_one() -> None:
-    """The same posterior by a dense system written out anew."""
+    """The same posterior by a dense system written out."""
     time_s = np.array([0.0, 1.0, 1.5, 3.0, 4.2])
     speeds = Observations(time_s, np.array([1.0, 2.0, 2.2, 3.0, 2.5]), np.ones(5))
     places = Observations(np.array([0.0, 3.0]), np.array([0.0, 6.0]), np.array([0.01, 0.5]))

@@ -265,9 +265,9 @@ def test_another_device_in_its_place_is_refused_in_one_line(name: str, ride: Cal
     progress = Progress()
     speaks = driven.supervisor.error == ""
     said = [driven.supervisor.error, *(progress.look(s * 1_000_000, speaks, core.samples) or "" for s in range(15))]
-    told = next(words for words in reversed(said) if words)
-    assert re.search(driven.fake.wrong, told)
-    assert "\n" not in told
+    reported = next(words for words in reversed(said) if words)
+    assert re.search(driven.fake.wrong, reported)
+    assert "\n" not in reported
     assert all(record.a_w_mps2 is None for record in rows.records)
 
 
@@ -288,7 +288,7 @@ def test_at_the_end_of_its_range_rows_are_flagged(name: str, ride: Callable[[str
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_frozen_it_is_told_and_its_rows_are_flagged(name: str, ride: Callable[[str], Ride]) -> None:
+def test_frozen_it_is_reported_and_its_rows_are_flagged(name: str, ride: Callable[[str], Ride]) -> None:
     driven = ride(name).drive(15)
     still = rough(driven.clock.now_us)
     driven.fake.accel = lambda t_us: still

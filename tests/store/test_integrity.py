@@ -221,7 +221,7 @@ def test_a_recording_that_is_being_made_is_open_and_its_torn_end_not_wrong(tmp_p
     writer.close()
 
 
-def test_a_sensor_that_was_silent_is_told_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_silent_sensor_is_reported_and_nothing_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The recording is what was written: a cable that came loose in the drive is no damage."""
     path = a_dump(tmp_path / "a.dump", *SAMPLES, Event(5_000_000, "bma220", b"\x00\x04\x40"))
     check = found(path)

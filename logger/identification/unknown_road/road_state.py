@@ -1,7 +1,7 @@
 """Numbers of a car, a road and the drives over it: their names, how they are asked for, and the road's spectrum.
 
 The prior of a road is that of ISO 8608, Gd(n0) (n / n0)^-w, flat below the longest waves. Its level is counted at a
-pivot where a car is shaken, so that level and waviness can be told apart.
+pivot where a car is shaken, so that level and waviness can be separated.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from logger.vehicle.effect import Chosen, Effect
 Progress = Callable[[str], None]
 
 DECISIVE = 2 * CONFUSED
-"""What a law has to gain over known effects that explain all: they are told from each other, and that twice."""
+"""What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
 
 
 @dataclass(frozen=True)
@@ -263,8 +263,8 @@ class _Chooser:
                 and not one.fit.hold_out.raises(one.base.hold_out))
 
     def _simplest(self, there: Sequence[LawFit]) -> LawFit:
-        """Of laws that cannot be told from the likeliest, the one with the fewest other effects beside it, and then the
-        fewest numbers."""
+        """Of laws that cannot be distinguished from the likeliest, the one with the fewest other effects beside it, and
+        then the fewest numbers."""
         near = [one for one in there if one.score < there[0].score + CONFUSED]
         return min(near, key=lambda one: (len(one.base.state.effects), len(one.draft.parameters), one.score))
 

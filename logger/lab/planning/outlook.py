@@ -25,8 +25,8 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 ISOLABLE_SIGMA = float(np.sqrt(CONFUSED))
-"""Effects are told apart where so many deviations of the one remain beside the other: their square is the difference of
-the two scores."""
+"""Two effects are distinguishable where so many deviations of the one remain beside the other: their square is the
+difference of the two scores."""
 _MOST_TRIALS = 4
 """Of an effect, spread over those that a search begins at: beside its usual values, they tell another shape of it from
 another effect; all of them would take three times as long."""
@@ -76,7 +76,7 @@ class Outlook:
 
     @property
     def isolability(self) -> Array:
-        """(e,) by how much each is told from the effect that is most like it."""
+        """(e,) how far each is distinguishable from the effect that is most like it."""
         return np.asarray(self.beside.min(axis=1))
 
     @property
@@ -87,7 +87,7 @@ class Outlook:
     @property
     def chances(self) -> Array:
         """(e,) that a search names each, were it there alone: what it finds is normal around what is expected, with a
-        deviation of one, and has to stand out and to be told from all others."""
+        deviation of one, and has to be detectable and distinguishable from all others."""
         from scipy.special import ndtr
 
         return np.minimum(ndtr(self.detectability - DETECTABLE_SIGMA), ndtr(self.isolability - ISOLABLE_SIGMA))

@@ -41,8 +41,8 @@ _WORTH_TELLING = 1.0
 class NextDrive:
     """What one more drive would add.
 
-    gains         deviations by which effects would be told better from what is most like them: first those that it
-                  makes likelier to be named, then those that it helps most for their size
+    gains         deviations by which effects would be more distinguishable from what is most like them: first those
+                  that it makes likelier to be named, then those that it helps most for their size
     more_named    how many more effects a search would name, were each of them there alone
     """
 
@@ -75,7 +75,7 @@ class Plan:
 
     @property
     def groups(self) -> list[tuple[str, ...]]:
-        """Effects that would stand out, and cannot be told from each other."""
+        """Effects that would stand out, and cannot be distinguished from each other."""
         seen = self.now.detectability >= DETECTABLE_SIGMA
         alike = (np.minimum(self.now.beside, self.now.beside.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
         found: list[set[int]] = []

@@ -40,7 +40,7 @@ from logger.store.log.log_name import OwnFile
 
 FILES_PER_MANIFEST = 32
 GROWTH_PER_MANIFEST = 8
-"""The lists are written anew when an eighth has been added: nine times their last length is written in all, and a stick
+"""The lists are rewritten when an eighth has been added: nine times their last length is written in all, and a stick
 that is pulled has at most a ninth of its files to be read once more, which are there."""
 
 ROOM_FOR_MANIFEST_BYTES = 65_536

@@ -52,7 +52,7 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
     """64 hex digits that change with any number of the vehicle, its effects, the recorder's response, the settings or
     the method.
 
-    Not with the vehicle's name. The recorder's gain is told by its values at 0.01 to 100 Hz.
+    Not with the vehicle's name. The recorder's gain is given by its values at 0.01 to 100 Hz.
     """
     numbers = asdict(vehicle)
     del numbers["name"]

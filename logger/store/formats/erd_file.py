@@ -77,7 +77,7 @@ class ErdFile:
     def wheel_tracks(self) -> tuple[Array, ...]:
         """Elevations (samples,) [m] of one track, or of the left and the right one.
 
-        One channel is one track. Of several, the left and the right one are told by their names (LElev., Right
+        One channel is one track. Of several, the left and the right one are recognised by their names (LElev., Right
         Profile ...); two channels without names are left and right in this order. BadInput otherwise.
         """
         chosen = self._sides()

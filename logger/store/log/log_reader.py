@@ -118,7 +118,7 @@ def read_logged(log: Path, place: Path | None = None) -> LoggedFile | None:
 
 
 def split_drives(records: Iterable[WindowRecord]) -> list[list[WindowRecord]]:
-    """Rows drive by drive. A new drive begins where its number changes or the rows are counted anew."""
+    """Rows drive by drive. A new drive begins where its number changes or the count of rows restarts."""
     drives: list[list[WindowRecord]] = []
     last: WindowRecord | None = None
     for record in records:

@@ -133,7 +133,7 @@ class SegmentLog:
 
     def go_on(self, unsynced: Iterable[WindowRecord]) -> None:
         """After an ``OSError``: leave the part as it stands, open the next, and put the rows there that were not
-        synced. A part that was opened here and has taken no row is begun anew: a disk that refuses for a day leaves
+        synced. A part that was opened here and has taken no row is begun again: a disk that refuses for a day leaves
         no more files than one that refuses once. Raises ``OSError``: not yet."""
         self._let_go()
         if self._is_retry:

@@ -70,9 +70,9 @@ def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
     table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
     response = table.responses(np.zeros(0), crossing.f_hz)[0]
     waves = np.ones(len(grid.wave_number_cpm), complex)
-    told = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
+    reported = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
     read = run.measured_mps2 - run.measured_mps2.mean()
-    assert np.mean((told - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
+    assert np.mean((reported - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
 
 
 @pytest.mark.parametrize("effect", [
@@ -86,7 +86,7 @@ def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
 
 
 def deviance(problem: SameRoad, state: State) -> float:
-    """Minus twice the log-likelihood of all drives by their covariance, written out, and what is granted."""
+    """Minus twice the log-likelihood of all drives by their covariance, written out, and the priors."""
     total = problem.cost(state)
     for road, part, parts in zip(problem._roads, problem._parts, problem.stretches, strict=True):
         own, grid = state.roads[part], road.grid
@@ -141,7 +141,7 @@ def test_drives_over_other_roads_are_refused() -> None:
 
 
 @pytest.mark.parametrize("effects", [[], [named("sensor_bandwidth", cutoff_hz=4.0)]], ids=["right", "lacking"])
-def test_one_road_is_told_from_two(effects: list[Chosen]) -> None:
+def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
     here = run_of(effects, 9.0, 85.0, 1)
     one = SameRoad([here, run_of(effects, 15.0, 85.0, 2)], CAR, Tolerance())
     assert all(found.seen for found in likenesses(one, one.start()))
@@ -202,10 +202,10 @@ def test_what_was_not_fitted_says_so() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
     found = Found((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
-    told = as_json(found)
-    assert told["candidates"][0]["error"] == 0.28 and told["candidates"][0]["fitted"] is False
-    assert told["maybe_over_two_roads"] == [["slow", "brisk"]]
-    assert any(words.startswith("Whether slow and brisk are over one road") for words in told["sentences"])
+    reported = as_json(found)
+    assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
+    assert reported["maybe_over_two_roads"] == [["slow", "brisk"]]
+    assert any(words.startswith("Whether slow and brisk are over one road") for words in reported["sentences"])
 
 
 @pytest.mark.slow
@@ -257,7 +257,7 @@ def test_drives_of_which_no_stretch_is_shared_by_all_are_placed_by_way_of_each_o
 
 
 def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:
-    """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be told."""
+    """Dry friction leaves power all over, more than a sensor of 0.01 m/s2 does anywhere; the road can be estimated."""
     rubbing = named("dry_friction", friction_force_n=80.0, transition_velocity_m_per_s=0.0)
     runs = [run_of([rubbing], speed, 110.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))]
     gain = shipped_effects()["sensor_gain"]

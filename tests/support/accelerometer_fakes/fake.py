@@ -16,7 +16,7 @@ Vector = npt.NDArray[np.float64]
 
 
 class Clock:
-    """Time that passes where somebody sleeps; who listens is told before it does."""
+    """Time that passes where somebody sleeps; listeners are called before it does."""
 
     def __init__(self, now_us: int = 50_000_000) -> None:
         self.now_us = now_us

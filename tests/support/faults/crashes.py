@@ -153,7 +153,7 @@ class Outcome:
     rows_lost: int = 0
     damaged_accepted: int = 0
     torn_or_damaged: int = 0
-    told: bool = False
+    reported: bool = False
     wrong: str = ""
 
 
@@ -292,7 +292,7 @@ def outage(folder: Path, error: int, kinds: tuple[str, ...], begin: int, length:
             service.storage.log.set_clock_map(ClockMap(OFFSET_US))
         files.refuses = lambda kind, bad=begin <= step < begin + length: bad and kind in kinds
         service.step()
-        outcome.told |= bool(service.storage.status().trouble)
+        outcome.reported |= bool(service.storage.status().trouble)
     service.wait()
     is_well = service.storage.status().trouble == "" and service.storage.log.waiting == 0
     service.storage.close()

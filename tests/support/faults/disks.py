@@ -25,7 +25,7 @@ def disk_refuses(folder: Path, case: Case) -> Found:
     error, kinds, begin, length = case
     outcome = outage(folder / "log", error, kinds, begin, length)
     assert not outcome.wrong, outcome.wrong
-    assert outcome.told or length < 12 or not {"write", "sync"} & set(kinds)
+    assert outcome.reported or length < 12 or not {"write", "sync"} & set(kinds)
     return found(rows=outcome.rows_promised, lost=outcome.rows_promised - outcome.rows_found)
 
 
@@ -361,7 +361,7 @@ HAZARDS = (
       for name, error in zip(("disk full (ENOSPC)", "dying card (EIO)", "card turns read-only (EROFS)"), ERRORS,
                              strict=True)),
     Hazard("disk that never comes back", "full, failing or read-only from a round on, to the end of the drive",
-           "what was on it stays; waiting and lost rows are counted and told", "as promised", disk_never_comes_back,
+           "what was on it stays; waiting and lost rows are counted and reported", "as promised", disk_never_comes_back,
            tuple(product(ERRORS, range(2, 12))), 15),
     Hazard("fsync that fails once", "the next fsync says that all is well, as Linux does",
            "never believed: the rows since the last good one are written again, to another file", "as promised",
