@@ -83,9 +83,9 @@ class FollowedRoad:
             self._learner = NoiseLearner(noise.with_rounding(rounding_mps2), usual.with_rounding(rounding_mps2),
                                          self._step_mps2 - rounding_mps2)
             self._take_over()
-        self.start_anew()
+        self.restart()
 
-    def start_anew(self) -> None:
+    def restart(self) -> None:
         """Another drive begins: spectrum and noise are taken along, all that belongs to places is not."""
         self._begun = False
         self._gaussian: Readings | None = None

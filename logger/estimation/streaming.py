@@ -166,7 +166,7 @@ class RoadEstimator:
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
         self._ride_ahead_m = ride_ahead_m
-        self._start_anew()
+        self._restart()
 
     def _answers_on(self, spectrum: RoadSpectrum, speed_mps: float) -> _Answers:
         """How the car answers such a road at such a speed; the last few are kept."""
@@ -198,11 +198,11 @@ class RoadEstimator:
         """The car stood for long: what comes now is the same sensor on another day."""
         self._road.next_drive()
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         self._waiting = Samples.unread(0, 0.0, 0.0)
         self._heard = 0
         self._samples: Samples | None = None
-        self._road.start_anew()
+        self._road.restart()
         self._next = 0
         self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
         self._gathered: list[_Piece] = []
@@ -244,7 +244,7 @@ class RoadEstimator:
             after = Samples.unread(count, float(last.distance_m[-1]), 0.0)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
-        self._start_anew()
+        self._restart()
         return estimates
 
     def _hop(self, fresh: Samples) -> list[WindowEstimate]:

@@ -156,11 +156,11 @@ class SignalChain:
         out = []
         for run in runs:
             if run.new_start:
-                out += self._start_anew(run)
+                out += self._restart(run)
             out += self._samples(run)
         return out
 
-    def _start_anew(self, run: GridRun) -> list[GridSamples]:
+    def _restart(self, run: GridRun) -> list[GridSamples]:
         """Before the first run and between two: what is missing, and the state of the filters."""
         hole_us = run.t0_us - self._next_us if self._next_us is not None else 0
         if self._next_us is not None and self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:

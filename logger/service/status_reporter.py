@@ -160,7 +160,7 @@ class StatusReporter:
         if frozen_s and now_us - self._started_anew_us >= HEALTH_LINE_US:
             self._started_anew_us = now_us
             log.warning("accelerometer: %s; restarting it", _frozen(frozen_s))
-            self._sensors["accelerometer"].start_anew(_frozen(frozen_s))
+            self._sensors["accelerometer"].restart(_frozen(frozen_s))
 
     def _doubt(self, name: str, now_us: int, state: str, readings: int) -> str | None:
         """What is wrong with a sensor that speaks; None: nothing."""

@@ -111,7 +111,7 @@ class Supervisor:
         """What the device holds back, as far as it vouches for it."""
         return self._source.flush()
 
-    def start_anew(self, doubt: str) -> None:
+    def restart(self, doubt: str) -> None:
         """Ask for the device to be closed and opened at its next turn, though it answers. Any thread may."""
         self._doubt = doubt
 
