@@ -203,7 +203,7 @@ def bench_of(word: str, model: Model, runs: SimulatedRuns, effect_files: Sequenc
              searches: str | None = None, warn: Tell = unsaid, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
-    low-passed, or that say so, what is left is compared.
+    low-passed, or that say so, only the band that remains is compared.
 
     word        by which the user knows the vehicle
     numbers     as ``deviation_of``

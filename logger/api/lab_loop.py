@@ -151,7 +151,7 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
 
 
 def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
-    """Nothing to tell beside what is found."""
+    """No explanation in addition to what is found."""
     return ""
 
 
@@ -161,7 +161,7 @@ def walk(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress, expla
 
     tell        called with what was found
     progress    context around what takes long, called with what is under way
-    explain     what to tell of each step beside what it finds
+    explain     what to say of each step in addition to what it finds
     """
     from logger.report.session_text import ending
     from logger.report.story_page import page
@@ -210,7 +210,7 @@ def go_through(given: Bench, out: Path, ask: Ask, tell: Say, progress: Progress,
             tell(chapter("Compare again", explain("again", wanted, word)))
             tell(_comparison_lines(rounds[-1].comparison))
             given = replace(given, model=model)
-            if not same:  # what is missing beside another effect is searched again
+            if not same:  # with another effect, what is missing is searched again
                 going = True
                 break
     return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused)), given.model

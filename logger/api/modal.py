@@ -247,7 +247,7 @@ def _asked(given: channel_file.ChannelRecord | Path | str, question: Question) -
     samples = record.samples[inside]
     outputs = [place for place, one in enumerate(record.names) if one != pushed]
     if not outputs:
-        raise BadInput(f"{at}: expected a column beside the input {pushed}")
+        raise BadInput(f"{at}: expected a column other than the input {pushed}")
     if not (samples.std(axis=0) > 0).all():
         raise BadInput(f"{name}: expected every column to move between {question.said('from_s')} and "
                        f"{question.said('to_s')}")

@@ -60,7 +60,7 @@ class Plan(CommandResult):
     _figure: Html = field(repr=False)
 
     def figures(self) -> list[Html]:
-        """The matrix of what remains of one effect beside another."""
+        """The matrix of what remains of one effect when another is fitted."""
         return [self._figure]
 
 

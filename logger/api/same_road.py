@@ -36,7 +36,7 @@ class SameRoadDiagnosis(Diagnosis):
     An error is rms(measured - model) / rms(measured) of each drive over the road that the other drives tell.
 
     run_errors       by name of the run: error before, and with the effects that were found
-    taken_by_road    effects that another road would imitate, and the share of their information that is left beside it
+    taken_by_road    effects that another road would imitate, and the share of their information that remains with it
     not_tried        effects that could not be tried, and why
     cannot_tell      sentences: what these drives do not tell
     """

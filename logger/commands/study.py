@@ -1,4 +1,4 @@
-"""Reproduce a table or a figure of the reference dissertation, or of other papers, beside its printed values.
+"""Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
 
   ridelog study --list
   ridelog study table-4-4
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     known = studies(args.shelf)
     if args.list:
         if args.name is not None:
-            raise BadInput(f"study --list: expected no NAME beside it, found {args.name}")
+            raise BadInput(f"study --list: expected no NAME with it, found {args.name}")
         for option, value in (("--quick", args.quick), ("--out", args.out)):
             if value:
                 raise BadInput(f"study {option}: expected a NAME with it, not --list")

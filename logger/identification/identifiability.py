@@ -35,7 +35,7 @@ NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their dist
 # Of a direction is named what has this share of its largest change, or of the largest trace that one alone would leave.
 _PART_OF, _TRACE_OF = 0.1, 0.9
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
-# Rms of what is left over that of what was measured; and how much less of it is clearly less.
+# Rms of the residual over that of the measurement; and how much less of it is clearly less.
 _EXPLAINS_NOTHING, _CLEARLY_LESS = 0.98, 0.8
 
 

@@ -7,7 +7,7 @@ the data cannot tell. Solution, in this order:
 2. go downhill, in the logarithm of what can only be positive, within bounds, on residuals as they are (output error),
    from every start that was given; the best goes on; by squares, as far from the end a robust loss has hills of its
    own;
-3. fit a noise model to what is left, weigh by it (innovations form), and repeat 2 from there, until neither moves;
+3. fit a noise model to the residual, weigh by it (innovations form), and repeat 2 from there, until neither moves;
 4. covariance of the estimates from the information matrix; ask once more whether what was found is an estimate, and
    whether the model at its best has anything to do with what was measured.
 
@@ -84,7 +84,7 @@ class DifferentiablePredictor(Predictor, Protocol):
 
 
 def least_share(model: Predictor) -> float:
-    """What is left of a measurement is taken for no less than this share of it, as predictions are no better."""
+    """The residual is taken for no less than this share of the measurement, as predictions are no better."""
     return LEAST_SHARE_SIMULATED if isinstance(model, DifferentiablePredictor) and not model.exact else LEAST_SHARE
 
 

@@ -1,8 +1,8 @@
 """A grey-box fit to records as they are: rounded to steps, at places that are only about known.
 
-Problem: a prediction-error fit takes every reading for an acceleration with noise, at the place beside it. Of a coarse
-sensor much more is known, the step that it was in; and at places that are some decimetres off a fit takes the loss for
-noise at best, for other numbers of the car at worst, with standard errors that are far too small.
+Problem: a prediction-error fit takes every reading for an acceleration with noise, at the place recorded with it. Of a
+coarse sensor much more is known, the step that it was in; and at places that are some decimetres off a fit takes the
+loss for noise at best, for other numbers of the car at worst, with standard errors that are far too small.
 
 Solution: as the lab's searches do it. Beside the model that was fitted, a rounded reading says by its bounds what it
 says (``likelihood.readings``), and the fit is repeated to that. Where a run says how far off its places are, its

@@ -114,7 +114,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
     if std is None:
         return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
     shown = (f"noise of {noise:.3g} +- {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
-             f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot tell it")
+             f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot resolve it")
     return [f"Learnt from the drive: {shown}", f"Assumed: {rounded}"]
 
 
@@ -143,8 +143,8 @@ def _range_words(found: Assessment) -> str:
     if road is None:
         return f"none over {RESOLVED_SHARE:.0%} of the way."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); that is "
-            f"what a profile holds{left_out}.")
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the way); "
+            f"a profile holds these{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[str]:

@@ -26,7 +26,7 @@ def lines(found: LaidDrives) -> list[str]:
     """For a person."""
     cells = len(found.iri.key)
     if not cells:
-        return ["No row has a place and an IRI with its standard error, so there is nothing to lay over each other."]
+        return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
     return [*_summary(found), *_visits(found), *_changes(found)]
 
 
@@ -43,8 +43,8 @@ def _summary(found: LaidDrives) -> Iterator[str]:
         yield (f"Beyond their own errors drives differ by {found.scatter.drive:.1%} of the IRI as a whole, and single "
                f"passes by {found.scatter.passes:.1%}: both are in the standard errors")
     else:
-        yield ("No cell was passed by two drives: what is common to a drive (the car, its tires, its load) is not "
-               "known, and not in the standard errors")
+        yield ("No cell was passed by two drives: what all windows of one drive share (the car, its tires, its load) "
+               "is not known, and not in the standard errors")
 
 
 def _visits(found: LaidDrives) -> Iterator[str]:

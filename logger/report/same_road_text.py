@@ -44,8 +44,8 @@ def cannot_tell(found: Found) -> list[str]:
     lines = [f"Whether {one} and {other} are over one road: too little of what they recorded there stands out of the "
              "noise." for one, other in found.doubtful]
     if found.taken_by_road:
-        lines.append(f"{', '.join(found.taken_by_road)}: the road takes what this does; another road that nobody "
-                     "measured would do the same.")
+        lines.append(f"{', '.join(found.taken_by_road)}: a road of another shape, which nobody measured, would look "
+                     "the same.")
     lines += [f"{', '.join(name for name, one in found.untried.items() if one == why)}: could not be tried; {why}."
               for why in dict.fromkeys(found.untried.values())]
     lines += [f"{name}: these drives could miss it; at its usual strength it stands out by {deviations:.1f} standard "

@@ -53,7 +53,7 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
-        heading("Studies: printed results, made again", "Each with one word for how ours stands beside the print."),
+        heading("Studies: printed results, made again", "Each with one word for how ours compares with the print."),
         paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, words, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)

@@ -70,7 +70,7 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert identify(runs, f"{MASS},{DAMPERS}", "--tries", "2", "--low-pass", "20", "--robust") == 0
     text = capsys.readouterr().out
     for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "taken for white noise of 0.0",
-                  "These runs tell all that was asked.", "Known best in the combination", "below 20 Hz"):
+                  "These runs determine all that was asked.", "Known best in the combination", "below 20 Hz"):
         assert words in text
 
 
@@ -225,7 +225,7 @@ def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_pat
     text = capsys.readouterr().out
     assert f"{FRICTION} " in text
     assert "starts end at the same place" in text
-    assert "These runs tell all that was asked." in text
+    assert "These runs determine all that was asked." in text
 
 
 @pytest.mark.parametrize(("free", "more", "message"), [
@@ -275,7 +275,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(("free", "more", "message"), [
     (MASS, ("--unmeasured-road", "--bump", "height_m=0.1,width_m=2"), "--bump: expected a road whose profile is known"),
     (MASS, ("--same-road", "--noise", "ar"), "--noise: expected a road whose profile is known"),
-    (MASS, ("--same-road", "--unmeasured-road"), "--unmeasured-road: expected no --same-road beside it"),
+    (MASS, ("--same-road", "--unmeasured-road"), "--unmeasured-road: expected no --same-road with it"),
     (MASS, ("--same-road", "--waviness", "9"), "--waviness 9: expected 1 to 3.5"),
     (MASS, ("--waviness", "2"), "expected --unmeasured-road or --same-road with it"),
     ("contact_patch_m", ("--unmeasured-road",), "cannot be found where the road is not known"),

@@ -83,7 +83,7 @@ def test_a_study_that_needs_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [(["table-9-9"], "study 'table-9-9': expected one of "), ([], "expected the NAME of a study, all, or --list"),
-     (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
+     (["--list", "fig-4-25"], "expected no NAME with it, found fig-4-25"),
      (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
      (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],
 )

@@ -62,8 +62,8 @@ def test_cars_of_lira_cd_find_the_profilers_iri(lira_cd: Path, capsys: pytest.Ca
             assert row["R2"] > r2
             assert abs(row["bias"]) < 0.03
             assert row["within 2 (95%)"] > 0.8
-    assert rows(repeats, "ARAN beside P79, 10 m")["CPH1 HH"]["R2"] > 0.85  # one error of 10 %, halved
-    tracks = rows(repeats, "P79, right track beside left, 10 m")["CPH1 HH"]
+    assert rows(repeats, "ARAN against P79, 10 m")["CPH1 HH"]["R2"] > 0.85  # one error of 10 %, halved
+    tracks = rows(repeats, "P79, right track against left, 10 m")["CPH1 HH"]
     assert tracks["MAE [m/km]"] == pytest.approx(0.05 * np.sqrt(2 / np.pi) * 5.1, rel=0.35)
 
 

@@ -141,8 +141,8 @@ class RoadProblem:
                         x[part[first + later + number]] = (scale - 1) / HUNDREDTH
         return x
 
-    def beside(self, x: Array) -> Array:
-        """A place a little beside a start, where no symmetry of the start hides anything."""
+    def shifted(self, x: Array) -> Array:
+        """A place a little shifted a start, where no symmetry of the start hides anything."""
         nudge = np.zeros_like(x)
         p = len(self.free)
         nudge[:p] = _NUDGE * np.cos(1.0 + 2.0 * np.arange(p)) * (p > 1)

@@ -1,4 +1,4 @@
-"""What drives could show of effects: how far each stands out, and how much of it remains beside each other one.
+"""What drives could show of effects: how far each stands out, and how much of it remains when each other one is fitted.
 
 Problem: an effect that stands out by twenty standard deviations is not named if another one, at a strength of its own,
 does the same; and what another one does depends on its shape (a frequency, a knee). Solution: each effect is looked at
@@ -25,11 +25,11 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 ISOLABLE_SIGMA = float(np.sqrt(CONFUSED))
-"""Two effects are distinguishable where so many deviations of the one remain beside the other: their square is the
-difference of the two scores."""
+"""Two effects are distinguishable where so many deviations of the one remain once the other is fitted: their square is
+the difference of the two scores."""
 _MOST_TRIALS = 4
-"""Of an effect, spread over those that a search begins at: beside its usual values, they tell another shape of it from
-another effect; all of them would take three times as long."""
+"""Of an effect, spread over those that a search begins at: in addition to its usual values, they tell another shape of
+it from another effect; all of them would take three times as long."""
 _TINY = 1e-9
 
 
@@ -68,21 +68,21 @@ class Outlook:
     """What some drives could show, in standard deviations.
 
     detectability    (e,) by how much each effect stands out
-    beside           (e, e) what of it remains after another one was fitted; of itself: all
+    pairwise           (e, e) what of it remains after another one was fitted; of itself: all
     """
 
     detectability: Array
-    beside: Array
+    pairwise: Array
 
     @property
     def isolability(self) -> Array:
         """(e,) how far each is distinguishable from the effect that is most like it."""
-        return np.asarray(self.beside.min(axis=1))
+        return np.asarray(self.pairwise.min(axis=1))
 
     @property
     def nearest(self) -> Indices:
         """(e,) which one that is; itself, where it stands alone."""
-        return np.asarray(self.beside.argmin(axis=1))
+        return np.asarray(self.pairwise.argmin(axis=1))
 
     @property
     def chances(self) -> Array:
@@ -116,8 +116,8 @@ def outlook(settings: Settings, information: Information, precision: Array, colu
     explained = marginal[:, columns] ** 2 / np.maximum(own, _TINY)[:, None]
     most = np.maximum.reduceat(explained, settings.first, axis=2)
     np.einsum("sii->si", most)[:] = 0.0
-    beside = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
-    found = np.sqrt(np.maximum(beside, 0.0))
+    pairwise = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)
+    found = np.sqrt(np.maximum(pairwise, 0.0))
     return Outlook(np.diag(found).copy(), found)
 
 

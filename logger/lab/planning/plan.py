@@ -77,7 +77,7 @@ class Plan:
     def groups(self) -> list[tuple[str, ...]]:
         """Effects that would stand out, and cannot be distinguished from each other."""
         seen = self.now.detectability >= DETECTABLE_SIGMA
-        alike = (np.minimum(self.now.beside, self.now.beside.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
+        alike = (np.minimum(self.now.pairwise, self.now.pairwise.T) < ISOLABLE_SIGMA) & seen & seen[:, None]
         found: list[set[int]] = []
         for index in np.flatnonzero(seen):
             near = {int(index), *map(int, np.flatnonzero(alike[index]))}
@@ -148,7 +148,7 @@ class _Asked:
         return np.array(list(self.pool.map(drive.change, self.settings.columns)))
 
     def of_runs(self, fitted: LinearModel) -> Information:
-        """What runs tell beside a fitted model."""
+        """What runs tell on top of a fitted model."""
         posterior, state = fitted.posterior, fitted.state
         predict = partial(posterior.predict, logs=state.logs, record=state.record, rough=True)
         here = predict(state.effects)

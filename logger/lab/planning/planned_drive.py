@@ -185,7 +185,7 @@ class Information:
 
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> Information:
-    """Of a model beside its state, by effects' changes (m, n) per run."""
+    """Of a model at its state, by effects' changes (m, n) per run."""
     free = linear.without_wall()
     logs, white = free.state.logs, free.whitened(changes)
     each, costs = [], []

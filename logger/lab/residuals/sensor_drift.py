@@ -141,7 +141,7 @@ def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[Shape]]:
 
 
 def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[Shape]) -> _Fit:
-    """A form beside white noise: the likeliest of its shapes, with a constant."""
+    """A form plus white noise: the likeliest of its shapes, with a constant."""
     if not shapes:
         offset = float(seen[0]) / float(np.sqrt(basis.samples))
         lack = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
@@ -161,7 +161,7 @@ def _white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array,
 
 
 def _wander(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
-    """A random walk beside white noise."""
+    """A random walk plus white noise."""
     numbers = np.arange(1, basis.count)
     powers = seen[1:] ** 2
     walks = np.geomspace(1e-2, 1e8, 81) * level

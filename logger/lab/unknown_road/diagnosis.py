@@ -1,8 +1,8 @@
 """The rounds of a diagnosis without a profile: what is missing, and what such drives cannot tell.
 
 Problem: as in ``diagnosis``, but the road is unknown, and part of what an effect does the road takes for itself.
-Solution: in each round every effect that can be tried is tried by the slopes beside the model, the promising ones are
-fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
+Solution: in each round every effect that can be tried is tried by the slopes on top of the model, the promising ones
+are fitted in full, and the best is taken if its gain would hardly come by chance in so many trials and is worth naming.
 What cannot be learned is not a list in a text: it is read off the information that these drives hold, with the road
 and without it.
 """
@@ -187,7 +187,7 @@ def _ranked(tried: Sequence[Trial]) -> dict[str, list[Trial]]:
 
 def _fits(base: Fitted, ranked: Mapping[str, Sequence[Trial]], progress: Progress, most: int = 3, share: float = 0.1,
           least: float = 6.0, starts: int = 2, first_steps: int = 4) -> dict[str, Fitted]:
-    """The most promising effects fitted beside the model, by name; the best of a few steps from each start goes on.
+    """The most promising effects fitted on top of the model, by name; the best of a few steps from each start goes on.
 
     most, share, least    so many at most, of those that promise this share of the best one, and so much
     starts                so many trials as they are; the best one also at the strength that it promises, which holds
@@ -228,7 +228,7 @@ def _candidate(problem: SameRoad, state: State, gain: float, count: int, fitted:
     return Candidate(one, problem.error(state), probability_by_chance(gain, count), gain, fitted=fitted)
 
 
-# --- what is left ---
+# --- the residual ---
 
 
 def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
@@ -239,7 +239,7 @@ def _with_errors(model: Fitted) -> tuple[Chosen, ...]:
 
 
 def _together(model: Fitted) -> tuple[Finding, ...]:
-    """What these drives cannot tell of masses, springs and dampers beside the road, whatever their prior."""
+    """What these drives cannot tell of masses, springs and dampers when the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])
     road = np.arange(len(names) + len(model.moves), len(model.data))

@@ -91,14 +91,14 @@ def sloped(problem: SameRoad, effects: tuple[Chosen, ...], moves: Sequence[Move]
     gains = problem.response(effects, logs)
     slopes = []
     for index in range(len(logs)):
-        beside = logs.copy()
-        beside[index] += step
-        slopes.append((problem.response(effects, beside) - gains) / step)
+        shifted = logs.copy()
+        shifted[index] += step
+        slopes.append((problem.response(effects, shifted) - gains) / step)
     here = coordinates_of(effects, moves)
     for index, own_step in enumerate(steps_of(effects, moves, step, step)):
-        beside = here.copy()
-        beside[index] += own_step
-        slopes.append((problem.response(moved(effects, moves, beside), logs) - gains) / own_step)
+        shifted = here.copy()
+        shifted[index] += own_step
+        slopes.append((problem.response(moved(effects, moves, shifted), logs) - gains) / own_step)
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 

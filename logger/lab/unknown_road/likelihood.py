@@ -10,7 +10,7 @@ The likelihood itself is never computed, only its slopes are. What one model gai
 a straight way from the one response to the other, which is short: the slopes, by a few points, are Gauss's.
 
 Only effects that leave a car answering in proportion to the road can be tried. What a road that is free takes for
-itself (a gain; a longer contact patch) shows in the information that is left of an effect beside it.
+itself (a gain; a longer contact patch) shows in the information that remains of an effect once it is integrated out.
 """
 
 from __future__ import annotations
