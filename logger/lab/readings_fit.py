@@ -32,10 +32,6 @@ from logger.runs import Run, normalised_rms
 Array = npt.NDArray[np.float64]
 ModelOf = Callable[[list[Run]], DriveModel]
 
-_ROUNDS = 8
-_AT_REST = 0.1
-"""Of a standard error: numbers that move by less between two fits are found."""
-
 
 @dataclass(frozen=True, eq=False)
 class ReadingsFit:
@@ -48,7 +44,8 @@ class ReadingsFit:
     moved_m: float = 0.0
 
 
-def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions]) -> ReadingsFit:
+def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions],
+                    rounds: int = 8) -> ReadingsFit:
     """The fit of a model to records (``session.upright_fit``), with what they say of their steps and places.
 
     NotIdentifiable and ValueError as ``upright_fit``.
@@ -61,7 +58,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
     found, model = first, model_of(there)
     if not moves and not any(record.facts.step_mps2 for record in records):
         return ReadingsFit(first, model)
-    for turn in range(_ROUNDS):
+    for turn in range(rounds):
         if moves:
             at = _moved(model, found, errors, at).at
         there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
@@ -168,8 +165,9 @@ def _again(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOp
     return fit(model, model.measured, replace(options(model), starts=()))
 
 
-def _rests(before: Fit, found: Fit) -> bool:
-    return all(abs(found.parameters[name] - before.parameters[name]) <= _AT_REST * error
+def _rests(before: Fit, found: Fit, share: float = 0.1) -> bool:
+    """Whether no number moved by more than this share of its standard error, which nobody would notice."""
+    return all(abs(found.parameters[name] - before.parameters[name]) <= share * error
                for name, error in found.standard_errors.items())
 
 

@@ -19,7 +19,7 @@ def fit_roads(car: LinearCar, roads: Sequence[Sequence[Drive]], options: Options
     options = options or Options()
     problem = RoadProblem(car, roads, options)
     x = problem.start()
-    first = problem.look(problem.beside(x), information=True)
+    first = problem.look(problem.shifted(x), information=True)
     findings = problem.structural(first)
     if findings and options.refuse:
         raise NotIdentifiable(findings)

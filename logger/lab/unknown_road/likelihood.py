@@ -41,8 +41,6 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.intp]
 
-_LEAST_S = 3.0
-"""What a drive has to share of a stretch to tell of it: some periods of a body's bounce."""
 PROBES = 8
 """Simulated drives that slopes are compared with: gains are taken for less than they seem by one part in so many."""
 
@@ -97,8 +95,8 @@ class SameRoad:
         self.stretches = _cut(self.runs)
         shared = {run for parts in self.stretches for run, _ in parts}
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
-            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {_LEAST_S:g} s of "
-                             "it that another drive was over too, by their distances")
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no stretch "
+                             "of some seconds that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
@@ -281,9 +279,9 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
     return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
-def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
+def _cut(runs: Sequence[Run], stretch_s: float = 10.0, least_s: float = 3.0) -> list[list[tuple[int, Drive]]]:
     """Stretches of the way, of about so many seconds, that at least two runs share: of each the runs, by number, and
-    their drives."""
+    their drives. A run counts that is in it for some periods of a body's bounce (``least_s``)."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
                     for places in ([run.first for run in runs], [-1] * len(runs)))
@@ -298,7 +296,7 @@ def _cut(runs: Sequence[Run], stretch_s: float = 10.0) -> list[list[tuple[int, D
         for number, (run, way) in enumerate(zip(runs, ways, strict=True)):
             first, last = np.searchsorted(way, (start, end))
             first = max(int(first), run.first)
-            if last - first >= _LEAST_S * run.rate_hz:
+            if last - first >= least_s * run.rate_hz:
                 part = slice(first, int(last))
                 parts.append((number, Drive(run.rate_hz, run.measured_mps2[part], run.distance_m[part])))
         if len(parts) > 1:
