@@ -3,7 +3,7 @@
 Problem. A recording is made in a car whose power goes without warning, is played back at hundreds of times
 real time, and may come from anybody. So the writer must lose no more than what came after its last flush,
 the reader must be quick, must never hold more than a few blocks in memory (also for a compressed file that
-unpacks to terabytes), and must tell a recording that was cut short from one that is damaged.
+unpacks to terabytes), and must distinguish a recording that was cut short from one that is damaged.
 
 Solution. One line per event, ``<t_s> <source> <hex>``, after a first line ``# ridelog-dump 1 {JSON}``. Times
 are read and written as integers, so the six decimals come back exactly. A last line without its newline, or a

@@ -229,7 +229,7 @@ def _set(path: Path, text: str) -> None:
 
 
 def _text(path: Path) -> str:
-    """A setting's text; empty where the device has no such file or does not tell it now."""
+    """A setting's text; empty where the device has no such file or does not give it now."""
     try:
         return path.read_text(errors="replace").strip()
     except (FileNotFoundError, NotADirectoryError):

@@ -3,7 +3,7 @@
 Problem: the kernel knows some hundred chips; each would need a driver here. Solution: its interface is read instead. In
 the best case its buffer gives scans with a time each (``in_timestamp``, on the monotonic clock); without it the times
 are recovered from when the scans came; without a buffer the raw values are read one by one, 100 times a second, each at
-the time of its read. Which of these it is, the recording tells, and ``status`` says where there is no buffer.
+the time of its read. Which of these it is, the recording says, and ``status`` says where there is no buffer.
 
 What the bytes mean is only known once a device is there, and another one may be plugged in later. So the first event,
 and one every ``DESCRIBE_US``, is a description (``_iio_layout``): a JSON object. All others begin with a letter: ``s``,

@@ -22,7 +22,7 @@ from logger.units import WINDOW_M
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.estimation.rms_calibration import Settings, SpeedCalibration
+    from logger.estimation.rms_calibration import CalibrationSettings, SpeedCalibration
     from logger.report.calibration_text import Calibrated
     from logger.vehicle.effect import Chosen
     from logger.vehicle.vehicle import Vehicle
@@ -146,12 +146,12 @@ def calibrated(model: vehicle_file.Model, path: Path | None, question: Question,
     path    of the vehicle's file, beside which they are kept; None: nowhere
     tell    called with where they are from
     """
-    from logger.estimation.rms_calibration import Settings, loaded
+    from logger.estimation.rms_calibration import CalibrationSettings, loaded
     from logger.report.calibration_text import Calibrated, Load
     from logger.service.signal_chain import recorder_gain
 
     try:
-        settings = Settings(window_m=question.window_m, seed=question.seed)
+        settings = CalibrationSettings(window_m=question.window_m, seed=question.seed)
     except ValueError as error:
         raise BadInput(f"{question.said}: {error}") from None
     vehicle = model.vehicle
@@ -175,7 +175,7 @@ class _Ask:
     path: Path | None
     effects: Sequence[Chosen]
     gain: Callable[[Array], Array]
-    settings: Settings
+    settings: CalibrationSettings
     recompute: bool
     tell: Tell
 

@@ -1,4 +1,4 @@
-"""Drives: recorded ones as runs, simulated ones, and the roughness of the road that a drive tells."""
+"""Drives: recorded ones as runs, simulated ones, and the roughness of the road as a drive shows it."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def _profile_of(track: Track) -> Profile:
     return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
 
 
-# --- the road that a drive tells ---
+# --- the road as a drive shows it ---
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -271,7 +271,7 @@ class Estimate(CommandResult):
     iri_exact_m_per_km   (w,) that of the run's profile; NaN where there is none
     limit_std_m_per_km   (w,) standard error that an estimator would reach which knew everything but the road
     flags                w sets of words
-    profile              the road, as far as the readings tell it, in its parts; it is smoother than the road
+    profile              the road, as far as the readings resolve it, in its parts; it is smoother than the road
     doubts               what may be wrong with the drive's record, a line each
     """
 

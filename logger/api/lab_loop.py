@@ -43,7 +43,7 @@ Ask = Callable[[Bench, str], str | None]
 """Which effect to add where one was found missing: its name or another's, or None for none."""
 Progress = Callable[[], AbstractContextManager[Tell]]
 Explain = Callable[[str, str, str], str]
-"""What to tell under a heading, laid out: of compare, diagnose, add, again or end; with the effect that is added, and
+"""What to say under a heading, laid out: of compare, diagnose, add, again or end; with the effect that is added, and
 the vehicle file that is read, or written where an effect is added."""
 
 
@@ -59,7 +59,7 @@ class LabStory(CommandResult):
     error_before         of the model as it was given; ``error_after`` of the last one, refitted
     noise_floor_error    that the sensor's noise alone makes
     steps                models on the way, each with its error on all samples
-    page                 the file that tells all of it
+    page                 the file with all of it
     """
 
     model: Model

@@ -18,7 +18,7 @@ from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.roads.elevation_spectrum import Bands
+    from logger.roads.elevation_spectrum import BandedSpectrum
 
 Array = npt.NDArray[np.float64]
 
@@ -218,7 +218,7 @@ class RoadClass(CommandResult):
     waviness: float
     waviness_std: float
     iri_m_per_km: float
-    spectrum: Bands
+    spectrum: BandedSpectrum
 
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""

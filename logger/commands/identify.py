@@ -20,7 +20,7 @@ looked for where none is given. run2.NAME is that of one run, each.NAME one for 
   ridelog identify drive.csv --vehicle rav4-2009 --step start_m=50,height_m=-0.03 --free step.height_m,speed_scale
 
 With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of the
-waviness that is said or, with road.waviness free, found. Drives over one road at different speeds tell far more
+waviness that is said or, with road.waviness free, found. Drives over one road at different speeds say far more
 (--same-road).
 
   ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg

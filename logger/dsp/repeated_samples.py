@@ -3,7 +3,8 @@ one code.
 
 Problem: a program that asks a phone 200 times a second gets each of its 51 readings three or four times. Steps that no
 car makes stand between the held values, and the ride reads too rough. A sensor with coarse steps repeats values too,
-for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not tell one from the other.
+for most of a quiet drive, and nothing is wrong with it: how many samples repeat does not distinguish one from the
+other.
 
 Solution: where a sensor moves by several steps before and after, a sample at which it hardly moves is a turning point,
 and there a move by one or two steps either way is as likely as none: the density of moves is flat over so few steps.

@@ -25,7 +25,7 @@ from logger.estimation.batch import (
     on_grid,
     score,
 )
-from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.road_profile import RoadProfile
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -114,7 +114,7 @@ def _check_speed(rate_hz: float, speed_mps: Array, distance_m: Array) -> None:
 
 @dataclass(frozen=True)
 class Assessment:
-    """All there is to tell of a drive's road.
+    """All results on a drive's road.
 
     exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
     compared                whether there is a profile to compare with
@@ -131,7 +131,7 @@ class Assessment:
     exact_m_per_km: Array
     compared: bool
     least_error_m_per_km: Array
-    limits: Limits
+    limits: ErrorBound
     road: RoadProfile | None
     noise: NoiseBelief | None
     learns_noise: bool = False
@@ -165,7 +165,7 @@ def assess(
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     if track is not None:
         exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
-    limits = Limits(car, gridded, window_m)
+    limits = ErrorBound(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
                       least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise)

@@ -62,7 +62,8 @@ class BentForces:
         do besides, because the motion is not known exactly [(m/s2)2].
 
         under       (axles, f) rfft of the elevations under the axles [m]
-        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
+        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings resolve of
+                    it
         """
         motions = np.array([np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
                             for gain in (self._travel, self._rate, self._own_rate)])

@@ -1,4 +1,4 @@
-"""A drive's readings and fixes, as they come, into what they tell of the receiver's delay and the sensor's mounting.
+"""A drive's readings and fixes, as they come, into what they show of the receiver's delay and the sensor's mounting.
 
 Readings are kept for a block of ``BLOCK_S`` only; a block begins with a fix and is done once the readings are
 ``WAIT_S`` past its end, for fixes come late. How readings and fixes are split between calls changes nothing.

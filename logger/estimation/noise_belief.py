@@ -2,8 +2,8 @@
 
 Problem. No data sheet states the noise of a BMA220, and an estimate with a noise half as large as it is makes a smooth
 road rough. Solution. Stretches of a drive each say how probable a noise would have made their readings
-(``noise_evidence``), for all noises of a grid: readings that never leave a step rule out the large ones and tell small
-ones not apart, which no slope and curvature at one noise can say. What was believed before is one more stretch.
+(``noise_evidence``), for all noises of a grid: readings that never leave a step rule out the large ones and distinguish
+small ones not apart, which no slope and curvature at one noise can say. What was believed before is one more stretch.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The road itself, from the pieces that the estimator gives: joined, and cut to the wavelengths that the readings tell.
+"""The road itself, from the pieces that the estimator gives: joined, and cut to the wavelengths that the readings
+resolve.
 
 Problem. Neighbouring pieces come from different solutions and may stand at different heights by a slow wave that no
 reading tells; joined end to start, their heights would be steps. And an estimate holds waves that are mostly belief.

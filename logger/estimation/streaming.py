@@ -2,7 +2,7 @@
 
 A block of 20 s is solved every 2 s (``road_solver``), with what was learnt of road and sensor so far
 (``recursive_road``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
-the body's slow swing, still tell of a road already driven; windows longer than 10 m are made of several stretches.
+the body's slow swing, still depend on a road already driven; windows longer than 10 m are made of several stretches.
 Splitting the readings differently changes nothing.
 """
 
@@ -31,7 +31,7 @@ from logger.estimation.iri_posterior import (
 )
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
-from logger.estimation.ride_posterior import Place, RidePosterior
+from logger.estimation.ride_posterior import RidePlace, RidePosterior
 from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
@@ -66,7 +66,7 @@ class WindowEstimate:
     iri_m_per_km        NaN when it is not known; ``flags`` say why: ``faint`` when the sensor hardly sees the road at
                         this speed, ``unsettled`` next to the start of the readings or a hole in them
     iri_std_m_per_km    its standard error [m/km], NaN likewise
-    resolved            share of the variance of the IRI's slope that the readings tell, 0 to 1
+    resolved            share of the variance of the IRI's slope that the readings resolve, 0 to 1
     ride                figures of the weighted acceleration without noise and rounding; nan where they are not known
     """
 
@@ -82,8 +82,8 @@ class WindowEstimate:
 class RoadPiece:
     """Estimated elevations (p,) [m] at ``start_m + k spacing_m``; the last point is the next piece's first.
 
-    The elevations of two pieces may differ by a slow wave that the readings do not tell. Waves from ``shortest_m`` to
-    ``longest_m`` are resolved: the readings explain more than half of their variance; both are NaN if none is.
+    The elevations of two pieces may differ by a slow wave that the readings do not resolve. Waves from ``shortest_m``
+    to ``longest_m`` are resolved: the readings explain more than half of their variance; both are NaN if none is.
     """
 
     start_m: float
@@ -298,7 +298,7 @@ class RoadEstimator:
                 piece = self._piece(slope[inside], unseen[inside], speed_mps, solved.variance, *level)
                 if weighted is not None:
                     log_std = self.noise.log_std if self.noise is not None else 0.0
-                    place = Place(speed_mps, solved.variance, *level, self._road.sensor, log_std)
+                    place = RidePlace(speed_mps, solved.variance, *level, self._road.sensor, log_std)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, solved.variance, level[0])
             estimates += self._window(number, piece)
@@ -334,7 +334,7 @@ class RoadEstimator:
         return block, solved
 
     def _ride_sums(
-        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: Place
+        self, weighted: Array, samples: Samples, moving: Bools, number: int, place: RidePlace
     ) -> RideSums | None:
         """What was felt in a piece while the car moved; None where that is not in the block."""
         assert self._answers.ride is not None

@@ -37,7 +37,7 @@ class CarBiases:
     log_std          standard error of its logarithm; where the gain is not known, the spread of the other cars' gains
     group            cars that can be compared share a number; the largest group is 0
     known            the gain follows from roads shared with other cars
-    growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not tell
+    growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not show it
     pass_std         relative standard deviation of a pass; NaN: no road has two passes of different cars
     """
 
@@ -107,7 +107,7 @@ def car_biases(road: Codes, car: Codes, cars: int, passes: Array, iri: Array, ye
 def shared_by_session(car: Codes, passes: Array, residual: Array, square: Array) -> float:
     """Variance of what all passes of a session share: temperature, load and tires of that day. By analysis of
     variance of a random effect (S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, 1992, section 3.6),
-    from sums of relative residuals of each session (n,) of a car; 0 where nothing tells it."""
+    from sums of relative residuals of each session (n,) of a car; 0 where nothing shows it."""
     sessions, cars, total = len(car), len(np.unique(car)), passes.sum()
     if sessions <= cars or total <= sessions:
         return 0.0

@@ -102,7 +102,7 @@ def _changes(roads: RoadTable) -> list[str]:
     worse = np.flatnonzero(roads.worse)
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
     if not order:
-        return [f"No {roads.by} has become worse, as far as these drives tell"]
+        return [f"No {roads.by} has become worse, as far as these drives show"]
     lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)",
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [

@@ -1,4 +1,4 @@
-"""Whether the data can tell the numbers apart at all, in words.
+"""Whether the data can distinguish the numbers at all, in words.
 
 Problem: a fit always ends somewhere. Where the data say nothing of a number, or only of a combination of several, the
 place it ends at is an accident that looks like a result. Solution: the predictions' derivatives, by the relative change
@@ -55,8 +55,8 @@ class Finding:
 
 
 class NotIdentifiable(CheckFailed):
-    """The data do not tell what was asked. ``findings`` say what, and its text says it in words; ``error_before`` that
-    of the model where every free number starts, None: not known."""
+    """The data do not determine what was asked. ``findings`` say what, and its text says it in words; ``error_before``
+    that of the model where every free number starts, None: not known."""
 
     def __init__(self, findings: Sequence[Finding], error_before: float | None = None) -> None:
         super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))
@@ -64,7 +64,7 @@ class NotIdentifiable(CheckFailed):
 
 
 def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
-    """What no amount of such data could tell.
+    """What no amount of such data could determine.
 
     derivatives    (N, p) of the predictions by the relative change of each number
     size           root of the sum of squares of the predictions
@@ -112,7 +112,7 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         else:
             why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
                 f"{_moves(shares)} drowns in the noise")
-            words = (f"this drive does not tell {_listed(list(shares))} apart: {why} (standard errors "
+            words = (f"this drive does not separate {_listed(list(shares))}: {why} (standard errors "
                      f"{', '.join(errors.values())}). Hold one of them fixed, or add runs that differ.")
         findings.append(Finding(WEAK, shares, words))
         weak &= ~np.isin(names, list(shares))

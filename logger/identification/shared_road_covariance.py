@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.identification.drive_model import DriveModel
-from logger.identification.noise_models import ROAD_LEVEL, Whitener
+from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
 from logger.profiles.track import Track
 from logger.roads.iso8608 import displacement_psd
@@ -94,7 +94,7 @@ class _Drive:
     way_m: Array
     white: Array
     slopes: Array
-    whitener: Whitener
+    whitener: PredictionWhitener
     response: Complex
 
 

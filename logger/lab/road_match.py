@@ -64,7 +64,7 @@ class RoadMatch:
 
 
 def pooled(matches: Sequence[RoadMatch]) -> RoadMatch:
-    """Several runs together, their means: what none of them could tell by itself, all may, as the mean of maxima
+    """Several runs together, their means: what none of them could show by itself, all may, as the mean of maxima
     scatters less around its own mean than one of them."""
     upright, turned, gain, chance, mean_chance, expected = map(
         float, np.mean([astuple(one) for one in matches], axis=0))

@@ -88,7 +88,7 @@ _STEP_WORDS = {
 
 
 def _confusion(found: Diagnosis, one: Chosen) -> str:
-    """What explains as well, and which drive would tell."""
+    """What explains as well, and which drive would separate them."""
     others = found.candidate(one.effect.name).confused_with
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in (one.effect.name, *others)]
     return (f"These runs cannot distinguish {one.effect.name} from {' or '.join(others)}: each explains about as much "

@@ -32,7 +32,7 @@ def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
 
 
 def as_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
-    """All of it for a program; null where there is nothing to tell."""
+    """All of it for a program; null where nothing is known."""
     names = list(fit.parameters)
     return {
         "parameters": fit.parameters, "standard_errors": fit.standard_errors,

@@ -1,4 +1,4 @@
-"""The page of a plan: which effects drives could show and tell apart, and which drive would add most."""
+"""The page of a plan: which effects drives could show and distinguish, and which drive would add most."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def ending(story: Story) -> list[str]:
     elif diagnosis.unexplained:
         lines.append("Something is missing still that no effect explains: an effect of your own may do it.")
     else:
-        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can tell.")
+        lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
     return [*lines, *with_what]
 
 

@@ -50,7 +50,7 @@ class ComfortColumns:
             return NO_COMFORT
         noise_mps2, log_std = (noise.noise_rms_mps2, noise.log_std) if noise else (self._noise_mps2, 0.0)
         if not self._is_coarse:
-            # What a drive tells of a fine sensor's noise holds what the car's model is wrong by: that is ride.
+            # What a drive shows of a fine sensor's noise holds what the car's model is wrong by: that is ride.
             noise_mps2 = min(noise_mps2, self._noise_mps2)
         ride = estimate.ride if estimate is not None else NO_FIGURES
         if not isfinite(ride.a_w.value):

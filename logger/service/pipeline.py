@@ -34,7 +34,8 @@ from logger.units import US_PER_S
 
 FIX_DELAY_US = 3_000_000
 LONGEST_LAG_US = 9_000_000
-"""A row is made at most so long after its window, once the motion in it is settled: the road behind tells of it."""
+"""A row is made at most so long after its window, once the motion in it is settled: the road behind is part of its
+estimate."""
 
 SHORT_WINDOW_SHARE = 0.5
 # Of the IRI: in simulated drives with losses of 2 to 9 s and changing speed the bias was 2 to 20 %.

@@ -5,7 +5,7 @@ that merely exists may be that of a service that died.
 
 Solution. The service fills a frozen ``ServiceStatus`` now and then and puts it, whole, into a small JSON file in
 memory (renamed into place, so a reader never sees half of one). It carries the process and the monotonic time of
-its making, by which ``trouble`` tells a living service from a dead, hung or never started one.
+its making, by which ``trouble`` distinguishes a living service from a dead, hung or never started one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SensorStatus:
     driver, place   what it is and where: ``bma220`` at ``/dev/i2c-1``
     state           ok: readings come; absent: it was never there; retrying: it was there, failed, and is tried
                     again; silent: it is open and says nothing; doubtful: it speaks, but what it says cannot be
-                    read or cannot be true (``last_error`` tells what)
+                    read or cannot be true (``last_error`` says what)
     since_s         how long it has been in that state [s]
     last_error      text of the last fault, also after it recovered; None: there was none
     readings        samples or fixes so far

@@ -1,4 +1,4 @@
-"""What the running service tells about itself: a snapshot for the status file, a line for systemd."""
+"""What the running service reports of itself: a snapshot for the status file, a line for systemd."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class StatusReporter:
         self._failed = False
         self._without_gravity = 0
         self._gravity_advice: str | None = None
-        self._progress = {"accelerometer": Progress(), "gps": Progress()}
+        self._progress = {"accelerometer": ReadingProgress(), "gps": ReadingProgress()}
         self._started_anew_us = self._began_us
 
     def write(self, now_us: int) -> None:
@@ -200,7 +200,7 @@ class StatusReporter:
         )
 
 
-class Progress:
+class ReadingProgress:
     """Do the bytes that arrive become readings? ``look`` gives what is wrong, or None."""
 
     def __init__(self) -> None:

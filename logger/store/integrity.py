@@ -268,7 +268,7 @@ def _compare_with_sidecar(sidecar: dict[str, Any], findings: _Findings) -> None:
         findings.wrong("sidecar: expected the number of rows of a finished log")
     elif not findings.good <= rows <= findings.good + findings.corrupt + findings.torn:
         findings.gaps += 1
-        findings.wrong(f"gap: expected the {rows} rows that the sidecar tells of, found {findings.good}")
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar lists, found {findings.good}")
 
 
 def _compare_neighbours(logs: dict[Path, _Findings]) -> None:

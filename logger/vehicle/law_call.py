@@ -58,7 +58,7 @@ def functions_of(law: MotionLaw) -> list[Any]:
     return functions
 
 
-def numbers_of(law: MotionLaw) -> list[float]:
+def numbers_in_order(law: MotionLaw) -> list[float]:
     """Its numbers in the order in which the loop hands them on."""
     return [value for _, value in sorted(vars(law.p).items())]
 

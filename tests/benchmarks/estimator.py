@@ -41,7 +41,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.dsp.sections import BlockFilter, butterworth_sos, frequency_response
-from logger.estimation.error_bound import Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.noise_belief import NoiseBelief
 from logger.estimation.rms_relation import RmsRelation, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -437,7 +437,7 @@ def exact(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = S
 def reported_limits(sensor: Accelerometer, extent: Extent) -> list[float]:
     """The product's own limit at each speed, over the levels driven."""
     structure = half_car.structure(rav4())
-    limits = Limits(LinearCar(structure, body_point(structure)), reported(sensor), WINDOW_M)
+    limits = ErrorBound(LinearCar(structure, body_point(structure)), reported(sensor), WINDOW_M)
     return [pooled_r2([limits.at(mph * MPH_MPS, RoadSpectrum.of_iri(level)) for level in extent.levels])
             for mph in extent.mph]
 

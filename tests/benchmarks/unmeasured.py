@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import Found, diagnose_same_road
+from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.likelihood import SameRoad
 from logger.profiles.track import Track
 from logger.runs import Run
@@ -31,7 +31,7 @@ ABSORBED = ("sensor_gain", "tire_enveloping", "speed_scale")
 FIRST_SEED = 1
 
 
-def diagnosed(seed: int, effect: str | None, folder: Path) -> Found:
+def diagnosed(seed: int, effect: str | None, folder: Path) -> UnknownRoadDiagnosis:
     """A case, from files."""
     from ..validation.cases.case_files import write_case
     from ..validation.cases.same_road import same_road_case

@@ -238,7 +238,7 @@ def test_a_short_drive_has_windows_without_a_profile(
     assert main(asked) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("IRI ") for line in lines)
-    why = f"No profile in {road}: the readings tell no wavelengths over a stretch longer than the longest of them"
+    why = f"No profile in {road}: the readings resolve no wavelengths over a stretch longer than the longest of them"
     assert lines[-1] == why
     assert windows.read_text().count("\n") > 10
     assert main([*asked, "--json"]) == 0

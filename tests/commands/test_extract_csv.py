@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.simulated_drive import Drive, DrivePlan, simulate_drive
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -19,7 +19,7 @@ from ..support.drives.phones import LAYOUTS, Phone, phone_in, phyphox, rotation,
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
-    stretches=(Stretch(1200, 90),), seed=11,
+    stretches=(RoadStretch(1200, 90),), seed=11,
 )
 FROM_M, TO_M = 100.0, 800.0
 

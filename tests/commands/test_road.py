@@ -142,5 +142,5 @@ def test_wrong_use_is_one_line(arguments: list[str], capsys: pytest.CaptureFixtu
 
 def test_a_profile_that_is_too_short(tmp_path: Path) -> None:
     generate(tmp_path / "road.csv", "--class", "A", "--length", "60")
-    with pytest.raises(BadInput, match=r"road\.csv: too short to tell its class: expected at least 100 m, found 60 m"):
+    with pytest.raises(BadInput, match=r"road\.csv: too short to classify: expected at least 100 m, found 60 m"):
         main(["road", "classify", str(tmp_path / "road.csv")])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from logger.estimation.error_bound import Limit, Limits, pooled_r2
+from logger.estimation.error_bound import ErrorBound, Limit, pooled_r2
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.roads.gd_iri import iri_of_road
@@ -27,8 +27,8 @@ WINDOW_M = 7.62
 LEVELS = (1.0, 2.5, 7.0)
 
 
-def limits(sensor: Sensor, window_m: float = WINDOW_M) -> Limits:
-    return Limits(LinearCar(STRUCTURE, body_point(STRUCTURE)), sensor, window_m)
+def limits(sensor: Sensor, window_m: float = WINDOW_M) -> ErrorBound:
+    return ErrorBound(LinearCar(STRUCTURE, body_point(STRUCTURE)), sensor, window_m)
 
 
 def golden_car(n: np.ndarray) -> np.ndarray:

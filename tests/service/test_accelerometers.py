@@ -24,7 +24,7 @@ from logger.errors import BadInput
 from logger.service import wiring
 from logger.service.config import AccelerometerConfig, load_config
 from logger.service.status import SensorStatus, ServiceStatus
-from logger.service.status_reporter import Progress
+from logger.service.status_reporter import ReadingProgress
 from logger.store.formats.vehicle_file import read_model
 
 from ..support.accelerometer_fakes import fakes
@@ -206,7 +206,7 @@ def test_another_device_in_its_place_is_refused_in_one_line(name: str, ride: Cal
     for event in driven.parked():
         core.feed(event)
     core.finish()
-    progress = Progress()
+    progress = ReadingProgress()
     speaks = driven.supervisor.error == ""
     said = [driven.supervisor.error, *(progress.look(s * 1_000_000, speaks, core.samples) or "" for s in range(15))]
     reported = next(words for words in reversed(said) if words)

@@ -16,7 +16,7 @@ from logger.service.listener import HANG_US, Listener, monotonic_us
 from logger.service.shutdown_signals import Stop
 from logger.service.storage import Storage
 from logger.store.export.pairing import Pairing
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 
 
 class Told:
@@ -42,7 +42,7 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             parts["storage"].close()
 
     def storage(*arguments: Any, pairing: Pairing) -> Storage:
-        parts["limits"] = next(argument for argument in arguments if isinstance(argument, Limits))
+        parts["limits"] = next(argument for argument in arguments if isinstance(argument, QuotaLimits))
         parts["pairing"] = pairing
         return Storage(*arguments, pairing=pairing)
 
@@ -58,7 +58,7 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_quota_and_floor_and_whose_copies_count_are_those_of_the_settings(built: dict[str, Any]) -> None:
-    assert built["limits"] == Limits(123_456_789, 987_654)
+    assert built["limits"] == QuotaLimits(123_456_789, 987_654)
     assert built["pairing"] == Pairing("first_stick")
 
 

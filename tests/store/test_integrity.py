@@ -156,7 +156,7 @@ def test_rows_that_the_sidecar_tells_of_are_missed(tmp_path: Path) -> None:
     store(tmp_path / "00001-001.csv", lines_of(row(1), row(2)))
     check = found(tmp_path / "00001-001.csv")
     assert counts(check) == (2, 0, 0, 1)
-    assert check.problems == ("gap: expected the 3 rows that the sidecar tells of, found 2",)
+    assert check.problems == ("gap: expected the 3 rows that the sidecar lists, found 2",)
 
 
 def test_damaged_sidecar_is_wrong(tmp_path: Path) -> None:
@@ -411,7 +411,7 @@ def test_more_rows_than_the_sidecar_tells_of_are_wrong(tmp_path: Path) -> None:
     with (tmp_path / "00001-001.csv").open("a") as file:
         file.write(f"{format_row(row(4))}\n")
     assert found(tmp_path / "00001-001.csv").problems == (
-        "gap: expected the 3 rows that the sidecar tells of, found 4",)
+        "gap: expected the 3 rows that the sidecar lists, found 4",)
 
 
 @pytest.mark.parametrize("place", [".", "/", "..", "./"])

@@ -266,7 +266,7 @@ def test_a_compiled_law_answers_as_it_is_written() -> None:
     felt = np.linspace(-0.4, 0.6, law_call.FELT)
     seen = Seen(*felt[: law_call.MEMORY_AT], (felt[law_call.MEMORY_AT],))
     answers = np.zeros(law_call.ANSWERS)
-    given = np.array([9.0, *law_call.numbers_of(law)])
+    given = np.array([9.0, *law_call.numbers_in_order(law)])
     law_call.ask(law_call.address_of(law), given, 1, felt, answers)
     expected = force(values, seen), rates(values, seen)[0]
     assert answers[:2] == pytest.approx(expected, rel=1e-12)

@@ -25,7 +25,7 @@ HUNDREDTH = 0.01
 """A scale of distances moves by hundredths."""
 
 
-class LinearCar(Protocol):
+class ResponseCar(Protocol):
     """A car as far as it is known here."""
 
     @property
@@ -56,7 +56,7 @@ class Options:
     most_steps       of Fisher's
     solved           what is left of a set of equations when it counts as solved, of what it began with
     fisher_probes    simulated drives that the information is a mean over
-    refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` tells
+    refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` says it
     """
 
     waviness: float = STANDARD_WAVINESS

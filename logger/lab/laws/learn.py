@@ -88,7 +88,7 @@ class Nearest:
 
     @property
     def as_good(self) -> bool:
-        """Whether the data do not tell the two apart."""
+        """Whether the data do not distinguish the two."""
         return self.gain > self.law_gain - CONFUSED
 
 

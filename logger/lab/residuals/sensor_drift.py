@@ -99,7 +99,7 @@ def drifts_of(runs: Sequence[Run], residuals: Sequence[Array], noise_mps2: float
 
 
 class _Cosines:
-    """The first orthonormal cosines (k, n) of n samples: those that count, and some more that tell of the noise."""
+    """The first orthonormal cosines (k, n) of n samples: those that count, and some more for the noise."""
 
     def __init__(self, samples: int, count: int, more: int) -> None:
         from scipy.fft import dct, idct

@@ -47,7 +47,7 @@ class SpatialLine:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run tells)."""
+    """What a model leaves: where it sits, its tests, and what repeats along the way (None: no run shows it)."""
 
     residuals: ModelResiduals
     where: Breakdown

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.lab.unknown_road.likelihood import SameRoad, State
+from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
 from logger.vehicle.effect_parameters import Move, coordinates_of, moved, moves_of, steps_of
 
@@ -30,14 +30,15 @@ class Fitted:
     problem        quick for states like this one
     """
 
-    state: State
+    state: RoadFitState
     moves: tuple[Move, ...]
     data: Array
     information: Array
     problem: SameRoad
 
 
-def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.1, many_rounds: int = 12) -> Fitted:
+def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: float = 0.1,
+           many_rounds: int = 12) -> Fitted:
     """The most probable state, by so many of Fisher's steps from this one at most.
 
     settled        a step that promises less, in the log of the probability, is the last
@@ -56,7 +57,7 @@ def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.
         logs, effects, roads = at(here)
         gains, slopes = sloped(problem, effects, moves, logs)
         if problem.rounds > many_rounds:
-            problem = problem.prepared(State(effects, logs, roads, gains))
+            problem = problem.prepared(RoadFitState(effects, logs, roads, gains))
         score, data = problem.scored(problem.table(gains, slopes), roads, information=True)
         off, precision = problem.prior_terms(logs, q, roads)
         score -= precision * off
@@ -66,7 +67,7 @@ def fitted(problem: SameRoad, state: State, steps: int = 10, settled: float = 0.
             break
         here = np.clip(here + np.clip(step, -longest, longest), low, high)
     logs, effects, roads = at(here)
-    found = State(effects, logs, roads, problem.response(effects, logs))
+    found = RoadFitState(effects, logs, roads, problem.response(effects, logs))
     return Fitted(found, tuple(moves), data, information, problem)
 
 

@@ -123,5 +123,5 @@ def _own_key(path: Path) -> str:
 
 
 def _fingerprint(key: bytes) -> str:
-    """A name made from a key, which does not tell it; empty for one that is too short to be one."""
+    """A name made from a key, which does not reveal it; empty for one that is too short to be one."""
     return hashlib.sha256(b"ridelog stick " + key).hexdigest()[:2 * _ID_BYTES] if len(key) >= LEAST_KEY_BYTES else ""

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.estimation.rms_calibration import METHOD, Line, Settings, SpeedCalibration
+from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import read_bounded, replace_bytes
 from logger.shipped import shipped
 from logger.store.formats.checksum import json_sha256
@@ -47,7 +47,7 @@ class Found:
     path: Path
 
 
-def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: Settings,
+def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: CalibrationSettings,
                 effects: Sequence[Chosen] = ()) -> str:
     """64 hex digits that change with any number of the vehicle, its effects, the recorder's response, the settings or
     the method.
@@ -110,7 +110,7 @@ def _read(path: Path) -> dict[str, tuple[SpeedCalibration, ...]]:
 
 
 def _speed(stored: dict[str, Any]) -> SpeedCalibration:
-    lines = [Line(**stored[field.name]) for field in fields(SpeedCalibration) if field.name != "speed_mps"]
+    lines = [RmsLine(**stored[field.name]) for field in fields(SpeedCalibration) if field.name != "speed_mps"]
     return SpeedCalibration(stored["speed_mps"], *lines)
 
 

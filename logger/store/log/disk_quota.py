@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Limits:
+class QuotaLimits:
     """quota_bytes    most bytes in the folder of the logs; None: no limit
     floor_bytes      free space on its disk that is left to others
     """
@@ -63,7 +63,7 @@ class DiskQuota:
     exported_removed, dumps_lost    files removed to make room: exported ones, and dumps that were not
     """
 
-    def __init__(self, directory: Path, limits: Limits, exported: Callable[[Path], set[str]],
+    def __init__(self, directory: Path, limits: QuotaLimits, exported: Callable[[Path], set[str]],
                  files: FileSystem) -> None:
         self._directory = directory
         self._limits = limits

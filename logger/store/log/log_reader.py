@@ -73,7 +73,7 @@ def find_logs_in(places: Sequence[Path]) -> list[tuple[Path, Path | None]]:
     found: list[tuple[Path, Path | None]] = []
     seen: set[object] = set()
     for place in places:
-        # With one place its own name says nothing; among several it tells them apart.
+        # With one place its own name says nothing; among several it distinguishes them.
         shown_from = place if len(places) == 1 else place.parent
         marks = {log: {log.resolve(), _copied(log) if len(places) > 1 else None} - {None} for log in find_logs(place)}
         found += [(log, shown_from) for log, its in marks.items() if not seen & its]

@@ -215,7 +215,7 @@ class SegmentLog:
 
     def _do(self, act: Callable[..., None], *what: bytes) -> None:
         """Write to or sync the part. One that failed at it is never tried again: the system may by then have thrown
-        away what it could not write, and tell of success."""
+        away what it could not write, and report success."""
         if self._descriptor is None:
             raise ValueError("expected an open log: go_on() after an error, and nothing after close()")
         try:

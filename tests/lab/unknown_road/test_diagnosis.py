@@ -11,10 +11,10 @@ import pytest
 
 from logger.identification.unknown_road.drive_operator import Crossing, Drive, grid_under
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import Candidate, Found, diagnose_same_road
+from logger.lab.unknown_road.diagnosis import Candidate, UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.fisher_scoring import fitted as fit
-from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad, State
-from logger.lab.unknown_road.same_road_test import apart, in_doubt, likenesses
+from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
+from logger.lab.unknown_road.same_road_test import likenesses, maybe_two_roads, surely_two_roads
 from logger.lab.unknown_road.screening import trials
 from logger.lab.unknown_road.tabulated_response import Tabulated, response_of
 from logger.profiles.track import Track
@@ -85,7 +85,7 @@ def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
         response_of(compose(CAR, [effect]), RATE_HZ)
 
 
-def deviance(problem: SameRoad, state: State) -> float:
+def deviance(problem: SameRoad, state: RoadFitState) -> float:
     """Minus twice the log-likelihood of all drives by their covariance, written out, and the priors."""
     total = problem.cost(state)
     for road, part, parts in zip(problem._roads, problem._parts, problem.stretches, strict=True):
@@ -113,7 +113,7 @@ def test_gains_are_those_of_dense_likelihoods() -> None:
     start = problem.start()
     before = replace(start, roads=start.roads + 0.02 * np.cos(np.arange(len(start.roads))))
     logs = 0.02 * np.cos(np.arange(len(start.logs)))
-    after = State((), logs, start.roads, problem.response((), logs))
+    after = RoadFitState((), logs, start.roads, problem.response((), logs))
     own = deviance(problem, before) - deviance(problem, after)
     found = problem.prepared(before).gain(before, after) * (1 + 1 / 8)
     assert found == pytest.approx(own, abs=max(4.0, 0.15 * abs(own)))
@@ -147,7 +147,7 @@ def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
     assert all(found.seen for found in likenesses(one, one.start()))
     two = SameRoad([here, run_of(effects, 15.0, 85.0, 2, OTHER)], CAR, Tolerance())
     assert not any(found.seen for found in likenesses(two, two.start()))
-    assert apart(likenesses(two, two.start())) == (0, 1)
+    assert surely_two_roads(likenesses(two, two.start())) == (0, 1)
 
 
 def test_the_one_drive_over_another_road_is_named() -> None:
@@ -169,8 +169,8 @@ def test_drives_that_drown_in_noise_are_not_refused() -> None:
     problem = SameRoad([run_of([], speed, 85.0, seed, noise_mps2=8.0) for seed, speed in ((1, 9.0), (2, 15.0))], CAR,
                        Tolerance())
     found = likenesses(problem, problem.start())
-    assert apart(found) is None
-    assert in_doubt(found) == [(0, 1)]
+    assert surely_two_roads(found) is None
+    assert maybe_two_roads(found) == [(0, 1)]
 
 
 def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
@@ -178,8 +178,8 @@ def test_a_car_that_hides_the_road_is_no_reason_to_refuse() -> None:
     problem = SameRoad([run_of([soft], speed, 85.0, seed, noise_mps2=0.01) for seed, speed in ((1, 9.0), (2, 15.0))],
                        CAR, Tolerance())
     trials_of_it = [chosen(soft.effect, values) for values in soft.effect.trials()]
-    assert apart(likenesses(problem, problem.start())) == (0, 1)
-    assert apart(likenesses(problem, problem.start(), trials_of_it)) is None
+    assert surely_two_roads(likenesses(problem, problem.start())) == (0, 1)
+    assert surely_two_roads(likenesses(problem, problem.start(), trials_of_it)) is None
 
 
 def test_errors_and_floor_are_over_the_same() -> None:
@@ -200,7 +200,7 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
 
 def test_what_was_not_fitted_says_so() -> None:
     one = Candidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
-    found = Found((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
+    found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
     reported = as_json(found)
     assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False

@@ -18,7 +18,7 @@ from drivers.errors import DumpError
 from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.integrity import verify
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.dump_recording import repair_recordings
 from logger.store.log.log_writer import ClockMap, next_session, read_sidecar, repair
 from logger.store.log.row_format import format_row, parse_row, read_log
@@ -31,7 +31,7 @@ HEADER = DumpHeader(None, {"driver": "bma220", "range_g": 2}, {"baud": 9600}, "r
 OFFSET_US = 1_783_160_000_000_000
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EROFS)
 KINDS = ("create", "write", "sync", "close", "rename", "remove", "sync_directory")
-WHOLE_DISK = Limits(floor_bytes=0)
+WHOLE_DISK = QuotaLimits(floor_bytes=0)
 OUTAGE_STEPS = 60
 LIFE_STEPS = 30
 
@@ -252,7 +252,7 @@ def _is_as_written(record: WindowRecord) -> bool:
 class Service:
     """The storage of a running service, with a clock of its own: a row and two events each half second."""
 
-    def __init__(self, folder: Path, files: RefusingFiles, limits: Limits = WHOLE_DISK,
+    def __init__(self, folder: Path, files: RefusingFiles, limits: QuotaLimits = WHOLE_DISK,
                  max_file_bytes: int = 2500) -> None:
         folder.mkdir(exist_ok=True)
         self.folder = folder

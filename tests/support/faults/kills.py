@@ -26,7 +26,7 @@ from unittest.mock import patch
 
 from drivers.dump import Event, intact_bytes, open_dump
 from logger.commands.status import advice, screen
-from logger.demo.motion import Stretch
+from logger.demo.motion import RoadStretch
 from logger.demo.simulated_drive import DrivePlan, record, simulate_drive
 from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
@@ -44,7 +44,7 @@ Rows = dict[int, set[int]]
 def fast_drive(path: Path, seconds: float) -> None:
     """Recorded at 24 m/s nearly from the start."""
     speed = ((0, 0), (1, 0), (4, 24), (seconds, 24))
-    plan = DrivePlan(speed_knots=speed, stretches=(Stretch(30 * seconds, 60),), seed=7)
+    plan = DrivePlan(speed_knots=speed, stretches=(RoadStretch(30 * seconds, 60),), seed=7)
     record(simulate_drive(plan, read_vehicle(vehicle_file("rav4-2009"))), path)
 
 

@@ -40,7 +40,7 @@ from logger.service.storage import Storage
 from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
 from logger.service.timebase import OTHER_DATE_US
 from logger.store.formats.vehicle_file import read_model
-from logger.store.log.disk_quota import Limits
+from logger.store.log.disk_quota import QuotaLimits
 from logger.store.log.row_format import read_log
 
 from ..drives.replay import Rows, parts_for
@@ -139,7 +139,7 @@ class Car:
         self.config = replace(config, log=replace(config.log, directory=folder))
         sensor = wiring.instrument(self.config.accelerometer)
         vehicle = read_model(self.config.vehicle)
-        self.storage = Storage(folder, {}, 4_000_000, None, Limits(), self.clock)
+        self.storage = Storage(folder, {}, 4_000_000, None, QuotaLimits(), self.clock)
         self.decoder = wiring.gps_decoder(self.config)
         self.pipeline = wiring.pipeline(self.config, sensor, vehicle)
         self.rows = Rows()
