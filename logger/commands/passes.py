@@ -1,4 +1,4 @@
-"""Drives laid over each other by place and direction: the mean of all passes with its standard error, what changed, and
+"""Repeated drives combined by place and direction: the mean of all passes with its standard error, what changed, and
 places that somebody should go and see.
 
   ridelog passes /media/RIDELOG --out means.html --visit places.gpx

@@ -10,7 +10,7 @@ import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
 from logger.printable import counted
-from logger.report.laid_drives import LaidDrives
+from logger.report.combined_drives import CombinedDrives
 from logger.report.quantities import known
 from logger.report.terminal import comfort_words
 from logger.roads.places_to_visit import Place
@@ -22,7 +22,7 @@ SIGNIFICANT = 0.05
 MOST_VISITS, MOST_CHANGES = 20, 20
 
 
-def lines(found: LaidDrives) -> list[str]:
+def lines(found: CombinedDrives) -> list[str]:
     """For a person."""
     cells = len(found.iri.key)
     if not cells:
@@ -30,7 +30,7 @@ def lines(found: LaidDrives) -> list[str]:
     return [*_summary(found), *_visits(found), *_changes(found)]
 
 
-def _summary(found: LaidDrives) -> Iterator[str]:
+def _summary(found: CombinedDrives) -> Iterator[str]:
     drives, cells = found.iri.drives, len(found.iri.key)
     several = int((drives > 1).sum())
     yield (f"{counted(found.drives, 'drive')}, {found.placed:,} of {counted(found.windows, 'window')} with a place, in "
@@ -47,7 +47,7 @@ def _summary(found: LaidDrives) -> Iterator[str]:
                "is not known, and not in the standard errors")
 
 
-def _visits(found: LaidDrives) -> Iterator[str]:
+def _visits(found: CombinedDrives) -> Iterator[str]:
     yield ""
     if not found.visits:
         yield "No place lies above a limit with enough confidence: nothing to visit."
@@ -67,7 +67,7 @@ def _visits(found: LaidDrives) -> Iterator[str]:
         yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
 
 
-def _changes(found: LaidDrives) -> Iterator[str]:
+def _changes(found: CombinedDrives) -> Iterator[str]:
     change = found.change
     if change is None:
         return
@@ -97,7 +97,7 @@ def compass(heading_deg: float) -> str:
 # --- for programs ---
 
 
-def as_json(found: LaidDrives) -> dict[str, Any]:
+def as_json(found: CombinedDrives) -> dict[str, Any]:
     """The figures; null where nothing is known."""
     return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
             "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
@@ -105,7 +105,7 @@ def as_json(found: LaidDrives) -> dict[str, Any]:
             "visits": [visit_values(found, one) for one in found.visits]}
 
 
-def cell_values(found: LaidDrives, index: int) -> dict[str, Any]:
+def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
     """A cell by the names of its columns."""
     key = found.iri.key[index]
     change, trend = found.change, found.trend
@@ -128,7 +128,7 @@ def cell_values(found: LaidDrives, index: int) -> dict[str, Any]:
     return values
 
 
-def visit_values(found: LaidDrives, one: Place) -> dict[str, Any]:
+def visit_values(found: CombinedDrives, one: Place) -> dict[str, Any]:
     """A place to visit by the names of its columns: where its worst cell is, and the figures of that."""
     values = cell_values(found, one.worst)
     a_w = values["a_w_mps2"]

@@ -19,7 +19,8 @@ def summary(found: UnknownRoadDiagnosis) -> list[str]:
         lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. The probability that noise alone "
                      f"looks like this, all candidates together: {chance(candidate.p_value)}.")
         if candidate.confused_with:
-            lines.append(f"These drives cannot tell {one.effect.name} from {' or '.join(candidate.confused_with)}.")
+            lines.append(f"These drives cannot distinguish {one.effect.name} from "
+                         f"{' or '.join(candidate.confused_with)}.")
     if not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"

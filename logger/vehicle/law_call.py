@@ -5,7 +5,7 @@ is compiled once and kept on disk, before anybody wrote that law. Solution: each
 machine code with one and the same signature; the loop knows it by its address. Without numba the address is a number
 in a list, and the law runs as it stands.
 
-A law's functions are told apart by their code, so they get all that they need as ``p`` and hold nothing else.
+A law's functions are distinguished by their code, so they get all that they need as ``p`` and hold nothing else.
 """
 
 from __future__ import annotations

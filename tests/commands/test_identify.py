@@ -79,7 +79,7 @@ def test_a_model_that_lacks_something(runs: list[str], tmp_path: Path, capsys: p
     wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, "--noise", "white"]) == 0
     text = capsys.readouterr().out
-    assert "yes, the model misses something of the car" in text
+    assert "yes, the model lacks something of the car" in text
     assert "the standard errors are a guide only" in text
 
 
@@ -183,7 +183,7 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
         assert reported["parameters"][name] == pytest.approx(truth, abs=4 * reported["standard_errors"][name])
     assert reported["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
     assert identify(files[:1], "step.height_m", "--step", "start_m=12,height_m=0.1", "--noise", "white") == 0
-    assert "yes, the model misses something of the car" in capsys.readouterr().out
+    assert "yes, the model lacks something of the car" in capsys.readouterr().out
 
 
 def rubbing_vehicle(folder: Path, friction_n: float) -> str:

@@ -103,10 +103,11 @@ def test_distances_that_are_off_are_reported() -> None:
     assert any("up to 0.34 m. That makes 40% of" in one for one in summary(off))
 
 
-def test_what_explains_as_well_is_named_with_the_drives_that_would_tell() -> None:
+def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them() -> None:
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
     said = summary(replace(FOUND, candidates=(alike, *OTHERS)))[-1]
-    assert said.startswith("These runs cannot tell dry_friction from damper_blow_off or sensor_gain: each explains")
+    assert said.startswith("These runs cannot distinguish dry_friction from damper_blow_off or sensor_gain: each "
+                           "explains")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in said
 

@@ -1,4 +1,4 @@
-"""Drives laid over each other: beside a town whose truth is known, and beside sums that are done by hand."""
+"""Repeated drives combined: beside a town whose truth is known, and beside sums that are done by hand."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def fitted(problem: SameRoad, state: RoadFitState, steps: int = 10, settled: flo
     """The most probable state, by so many of Fisher's steps from this one at most.
 
     settled        a step that promises less, in the log of the probability, is the last
-    many_rounds    equations that take more rounds are prepared anew where the fit has come to
+    many_rounds    equations that take more rounds are prepared again where the fit has come to
     """
     moves = moves_of(state.effects)
     p, q = len(state.logs), len(moves)

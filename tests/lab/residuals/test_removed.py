@@ -71,4 +71,4 @@ def test_what_lies_outside_of_the_pass_band_has_its_share() -> None:
     found = compare(SimulatedRuns(runs), CAR)
     # The model is right: noise alone differs, white up to half the sample rate, half of it above 25 Hz.
     assert found.removed.filter_share == pytest.approx(0.5, abs=0.03)
-    assert "What lies outside makes" in " ".join(headline(found))
+    assert "Outside of that lies" in " ".join(headline(found))
