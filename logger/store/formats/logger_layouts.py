@@ -2,8 +2,8 @@
 
 Problem: a phone's recording says "Acceleration x (m/s^2)", the next one "z" in a file called TotalAcceleration.csv.
 Solution: one table of what is known, each with its source. A file is recognised by all columns that a layout needs, and
-by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the columns are
-named (``logger_columns``).
+by its name where columns alone do not distinguish an accelerometer from a gyroscope. For another recorder the columns
+are named (``logger_columns``).
 
 Sign: an accelerometer at rest feels gravity as a push upwards (Android), or a program writes all its axes the other way
 round (Apple's Core Motion). Both read the same along the direction in which gravity is felt, so no layout needs a sign.
