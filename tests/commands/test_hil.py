@@ -283,7 +283,7 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
         found = compare(rows, sessions, BRIDGE_S)
         assert not found.ok
         assert found.session is None
-        assert "TX on RX" in command.Result(False, None, found).text()
+        assert "TX on RX" in command.PlayedDrive(False, None, found).text()
 
 
 def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_since(
@@ -307,10 +307,10 @@ def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_si
 
 
 def test_late_bytes_fail_the_run_and_say_so() -> None:
-    late = command.Result(False, Sent(1.0, {"nmea": 3}, (1.0, 51.0, 60.0)), None)
+    late = command.PlayedDrive(False, Sent(1.0, {"nmea": 3}, (1.0, 51.0, 60.0)), None)
     assert not late.ok
     assert "TOO LATE" in late.text()
-    assert command.Result(False, Sent(1.0, {"nmea": 3}, (1.0, 49.0, 600.0)), None).ok
+    assert command.PlayedDrive(False, Sent(1.0, {"nmea": 3}, (1.0, 49.0, 600.0)), None).ok
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

@@ -69,7 +69,7 @@ def test_for_a_program(runs: list[str], tmp_path: Path, capsys: pytest.CaptureFi
 def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert identify(runs, f"{MASS},{DAMPERS}", "--tries", "2", "--low-pass", "20", "--robust") == 0
     text = capsys.readouterr().out
-    for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "taken for white noise of 0.0",
+    for words in ("Converged in", "3 of 3 starts", "95 % interval", "std. error", MASS, "as white noise of 0.0",
                   "These runs determine all that was asked.", "Known best in the combination", "below 20 Hz"):
         assert words in text
 
@@ -264,7 +264,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     assert read_vehicle(out).sprung_mass_kg == reported["parameters"][MASS]
     assert identify(files[:1], MASS, "--unmeasured-road", "--waviness", "2.1") == 0
     text = capsys.readouterr().out
-    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "taken for one of ISO 8608", "Poorly determined"):
+    for words in ("Converged in", "road1.gd_n0_cm3", "noise_mps2", "to be one of ISO 8608", "Poorly determined"):
         assert words in text
     assert identify(files[:1], "pitch_inertia_kg_m2", "--unmeasured-road", "--json") == 1
     assert "pitch_inertia_kg_m2" in json.loads(capsys.readouterr().out)["cannot_tell"][0]

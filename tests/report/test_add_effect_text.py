@@ -52,7 +52,7 @@ def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
 def test_what_is_removed_is_said_before_the_effect() -> None:
     drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
     found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
-    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2): it is no part of the car")
+    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). That has nothing to do")
     assert as_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 

@@ -40,11 +40,11 @@ def test_what_remains_is_what_least_squares_leave() -> None:
     assert list(shown) == list(settings.first)
     for row, column in enumerate(shown):
         alone = left_by(numbers, deviations, changes[column])
-        assert found.detectability[row] == pytest.approx(alone) == pytest.approx(found.beside[row, row])
+        assert found.detectability[row] == pytest.approx(alone) == pytest.approx(found.pairwise[row, row])
         for other in set(range(len(NAMES))) - {row}:
             beside = [left_by(np.vstack([numbers, changes[one]]), np.append(deviations, np.inf), changes[column])
                       for one in settings.columns_of(other)]
-            assert found.beside[row, other] == pytest.approx(min(beside))
+            assert found.pairwise[row, other] == pytest.approx(min(beside))
 
 
 def test_an_effect_is_as_likely_named_as_not_where_it_just_stands_out() -> None:

@@ -94,7 +94,7 @@ def test_a_late_clock_is_distinguished_from_a_wrong_place() -> None:
         assert found.found
         assert found.unit == unit
         assert found.value == pytest.approx(value, rel=0.05)
-        assert "behind the model" in sentence(found)
+        assert "lags the model" in sentence(found)
 
 
 def test_a_speed_that_is_off_lets_the_model_run_ahead() -> None:
