@@ -92,11 +92,12 @@ class SameRoad:
         structure = compose(stands).structure
         self._behind_m = np.unique(structure.behind_m)
         self._patch_m = structure.contact_patch_m
-        self.stretches = _cut(self.runs)
+        least_s = 3.0  # of a stretch, some periods of a body's bounce, to say anything of it
+        self.stretches = _cut(self.runs, least_s)
         shared = {run for parts in self.stretches for run, _ in parts}
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
-            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no stretch "
-                             "of some seconds that another drive was over too, by their distances")
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
+                             "it that another drive was over too, by their distances")
         options = Options(free_waviness=True, probes=PROBES)
         generator = np.random.default_rng(options.seed)
         nominal = self.table(response_of(self.car((), self.stands), self.rate_hz))
@@ -279,9 +280,9 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
     return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
-def _cut(runs: Sequence[Run], stretch_s: float = 10.0, least_s: float = 3.0) -> list[list[tuple[int, Drive]]]:
-    """Stretches of the way, of about so many seconds, that at least two runs share: of each the runs, by number, and
-    their drives. A run counts that is in it for some periods of a body's bounce (``least_s``)."""
+def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, Drive]]]:
+    """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: of
+    each stretch the runs, by number, and their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
                     for places in ([run.first for run in runs], [-1] * len(runs)))
