@@ -107,7 +107,7 @@ def on_line(run: Run, line: MeasuredLine, from_m: float = 0.0) -> list[Run]:
     """A drive on a line's own distance, less ``from_m``, by its places alone: a run for each pass over the line.
 
     Where the receiver puts the car along the line is averaged over ``_SMOOTH_FIXES`` fixes: between them the speed
-    tells the way better.
+    shows the way better.
     """
     if run.lat_deg is None or run.lon_deg is None:
         return []

@@ -18,7 +18,7 @@ from logger.store.formats import drive_file, profile_file
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-    from logger.roads.elevation_spectrum import Bands
+    from logger.roads.elevation_spectrum import BandedSpectrum
     from logger.roads.localized_roughness import Area
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +60,7 @@ class Profile(profile_file.Profile, Shown):
 def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
     """Read a road profile.
 
-    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (told by its first line)
+    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line)
     resample_m    for one that is unevenly spaced: lay straight lines between its samples, and take one every so many
                   metres [m]
 
@@ -233,7 +233,7 @@ class RoadClass(CommandResult):
     waviness: float
     waviness_std: float
     iri_m_per_km: float
-    spectrum: Bands
+    spectrum: BandedSpectrum
 
     def charts(self) -> Sequence[Chart]:
         """The spectrum of the (left) track, the line through it, and the limits of the classes (ISO 8608)."""

@@ -20,7 +20,7 @@ WINDOW_M = 100.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("profile", type=Path, metavar="PROFILE", nargs="?", help="CSV or ERD file")
     parser.add_argument("--response", action="store_true",
-                        help="without a profile: what the IRI hears of each wavelength, as a table")
+                        help="without a profile: how strongly the IRI responds to each wavelength, as a table")
     parser.add_argument("--window", type=float, default=WINDOW_M, metavar="M",
                         help="length of a window [m] (default: 100, as road agencies report; a tenth of a mile is "
                              "160.9344, the service's 25 ft are 7.62)")

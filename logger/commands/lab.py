@@ -4,7 +4,7 @@
   ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
 
 Before an effect is added it asks: yes, no, or the name of another one. DIR gets a vehicle file for each step and
-story.html, the page that tells all of it.
+story.html, the page of all of it.
 """
 
 from __future__ import annotations

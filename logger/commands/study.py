@@ -1,4 +1,4 @@
-"""Reproduce a table or a figure of the reference dissertation, or of other papers, beside its printed values.
+"""Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
 
   ridelog study --list
   ridelog study table-4-4
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     known = studies(args.shelf)
     if args.list:
         if args.name is not None:
-            raise BadInput(f"study --list: expected no NAME beside it, found {args.name}")
+            raise BadInput(f"study --list: expected no NAME with it, found {args.name}")
         for option, value in (("--quick", args.quick), ("--out", args.out)):
             if value:
                 raise BadInput(f"study {option}: expected a NAME with it, not --list")
@@ -207,11 +207,11 @@ def _figure(one: Chart) -> dict[str, Any]:
 
     if isinstance(one, Bars):
         return {"title": one.title, "value": one.value_name, "bars": [list(bar) for bar in one.bars]}
-    told: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
+    named: dict[str, Any] = {"title": one.title, "x": one.x_name, "y": one.y_name}
     if isinstance(one, Field):
-        return {**told, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
+        return {**named, "value": one.value_name, "x_values": one.x.tolist(), "y_values": one.y.tolist(),
                 "values": [[_known(value) for value in row] for row in one.values.tolist()]}
-    return {**told, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
+    return {**named, "lines": [{"name": line.name, "x": line.x.tolist(), "y": [_known(y) for y in line.y.tolist()]}
                               for line in one.lines]}
 
 

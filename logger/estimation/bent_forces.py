@@ -4,8 +4,8 @@ Problem: a linear car is right on the average of a road (``vehicle.linearise``),
 than bump has no linear stand-in at all, and friction pushes the more evenly the harder a stretch shakes. Solution: once
 a block's road is known, so is how the suspensions moved; what the laws answer to that, less what the linear ones do, is
 a force, and what a force does to the reading is linear again. Its share is taken off the readings, and the road is
-found anew. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds off
-the corners that would keep the two from coming to rest.
+solved again. The motion is not known exactly: a law is asked for its mean over what may have been, which also rounds
+off the corners that would keep the two from coming to rest.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class BentForces:
         do besides, because the motion is not known exactly [(m/s2)2].
 
         under       (axles, f) rfft of the elevations under the axles [m]
-        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings tell of it
+        psd_m3      (n,) of the road at ``WAVE_NUMBERS_CPM``; ``resolved`` (n,) the share that the readings resolve of
+                    it
         """
         motions = np.array([np.fft.irfft((under[:, None] * gain).sum(axis=0), self._count)
                             for gain in (self._travel, self._rate, self._own_rate)])

@@ -1,9 +1,10 @@
 """From an estimated road to its IRI: what is known of the Golden Car's slope, and the mean of its absolute value.
 
-An estimated road is too smooth: what the readings do not tell is missing in it. The slope of the Golden Car at a place
-is known with a mean and a variance, and the IRI asks for the mean of its absolute value, which the variance adds to
-(folded normal distribution). The error of a window follows from the covariance of those absolute values. For a steady
-speed both are integrals over wave numbers: of the road's spectrum S, gain H and noise N, S N / (|H|^2 S + N) is left.
+An estimated road is too smooth: what the readings do not resolve is missing in it. The slope of the Golden Car at a
+place is known with a mean and a variance, and the IRI asks for the mean of its absolute value, which the variance adds
+to (folded normal distribution). The error of a window follows from the covariance of those absolute values. For a
+steady speed both are integrals over wave numbers: of the road's spectrum S, gain H and noise N, S N / (|H|^2 S + N) is
+left.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def reading_noise_psd(variance: float, rate_hz: float, speed_mps: float) -> floa
 
 
 def resolved_share(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> Array:
-    """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings tell."""
+    """Share of the variance of each wave at ``WAVE_NUMBERS_CPM`` that the readings resolve."""
     signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
     return signal / (signal + noise_psd)
 
@@ -81,7 +82,7 @@ class SlopeKnowledge:
 
     @property
     def resolved(self) -> float:
-        """Share of the variance that the readings tell."""
+        """Share of the variance that the readings resolve."""
         return 1 - self.left / self.variance
 
 

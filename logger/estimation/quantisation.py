@@ -33,16 +33,16 @@ _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own rea
 
 
 @dataclass(frozen=True)
-class Readings:
+class GaussianReadings:
     """As Gaussian readings: values [m/s2] and variances [(m/s2)2], both (t,)."""
 
     value_mps2: Array
     variance: Array
 
 
-def first_guess(reading_mps2: Array, sensor: Sensor) -> Readings:
+def first_guess(reading_mps2: Array, sensor: Sensor) -> GaussianReadings:
     """Rounding as if it were noise."""
-    return Readings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
+    return GaussianReadings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
 
 
 def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array, Array]:
@@ -61,13 +61,13 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
 
 
 def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
-    """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
-    variance (t,) of even readings that tell as much [(m/s2)2].
+    """Variance (t,) that all other readings leave of each acceleration, where some say much and some little, and the
+    variance (t,) of even readings with the same information [(m/s2)2].
 
     left        variance that even readings of a variance leave of each acceleration, their own included
     variance    (t,) of the readings as they are
 
-    The mean of their precisions would make too much of the precise ones: two of them side by side tell little more than
+    The mean of their precisions would make too much of the precise ones: two of them side by side say little more than
     one. Even readings that stand for those about a place have the variance e for which a reading put among the others
     weighs the same on the mean, 1 / (others + e) = mean of 1 / (others + variance).
     Source: the coherent potential approximation (Soven, Physical Review 156, 1967), with ``variance`` as disorder.
@@ -89,7 +89,7 @@ def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Arra
     return others, even
 
 
-def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
+def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
     """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
     taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)
     others = 1 / fitted_variance - taken_out
@@ -97,8 +97,9 @@ def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array |
 
 
 def improved(
-    readings: Readings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float, sensor: Sensor
-) -> Readings:
+    readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
+    sensor: Sensor
+) -> GaussianReadings:
     """One round.
 
     low, high          (t,) bounds of each reading [m/s2]
@@ -114,4 +115,4 @@ def improved(
     value = (mean / variance - expected / spread) / precision
     new = 1 / (1 / precision + noise)
     total = (1 - _KEPT) * new + _KEPT * own
-    return Readings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)
+    return GaussianReadings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

@@ -20,7 +20,7 @@ from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, residual_evidence
 from logger.estimation.quantisation import (
-    Readings,
+    GaussianReadings,
     bounds,
     cavity,
     first_guess,
@@ -42,9 +42,9 @@ _FIRST_STEPS = 24
 _FIRST_ROUNDS = 8
 _COARSE_ROUNDS, _COARSE_STEPS = 2, 3
 _MOST_DEVIATIONS = 3.0
-_SETTLED_SAMPLES = 1000  # behind those that tell of the noise: their bounds have gone through ten rounds by then
+_SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
 # Solved with no less where the noise is learnt: below, a few rounds do not settle, and what they say of a smaller noise
-# leads astray (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
+# misleads (bench of noise: 0.05 and 0.1 are worse, the one at 4 g and 20 mph, the other at 8 g).
 _LEAST_SHARE_OF_STEP = 0.07
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
@@ -83,12 +83,12 @@ class FollowedRoad:
             self._learner = NoiseLearner(noise.with_rounding(rounding_mps2), usual.with_rounding(rounding_mps2),
                                          self._step_mps2 - rounding_mps2)
             self._take_over()
-        self.start_anew()
+        self.restart()
 
-    def start_anew(self) -> None:
+    def restart(self) -> None:
         """Another drive begins: spectrum and noise are taken along, all that belongs to places is not."""
         self._begun = False
-        self._gaussian: Readings | None = None
+        self._gaussian: GaussianReadings | None = None
         self._solved_last: tuple[Block, ComplexArray] | None = None
         self._local = LocalRoughness(self._spacing_m)
         self._unscored = 0
@@ -138,7 +138,7 @@ class FollowedRoad:
         if self._gaussian is None:
             return
         guess = first_guess(fresh.reading_mps2, self._sensor)
-        self._gaussian = Readings(
+        self._gaussian = GaussianReadings(
             np.concatenate([self._gaussian.value_mps2[len(fresh):], guess.value_mps2]),
             np.concatenate([self._gaussian.variance[len(fresh):], guess.variance]),
         )
@@ -207,15 +207,16 @@ class FollowedRoad:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
         return SolvedBlock(solution.road, solution.fitted_mps2 - solution.drift_mps2, typical)
 
-    def _as_gaussian(self, samples: Samples) -> Readings:
+    def _as_gaussian(self, samples: Samples) -> GaussianReadings:
         if not self._is_coarse:
             noise = self._sensor.variance_mps2_2 * noise_factor(self._belief)
-            return Readings(samples.reading_mps2, np.full(len(samples), noise))
+            return GaussianReadings(samples.reading_mps2, np.full(len(samples), noise))
         return first_guess(samples.reading_mps2, self._sensor) if self._gaussian is None else self._gaussian
 
     def _improved(
-        self, readings: Readings, samples: Samples, read: Bools, solution: Solution, others: Array, usable: Bools | None
-    ) -> Readings:
+        self, readings: GaussianReadings, samples: Samples, read: Bools, solution: Solution, others: Array,
+        usable: Bools | None
+    ) -> GaussianReadings:
         """Another round for the bounds, with the variance (t,) that all other readings leave of each acceleration. The
         noise is learnt of the readings that are ``usable`` (t,), if any."""
         low, high = bounds(samples.reading_mps2, samples.at_end, self._sensor.step_mps2)

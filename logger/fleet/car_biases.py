@@ -13,7 +13,7 @@ was fitted in place (Henderson's moments: S. R. Searle, G. Casella, C. E. McCull
 5), the traces by random signs (M. F. Hutchinson, Communications in Statistics 19, 1990). So no degree of freedom is
 counted that the cars and roads have used up.
 
-The mean of all cars' ln g is zero: what all cars share cannot be told from the roads. Cars that share no road with
+The mean of all cars' ln g is zero: what all cars share cannot be distinguished from the roads. Cars that share no road with
 others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias that
 could be known. Without the growth a car of the second year would be charged with a year's decay.
 """
@@ -48,7 +48,7 @@ class CarBiases:
     log_std          standard error of its logarithm; where the gain is not known, the spread of the other cars' gains
     group            cars that can be compared share a number; the largest group is 0
     known            the gain follows from roads shared with other cars
-    growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not tell
+    growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not show it
     growth_std       of roads' own growth about that, as a fraction a year
     pass_std         relative standard deviation of a pass; NaN: no road has two passes of different cars
     session_std      of it, what all passes of a session share

@@ -104,7 +104,7 @@ def _changes(roads: RoadTable) -> list[str]:
     power = ([f"A change of {limit:.2f} m/km a year would be found on every second {roads.by} with 80 % certainty"]
             if isfinite(limit) else [])
     if not order:
-        return [f"No {roads.by} has become worse, as far as these drives tell", *power]
+        return [f"No {roads.by} has become worse, as far as these drives show", *power]
     lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [

@@ -88,11 +88,11 @@ _STEP_WORDS = {
 
 
 def _confusion(found: Diagnosis, one: Chosen) -> str:
-    """What explains as well, and which drive would tell."""
+    """What explains as well, and which drive would separate them."""
     others = found.candidate(one.effect.name).confused_with
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in (one.effect.name, *others)]
-    return (f"These runs cannot tell {one.effect.name} from {' or '.join(others)}: each explains about as much. What "
-            f"shows each best, and so would separate them: {'; '.join(drives)}.")
+    return (f"These runs cannot distinguish {one.effect.name} from {' or '.join(others)}: each explains about as much "
+            f"of the residual. Drives that would: {'; '.join(drives)}.")
 
 
 def _on_the_way(found: Diagnosis) -> list[str]:

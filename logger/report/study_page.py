@@ -78,7 +78,7 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return document("Studies", [
         heading("Studies: printed results, made again",
-                "Each printed item has one word for how ours stands beside it."),
+                "Each printed item has one word for how ours compares with it."),
         paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)

@@ -1,13 +1,13 @@
 """Which way each window of a drive lies on, decided by the whole drive.
 
-Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not tell a street
-from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error against
-the network is a state: two components, a first-order Gauss-Markov process each. Every chain of ways that a drive may
-have followed carries its own estimate of it (a Kalman filter of the distances aside), and the most likely chain is
-kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through noise and sparseness", ACM GIS 2009, with the error
-that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely within
-seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street before
-hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
+Problem. The error of a receiver is some metres and changes over minutes, so that a window alone does not distinguish a
+street from the next one 15 m aside, and neither do a hundred windows in a row: they all err alike. Solution. The error
+against the network is a state: two components, a first-order Gauss-Markov process each. Every chain of ways that a
+drive may have followed carries its own estimate of it (a Kalman filter of the distances aside), and the most likely
+chain is kept (Viterbi; Newson & Krumm, "Hidden Markov map matching through noise and sparseness", ACM GIS 2009, with
+the error that they take for white). A jump to the parallel street asks for a jump of the error, which is not likely
+within seconds; a street that is not known yet is one more hypothesis. Each turn shows the component that the street
+before hid, so places along a way, smoothed from both ends (Rauch, Tung & Striebel 1965), are better than the fixes.
 """
 
 from __future__ import annotations
@@ -314,7 +314,7 @@ def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Ints, Array]:
 
 
 def _smoothed(trace: Trace, receiver: Receiver, states: Array) -> Array:
-    """Errors to the east and north (n, 2) as the whole drive tells them."""
+    """Errors to the east and north (n, 2) as the whole drive gives them."""
     keeps = np.exp(-np.diff(trace.t_s).clip(0.0) / receiver.correlation_s)
     covariance = states[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     drifted = keeps[:, None, None]**2 * covariance[:-1] + (

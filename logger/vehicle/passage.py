@@ -70,11 +70,6 @@ class Passage:
         self._bodies: dict[Hashable, Complex] = {}
 
     @property
-    def fine_count(self) -> int:
-        """Instants that a car is stepped through, one more than the steps."""
-        return len(self._way.time_s)
-
-    @property
     def time_s(self) -> Array:
         """When the samples are taken (N,), the first at 0 [s]."""
         return np.arange(self.count) / self.rate_hz

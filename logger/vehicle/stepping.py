@@ -145,13 +145,13 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked 
     """Laws by all that moves as the loop reads them; None where there are none."""
     if not any(one.motions for one in laws):
         return None
-    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_of
+    from logger.vehicle.law_call import ANSWERS, FELT, address_of, numbers_in_order
 
     whole, numbers, memories = [], [0.0], []
     for i, corner in enumerate(laws):
         for one in corner.motions:
             whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
-            numbers += numbers_of(one)
+            numbers += numbers_in_order(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
     places = way.distance_m[:, None] - structure.behind_m
     return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),

@@ -29,7 +29,7 @@ def stuck(tmp_path: Path, road: str, friction_n: int) -> SimulatedRuns:
 
 
 @pytest.mark.parametrize(("road", "friction_n"), [("A", 200), ("A", 300), ("B", 500)])
-def test_a_suspension_that_sticks_is_neither_upside_down_nor_in_feet(tmp_path: Path, road: str, friction_n: int) -> None:
+def test_a_suspension_that_sticks_is_no_wrong_input(tmp_path: Path, road: str, friction_n: int) -> None:
     check_model("rav4-2009", read_model(vehicle_file("rav4-2009")), stuck(tmp_path, road, friction_n), unsaid)
 
 

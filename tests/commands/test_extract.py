@@ -13,7 +13,7 @@ import yaml
 
 from drivers.dump import DumpWriter, open_dump
 from drivers.events import GPS
-from logger.demo.motion import LEAD_M, SPACING_M, Stretch
+from logger.demo.motion import LEAD_M, SPACING_M, RoadStretch
 from logger.demo.receiver import Reception
 from logger.demo.simulated_drive import Drive, DrivePlan, record, simulate_drive
 from logger.shipped import vehicle_file
@@ -21,7 +21,7 @@ from logger.store.formats.vehicle_file import read_vehicle
 
 PLAN = DrivePlan(
     speed_knots=((0, 0), (4, 0), (14, 13), (40, 11), (50, 14), (75, 12), (85, 0), (92, 0)),
-    stretches=(Stretch(1200, 90),), reception=Reception(first_fix_s=2, latency_s=0.2), seed=11,
+    stretches=(RoadStretch(1200, 90),), reception=Reception(first_fix_s=2, latency_s=0.2), seed=11,
     offset_mps2=(0.1, 0.2, 0.15),
 )
 FROM_M, TO_M, ZERO_M = 100.0, 800.0, 4000.0

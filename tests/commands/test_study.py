@@ -64,8 +64,8 @@ def test_all_with_one_that_fails(
     out = tmp_path / "pages"
     assert main(["study", "all", "--quick", "--out", str(out), "--json"]) == 1
     shown = capsys.readouterr()
-    told = json.loads(shown.out)
-    assert [(one["name"], one["failure"]) for one in told["studies"]] == [
+    reported = json.loads(shown.out)
+    assert [(one["name"], one["failure"]) for one in reported["studies"]] == [
         ("table-9-9", "KeyError: 'table-9-9'"), ("table-4-1", None)]
     assert shown.err.count("of 2] table-") == 2
     page = (out / "index.html").read_text()
@@ -86,7 +86,7 @@ def test_a_study_that_needs_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [(["table-9-9"], "study 'table-9-9': expected one of "), ([], "expected the NAME of a study, all, or --list"),
-     (["--list", "fig-4-25"], "expected no NAME beside it, found fig-4-25"),
+     (["--list", "fig-4-25"], "expected no NAME with it, found fig-4-25"),
      (["--list", "--quick"], "--quick: expected a NAME with it"), (["all"], "expected --out DIR"),
      (["fig-4-25", "roads"], "study fig-4-25: expected no DIR, found roads")],
 )

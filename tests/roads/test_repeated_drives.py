@@ -1,4 +1,4 @@
-"""Drives laid over each other: beside a town whose truth is known, and beside sums that are done by hand."""
+"""Repeated drives combined: beside a town whose truth is known, and beside sums that are done by hand."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_a_drive_that_passes_a_place_twice_is_laid_over_itself() -> None:
     assert np.abs(found.along_m[second] - (at_m[second] - 1000.0 + WINDOW_M / 2)).max() < WINDOW_M
 
 
-def test_lanes_of_a_town_are_told_apart() -> None:
+def test_lanes_of_a_town_are_distinguished() -> None:
     drives = town_drives(8, 400, seed=4)
     network = RoadNetwork()
     seen = judged(drives, lay(network, [one.trace for one in drives]), network)

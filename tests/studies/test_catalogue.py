@@ -115,9 +115,9 @@ def test_a_study_that_is_not_as_it_states_says_so() -> None:
     study = STUDIES["table-4-1"]
     good, bad = (Value(name, 1.2, ours, 0.05) for name, ours in (("body [Hz]", 1.21), ("wheel [Hz]", 1.3)))
     assert not study.differs(Result((), "", values=(good,)))
-    told = study.differs(Result((), "", values=(good, bad)))
-    assert "wheel [Hz] (1.3, printed 1.2" in told
-    assert "body" not in told
+    reported = study.differs(Result((), "", values=(good, bad)))
+    assert "wheel [Hz] (1.3, printed 1.2" in reported
+    assert "body" not in reported
 
 
 def test_an_item_whose_checks_come_to_another_word_says_so() -> None:
@@ -134,10 +134,10 @@ def test_an_item_whose_checks_come_to_another_word_says_so() -> None:
 
 
 def test_effort() -> None:
-    told: list[tuple[int, int]] = []
-    effort = Effort(0.5, lambda done, of: told.append((done, of)))
+    reported: list[tuple[int, int]] = []
+    effort = Effort(0.5, lambda done, of: reported.append((done, of)))
     assert effort.some(range(5), 2) == [0, 4]
     assert effort.some(range(9)) == [0, 3, 5, 8]
     assert (effort.count(200), effort.count(3, 2), Effort(0.001).count(200, 6), Effort().count(7)) == (100, 2, 6, 7)
     assert list(effort.each("ab")) == ["a", "b"]
-    assert told == [(0, 2), (1, 2), (2, 2)]
+    assert reported == [(0, 2), (1, 2), (2, 2)]

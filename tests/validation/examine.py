@@ -6,7 +6,7 @@
     python -m tests.validation.examine --release             what is published
 
 Each case is one line of the results file as soon as it is over: stopped, the examination goes on where it was. Remove
-the file to begin anew, as one should after a change of the program. Writes examination.md, .html and .svg, and the
+the file to begin again, as one should after a change of the program. Writes examination.md, .html and .svg, and the
 counts that ``ridelog study lab-examination`` shows: with --docs beside these pages, else into the package.
 
 Seeds 2000 to 2099 are for development: the lab may be changed by what comes of them. Seeds 7000 to 7999 are for

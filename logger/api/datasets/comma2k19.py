@@ -47,7 +47,7 @@ def run(folder: Path, effort: Effort) -> Result:
              "shown to be right.")
     speed = _speeds(log, recording)
     if speed is not None:
-        tables.append(Table("The receiver's speed beside the car's", (
+        tables.append(Table("The receiver's speed against the car's", (
             Column("figure"), Column("read before", ".3g"), Column("ours", ".3g")), speed))
     return Result(tuple(tables), words, (Picture(_map(drives)),))
 

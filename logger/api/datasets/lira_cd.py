@@ -88,12 +88,12 @@ def run(folder: Path, effort: Effort) -> Result:
     if not parts:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
     tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
-    tables.append(Table("The profilers beside each other", REPEAT_COLUMNS, tuple(repeats)))
+    tables.append(Table("The profilers against each other", REPEAT_COLUMNS, tuple(repeats)))
     pictures = tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
     return Result(tuple(tables), verdict_of(parts, refused, _CEILING), pictures)
 
 
-_CEILING = ("The profilers beside each other are the ceiling: no car can agree better with one of them than the other "
+_CEILING = ("The profilers against each other are the ceiling: no car can agree better with one of them than the other "
             "does.")
 
 
@@ -217,20 +217,20 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
     left, right = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
                    for one in (road.left_m_per_km, road.right_m_per_km))
-    rows = [repeat_row(road.name, f"P79, right track beside left, {window_m:g} m", right, left)]
+    rows = [repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
     if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
         theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
                                        _MOST_CELLS)
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
         both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
                 mean_between(road.edges_m, known, begin_m, begin_m + window_m))
-        rows.append(repeat_row(road.name, f"ARAN beside P79, {window_m:g} m", *both, _CELL_M * cells))
+        rows.append(repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, _CELL_M * cells))
     return rows
 
 
 _DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
 STUDY = Study(
-    "lira_cd", "Electric cars beside the road directorate's profiler, 10 m and 100 m", "IRI of P79",
+    "lira_cd", "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
     "Each pass goes the way of any recording (extract --csv, estimate with the noise learnt); windows lie on the "
     "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
     "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. "

@@ -91,7 +91,7 @@ def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tup
     at_m, values = at_m[on], other.iri_m_per_km[on]
     begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - window_m + 1, window_m)
     ends_m = (begin_m, begin_m + window_m)
-    names = f"{other.name} beside {one.name}"
+    names = f"{other.name} against {one.name}"
     theirs, cells = matching_cells(one.begin_m, one.iri_m_per_km, at_m, values, _MOST_CELLS)
     mine = np.where(np.isfinite(theirs), one.iri_m_per_km, np.nan)
     nearest = (mean_between(one.edges_m, theirs, *ends_m), mean_between(one.edges_m, mine, *ends_m))
@@ -132,10 +132,10 @@ _DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is rea
 STUDY = Study(
     "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
     "Three passes over some 26 km of Danish road, by their places. Their cells of 10 m begin at different places. "
-    "Nearest: each beside the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
+    "Nearest: each against the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
     "over: means of two cells' parts, smoother than what was measured, which makes them more alike. The truth lies "
     "between. Moved piece by piece they are more alike still, for each piece may follow the noise. This was run on the "
     "real files.",
     from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
-    "Run on the real files, it gives the ceiling that is printed beside every other set; no paper prints it."),),
+    "Run on the real files, it gives the ceiling that is printed with every other set; no paper prints it."),),
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

@@ -152,7 +152,7 @@ def _together(road: str, window_m: float, found: list[tuple[str, DrivenWindows]]
 
 _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
 STUDY = Study(
-    "zenodo_4386256", "Phones at 100 Hz beside laser profiles, 10 m and 100 m", "Three roads",
+    "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
     "Each trip goes the way of any recording: extract --csv --profile lays it on the laser profile, by the phone's "
     "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
     "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested "

@@ -20,7 +20,7 @@ class TrackMap {
     this.listen();
   }
 
-  // How large the map is. It is kept, because a browser that is asked may lay out its page anew.
+  // How large the map is. It is kept, because a browser that is asked may lay out its page again.
   measure() { [this.width, this.height] = [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
   // --- where things are ---
@@ -86,7 +86,7 @@ class TrackMap {
   // --- drawing ---
 
   // What is slow to draw is kept as a picture somewhat larger than the view. While the map moves the picture moves; it
-  // is painted anew where it no longer covers the view, and sharp once the map rests at another scale.
+  // is painted again where it no longer covers the view, and sharp once the map rests at another scale.
   drawWay() {
     const {ink, width, height} = sheet(this.canvas);
     if (!this.covers(width, height)) this.paint(width, height);

@@ -176,7 +176,7 @@ COLUMNS = (
     _number("vdv_raw_mps175", 4),
 )
 _OLD_COUNT = 23
-"""Columns of logs that did not tell the ride from the noise yet."""
+"""Columns of logs that did not separate the ride from the noise yet."""
 
 
 def _header(columns: Sequence[Column]) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 
 from logger.chart_data import Curves, Field, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
-from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, Settings, calibrate
+from logger.estimation.rms_calibration import LEVELS_IRI, SPEEDS_MPS, CalibrationSettings, calibrate
 from logger.studies.checks import Statement, Word, about
 from logger.studies.drives import PS_2119, drive_over, random_road, rav4
 from logger.studies.study import Column, Effort, Picture, Result, Study, Table, alike
@@ -18,7 +18,7 @@ _DRIVEN_IRI, _LENGTH_M = 5.0, 305.0
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    settings = Settings(roads=effort.count(_ROADS, 10))
+    settings = CalibrationSettings(roads=effort.count(_ROADS, 10))
     (lines,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     mph = np.round(np.array(SPEEDS_MPS) / MPH_MPS)
     per_iri = np.array([one.a_w_per_iri.slope for one in lines])

@@ -115,7 +115,7 @@ def run(effort: Effort) -> Result:
 
 def _biases_percent(mph: int, segments: Sequence[int], effort: Effort) -> Array:
     """Errors of the windows' mean by the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
-    edges_m = WINDOW_M * np.arange(_WINDOWS + 1)
+    edges_m: Array = WINDOW_M * np.arange(_WINDOWS + 1.0)
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
     roads = max(2, effort.count(_ROADS * len(segments)), _FEWEST * slow * (len(segments) > 1))
     found = []

@@ -3,7 +3,7 @@
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.estimation.rms_calibration import PASSENGER_KG, Settings, calibrate, loaded
+from logger.estimation.rms_calibration import PASSENGER_KG, CalibrationSettings, calibrate, loaded
 from logger.estimation.rms_relation import rms_relation
 from logger.roads.iso8608 import IRI_PER_ROOT_GD
 from logger.studies.checks import Statement, Word, about
@@ -23,7 +23,7 @@ def run(effort: Effort) -> Result:
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
     cars = (rav4(), loaded(rav4(), passengers=2), loaded(rav4(), sprung_mass_factor=2.0))
     own, two, heavy = (rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
-    settings = Settings(tuple(speeds.tolist()), roads=effort.count(_ROADS, 10))
+    settings = CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(_ROADS, 10))
     (drives,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in

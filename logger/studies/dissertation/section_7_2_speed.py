@@ -3,7 +3,7 @@
 import numpy as np
 
 from logger.chart_data import Curves, Line
-from logger.estimation.error_bound import Limits
+from logger.estimation.error_bound import ErrorBound
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.studies.checks import Statement, Word
@@ -19,7 +19,7 @@ _IRI, _LENGTH_M = 3.0, 230.0
 
 def run(effort: Effort) -> Result:
     """As ``Study.run``."""
-    limits = Limits(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
+    limits = ErrorBound(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
     roads = [random_road(_IRI, _LENGTH_M, 21 + number, waviness) for number, waviness in enumerate(WAVINESS)]
     rows = []
     for one_mph in effort.each(effort.some(SPEEDS_MPH)):

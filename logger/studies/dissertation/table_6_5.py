@@ -4,7 +4,7 @@ import numpy as np
 
 from logger.chart_data import Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
-from logger.estimation.rms_calibration import Settings, calibrate
+from logger.estimation.rms_calibration import CalibrationSettings, calibrate
 from logger.roads.obstacles import pothole, step
 from logger.studies.checks import Statement, Word
 from logger.studies.dissertation.fig_6_23 import LOW_PASS_HZ, PRINTED_MPH
@@ -33,7 +33,7 @@ def run(effort: Effort) -> Result:
     per_mm = [np.mean([_a_w_per_unit(shape(start), PRINTED_MPH[segment]) for start in starts]) / (1000 * _UNIT_M)
               for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(PRINTED[:2]), strict=True)]
     speed = (PRINTED_MPH[PRINTED[2][1]] * MPH_MPS,)
-    (line,) = calibrate(known_vehicle(rav4()), None, Settings(speed, roads=effort.count(_ROADS, 5)))
+    (line,) = calibrate(known_vehicle(rav4()), None, CalibrationSettings(speed, roads=effort.count(_ROADS, 5)))
     factors = (*map(float, per_mm), line.a_w_per_iri.slope)
     sizes = ("height of a step [mm]", "depth of a dip of 0.6 m [mm]", "IRI over the window [m/km]")
     rows = tuple(_row(printed, what, factor) for printed, what, factor in zip(PRINTED, sizes, factors, strict=True))
