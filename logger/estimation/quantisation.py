@@ -81,11 +81,11 @@ def cavity(motion: SteadyMotion, variance: Array) -> Array:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
 
     trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    log_left = np.log([motion.left(trial) for trial in trials.tolist()])
+    whole = np.array([1 / motion.left(trial) for trial in trials.tolist()])
+    log_others = -np.log(np.maximum(whole - 1 / trials, _LEAST_OTHERS / trials))
     even = 1 / mean(1 / variance)
     for _ in range(_EVENING_ROUNDS):
-        whole = np.exp(np.interp(np.log(even), np.log(trials), log_left))
-        others = 1 / np.maximum(1 / whole - 1 / even, _LEAST_OTHERS / even)
+        others = np.exp(np.interp(np.log(even), np.log(trials), log_others))
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
     return others
 
