@@ -24,6 +24,7 @@ from logger.estimation.car_response import (
 )
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
 from logger.estimation.road_spectrum import RoadSpectrum
+from logger.estimation.steady_motion import SteadyMotion
 from logger.roads.iri import PER_KM
 
 Array = npt.NDArray[np.float64]
@@ -59,10 +60,12 @@ def vehicle_error_variance(
     return density * rate_hz / (2 * speed_mps)
 
 
-def acceleration_variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> float:
-    """Variance of the acceleration itself once the readings are known [(m/s2)2]."""
-    signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
-    return float((signal * noise_psd / (signal + noise_psd)) @ WAVE_NUMBER_STEPS_CPM)
+def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
+                  ) -> SteadyMotion:
+    """What such a road makes of the car, at the frequencies of ``count`` readings (even)."""
+    per_hz = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM) / speed_mps
+    f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+    return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
-from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
+from logger.estimation.iri_posterior import steady_motion, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, residual_evidence
@@ -23,6 +23,7 @@ from logger.estimation.quantisation import (
     GaussianReadings,
     bounds,
     cavity,
+    even_variance,
     first_guess,
     improved,
     unexplained,
@@ -182,9 +183,10 @@ class FollowedRoad:
         typical = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain = solution.gain
         if self._is_coarse:
-            others, even = self._cavity(block, variance)
+            motion = steady_motion(block.car, block.mean_speed_mps, self._belief.spectrum, RATE_HZ, len(variance))
+            others = cavity(motion, variance)
             if moving.any():
-                uneven, typical = typical, 1 / float((1 / even[moving]).mean())
+                uneven, typical = typical, even_variance(motion, others[moving], variance[moving])
                 gain = gain * (uneven / typical)
 
         innovations = np.fft.irfft(solution.waves, block.count)
@@ -226,16 +228,6 @@ class FollowedRoad:
             expected = without_own(readings, solution.fitted_mps2, fitted_variance)
             self._learn_from_bounds(*expected, low, high, usable)
         return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._sensor)
-
-    def _cavity(self, block: Block, variance: Array) -> tuple[Array, Array]:
-        """``cavity`` of a block whose readings have variances (t,)."""
-        speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
-
-        def left(even: float) -> float:
-            noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
-            return acceleration_variance_left(block.car, speed_mps, spectrum, noise_psd)
-
-        return cavity(left, variance)
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""

@@ -13,9 +13,9 @@ was fitted in place (Henderson's moments: S. R. Searle, G. Casella, C. E. McCull
 5), the traces by random signs (M. F. Hutchinson, Communications in Statistics 19, 1990). So no degree of freedom is
 counted that the cars and roads have used up.
 
-The mean of all cars' ln g is zero: what all cars share cannot be distinguished from the roads. Cars that share no road with
-others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias that
-could be known. Without the growth a car of the second year would be charged with a year's decay.
+The mean of all cars' ln g is zero: what all cars share cannot be distinguished from the roads. Cars that share no
+road with others, directly or through others, make groups of their own, each with its own zero; a car alone has no bias
+that could be known. Without the growth a car of the second year would be charged with a year's decay.
 """
 
 from __future__ import annotations

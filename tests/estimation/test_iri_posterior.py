@@ -7,10 +7,9 @@ from scipy.signal import sosfilt
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
 from logger.estimation.iri_posterior import (
     SlopeErrors,
-    acceleration_variance_left,
     raised,
-    reading_noise_psd,
     resolved_share,
+    steady_motion,
     unseen_share,
     window_iri,
 )
@@ -69,8 +68,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     by_lag = [off @ np.roll(off, lag) / (off @ off) for lag in range(0, POINTS + 1, 5)]
     assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)
 
-    noise_psd = reading_noise_psd(deviation**2, RATE_HZ, speed_mps)
-    left = acceleration_variance_left(CAR, speed_mps, spectrum, noise_psd)
+    left = steady_motion(CAR, speed_mps, spectrum, RATE_HZ, 8192).remaining_variance(deviation**2)
     assert left == pytest.approx((accel - fitted).var(), rel=0.05)
 
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
