@@ -40,14 +40,44 @@ class _Record:
         """Cholesky's factor of the information (k, k), lower."""
         return np.asarray(np.linalg.cholesky(self.gram + self.error.precision(size)), float)
 
-    def lack(self, size: ErrorSize) -> float:
-        """Minus twice the log of the evidence for a size, without its constant."""
+    def lack(self, size: ErrorSize, walks: dict[float, _Walk]) -> float:
+        """Minus twice the log of the evidence for a size, without its constant.
+
+        walks    what is known of sizes of the walk already
+        """
+        if size.walk_m not in walks:
+            walks[size.walk_m] = _Walk.of(self, size)
+        walk, weights = walks[size.walk_m], self.error.trend_precisions(size)
+        there = self.error.trend.T @ self.here
+        # M. Woodbury's identity: start and factor are two numbers among hundreds.
+        small = np.diag(1 / weights) + walk.trend.T @ walk.trend
+        grown = walk.grown - walk.trend @ (weights * there)
+        by_trend = walk.trend.T @ grown
+        return float(walk.log_determinant + np.linalg.slogdet(small)[1] + np.log(weights).sum()
+                     - self.error.log_determinant(size) + walk.cost + weights @ there**2
+                     - grown @ grown + by_trend @ np.linalg.solve(small, by_trend))
+
+
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """The record error of one run whose start and factor may be anything, beside a state: the logarithm of the
+    information's determinant, the cost of the numbers as they are, and their pull (k,) and the trend (k, 2) through
+    its Cholesky factor."""
+
+    log_determinant: float
+    cost: float
+    grown: Array
+    trend: Array
+
+    @staticmethod
+    def of(record: _Record, size: ErrorSize) -> _Walk:
+        """Of a run, if the walk is of this size."""
         from scipy.linalg import solve_triangular
 
-        precision, root = self.error.precision(size), self.root(size)
-        grown = solve_triangular(root, self.pull - precision @ self.here, lower=True)
-        return float(_log_determinant(root) - self.error.log_determinant(size)
-                     + self.here @ precision @ self.here - grown @ grown)
+        precision, here = record.error.trendless_precision(size), record.here
+        root, owed = np.linalg.cholesky(record.gram + precision), precision @ here
+        both = solve_triangular(root, np.column_stack([record.pull - owed, record.error.trend]), lower=True)
+        return _Walk(_log_determinant(root), float(here @ owed), both[:, 0], both[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +154,11 @@ class LinearModel:
     def _likeliest_size(self, size: ErrorSize) -> ErrorSize:
         """By evidence, from a size or from one whose start and factor are ten times as large as usual: what these
         explain, a walk explains as well, and there may be an optimum at either."""
+        walks: list[dict[float, _Walk]] = [{} for _ in self._records]
+
         def lack(logs: Array) -> float:
             found = ErrorSize.of(logs)
-            return sum(one.lack(found) for one in self._records) + found.cost
+            return sum(one.lack(found, known) for one, known in zip(self._records, walks, strict=True)) + found.cost
 
         here, least = _descended(lack, size.logs)
         trend = USUAL.logs + np.log([10.0, 1.0, 10.0])
