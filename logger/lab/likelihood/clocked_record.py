@@ -35,7 +35,7 @@ class ClockedRecord(RecordError):
         """There is none (2, 0)."""
         return np.empty((2, 0))
 
-    def trendless_precision(self, size: ErrorSize) -> Array:
+    def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (2, 2)."""
         return np.diag([self.tolerance.gain**-2, self.tolerance.droop**-2])
 

@@ -124,25 +124,21 @@ class RecordError:
 
     def precision(self, size: ErrorSize) -> Array:
         """Inverse covariance of k (k, k)."""
-        return self.trendless_precision(size) + (self.trend * self.trend_precisions(size)) @ self.trend.T
-
-    def trendless_precision(self, size: ErrorSize) -> Array:
-        """The same (k, k) with a start and a factor that may be anything."""
         found = self._walk_precision / (self._own(size)[1] ** 2 * self.knot_s)
         np.einsum("ii->i", found)[-3:] += 1.0, self.tolerance.gain**-2, self.tolerance.droop**-2
         if self.late_s is not None:
             found[self.coefficients, self.coefficients] += self.late_s**-2
-        return found
+        return found + (self.trend * self.trend_precisions(size)) @ self.trend.T
 
     @cached_property
     def trend(self) -> Array:
-        """Start and factor are products of k with these columns (k, 2)."""
+        """Start and factor are products of k with these columns (k, t)."""
         found = np.zeros((self.count, 2))
         found[: self.coefficients, 0], found[-4, 1] = self.basis[: self.coefficients, 0], 1.0
         return found
 
     def trend_precisions(self, size: ErrorSize) -> Array:
-        """Of start and factor (2,)."""
+        """Of start and factor (t,)."""
         return np.array([self._own(size)[0], size.scale]) ** -2
 
     def _own(self, size: ErrorSize) -> tuple[float, float]:

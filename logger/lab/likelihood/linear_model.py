@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,8 @@ from logger.vehicle.effect_parameters import moves_of
 
 Array = npt.NDArray[np.float64]
 
+_LOOSE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
+"""Starts and factors that are as good as free; what a run does not tell of them is not singular yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +50,20 @@ class _Record:
         """
         if size.walk_m not in walks:
             walks[size.walk_m] = _Walk.of(self, size)
-        walk, weights = walks[size.walk_m], self.error.trend_precisions(size)
+        walk, weights = walks[size.walk_m], self.error.trend_precisions(size) - self.error.trend_precisions(_LOOSE)
         there = self.error.trend.T @ self.here
         # M. Woodbury's identity: start and factor are two numbers among hundreds.
-        small = np.diag(1 / weights) + walk.trend.T @ walk.trend
+        small = np.eye(len(weights)) + weights[:, None] * (walk.trend.T @ walk.trend)
         grown = walk.grown - walk.trend @ (weights * there)
         by_trend = walk.trend.T @ grown
-        return float(walk.log_determinant + np.linalg.slogdet(small)[1] + np.log(weights).sum()
-                     - self.error.log_determinant(size) + walk.cost + weights @ there**2
-                     - grown @ grown + by_trend @ np.linalg.solve(small, by_trend))
+        return float(walk.log_determinant + np.linalg.slogdet(small)[1] - self.error.log_determinant(size)
+                     + walk.cost + weights @ there**2
+                     - grown @ grown + by_trend @ np.linalg.solve(small, weights * by_trend))
 
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """The record error of one run whose start and factor may be anything, beside a state: the logarithm of the
+    """The record error of one run whose start and factor may be nearly anything, beside a state: the logarithm of the
     information's determinant, the cost of the numbers as they are, and their pull (k,) and the trend (k, 2) through
     its Cholesky factor."""
 
@@ -74,7 +77,7 @@ class _Walk:
         """Of a run, if the walk is of this size."""
         from scipy.linalg import solve_triangular
 
-        precision, here = record.error.trendless_precision(size), record.here
+        precision, here = record.error.precision(replace(_LOOSE, walk_m=size.walk_m)), record.here
         root, owed = np.linalg.cholesky(record.gram + precision), precision @ here
         both = solve_triangular(root, np.column_stack([record.pull - owed, record.error.trend]), lower=True)
         return _Walk(_log_determinant(root), float(here @ owed), both[:, 0], both[:, 1:])
@@ -82,12 +85,24 @@ class _Walk:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Predictions beside a state with the most likely record errors: whitened residuals (kept,) per run, the numbers of
-    the record errors (k,) per run, and the squares of both."""
+    """Predictions beside a state with the most likely record errors.
 
-    residuals: list[Array]
+    record         numbers of the record errors (k,) per run
+    squares        of the whitened residuals and of these numbers
+    left, steps    whitened residuals (kept,) per run before the record errors took these steps (k,) ...
+    slopes         ... along what they do (k, kept)
+    """
+
     record: list[Array]
     squares: float
+    left: list[Array]
+    steps: list[Array]
+    slopes: list[Array]
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Whitened (kept,) per run."""
+        return [white - step @ slopes for white, step, slopes in zip(self.left, self.steps, self.slopes, strict=True)]
 
 
 class LinearModel:
@@ -210,17 +225,18 @@ class LinearModel:
         """Predictions (n,) per run, laid out with record errors (k,) per run; None: with those of the state."""
         from scipy.linalg import cho_solve
 
-        residuals, record, squares = [], [], 0.0
+        record, squares, whites, steps = [], 0.0, [], []
         for left, whitener, root, precision, one, here in zip(
                 self.posterior.left_by(predictions), self.whiteners, self._roots, self._precisions, self._records,
                 self.state.record if laid is None else laid, strict=True):
             white = whitener(left)
             owed = one.white @ white - precision @ here
             step = cho_solve((root, True), owed)
-            residuals.append(white - step @ one.white)
+            whites.append(white)
+            steps.append(step)
             record.append(here + step)
             squares += float(white @ white + here @ precision @ here - owed @ step)
-        return Eliminated(residuals, record, squares)
+        return Eliminated(record, squares, whites, steps, [one.white for one in self._records])
 
     def objective(self, predictions: Sequence[Array], logs: Array, laid: Sequence[Array] | None = None) -> float:
         """Squares of the whitened residuals and the cost of what is off, with the most likely record errors."""
