@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -182,9 +181,7 @@ def bounded(records: Sequence[Array]) -> bool:
 def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws:
-        with _ONE_AT_A_TIME:
-            stepper = _stepper(car, passage.step_s)
-        return stepper.march(*passage.under_wheels(car.structure), passage.way)
+        return stepper_of(car, passage.step_s).march(*passage.under_wheels(car.structure), passage.way)
     states = in_blocks(car.structure, passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 
@@ -229,12 +226,9 @@ def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
     return transition, np.hstack([at_start + at_end, at_end - at_start])
 
 
-_ONE_AT_A_TIME = Lock()
-
-
 @lru_cache(maxsize=4)
-def _stepper(car: Car, step_s: float) -> Stepper:
-    """Of a car that is about to pass all of its runs, by several threads at once."""
+def stepper_of(car: Car, step_s: float) -> Stepper:
+    """What steps a car, which passes all of its runs one after the other or at once."""
     return Stepper.of(car.structure, car.laws, step_s)
 
 

@@ -152,10 +152,11 @@ def changed(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
         part, _, leaf = name.rpartition(".")
         for one in AXLES if part == BOTH else (part,):
             parts.setdefault(one, {})[leaf] = value
-    whole: dict[str, Any] = parts.pop("", {})
-    return replace(vehicle, **whole, **{
-        part: replace(vehicle.sensor if part == SENSOR else _axle(vehicle, part), **some)
-        for part, some in parts.items()})
+    whole: dict[str, Any] = {**parts.pop("", {})}
+    for part, some in parts.items():
+        of: Any = vehicle.sensor if part == SENSOR else _axle(vehicle, part)
+        whole[part] = replace(of, **some)
+    return replace(vehicle, **whole)
 
 
 def free(

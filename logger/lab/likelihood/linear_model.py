@@ -78,7 +78,7 @@ class _Walk:
         from scipy.linalg import solve_triangular
 
         precision, here = record.error.precision(replace(_LOOSE, walk_m=size.walk_m)), record.here
-        root, owed = np.linalg.cholesky(record.gram + precision), precision @ here
+        root, owed = np.asarray(np.linalg.cholesky(record.gram + precision), float), precision @ here
         both = solve_triangular(root, np.column_stack([record.pull - owed, record.error.trend]), lower=True)
         return _Walk(_log_determinant(root), float(here @ owed), both[:, 0], both[:, 1:])
 
