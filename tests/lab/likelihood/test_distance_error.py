@@ -7,6 +7,8 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
+from scipy.signal import savgol_filter
 
 from logger.lab.likelihood.distance_error import (
     USUAL,
@@ -84,6 +86,15 @@ def test_slopes_say_what_small_numbers_do_to_a_prediction() -> None:
 def test_the_curve_goes_through_a_straight_line() -> None:
     line_m = 0.3 - 0.002 * np.arange(RUN.count)
     assert ERROR.moved_m(ERROR.through(line_m)) == pytest.approx(line_m, abs=1e-12)
+
+
+def test_the_basis_is_that_of_splines_and_of_what_a_smoothing_filter_leaves() -> None:
+    count = ERROR.coefficients
+    splines = BSpline.design_matrix(np.linspace(0, count - 3, RUN.count), np.arange(-3, count + 1.0), 3).toarray().T
+    assert ERROR.basis[:count] == pytest.approx(splines, abs=1e-12)
+    rough = replace(RUN, distance_m=np.round(RUN.distance_m, 2))
+    left = rough.distance_m - savgol_filter(rough.distance_m, 101, 3)
+    assert RecordError.of(rough, Tolerance()).basis[-1] == pytest.approx(-left, abs=1e-9)
 
 
 @pytest.mark.parametrize(("lasts_s", "coefficients"), [(20.0, 63), (100.0, 303), (150.0, 363), (400.0, 363)])
