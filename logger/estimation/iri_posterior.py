@@ -8,6 +8,7 @@ speed both are integrals over wave numbers: of the road's spectrum S, gain H and
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot, pi, sqrt
@@ -58,10 +59,16 @@ def vehicle_error_variance(
     return density * rate_hz / (2 * speed_mps)
 
 
-def acceleration_variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, noise_psd: float) -> float:
-    """Variance of the acceleration itself once the readings are known [(m/s2)2]."""
+def variance_left(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum) -> Callable[[Array], Array]:
+    """Variances (e,) of the acceleration itself once readings with a white noise of spectra (e,) are known [(m/s2)2],
+    as a function of these [(m/s2)2 per cycle/m]."""
     signal = car.power(speed_mps) * spectrum.psd(WAVE_NUMBERS_CPM)
-    return float((signal * noise_psd / (signal + noise_psd)) @ WAVE_NUMBER_STEPS_CPM)
+
+    def left(noise_psd: Array) -> Array:
+        noise = noise_psd[:, None]
+        return np.asarray((signal * noise / (signal + noise)) @ WAVE_NUMBER_STEPS_CPM)
+
+    return left
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ from logger.estimation.normal_distribution import within
 from logger.estimation.sensor_noise import Sensor
 
 Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
 _NEIGHBOURS = 4.0  # samples: an acceleration and those about it go together
@@ -60,11 +62,11 @@ def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> 
     return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
 
 
-def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Array]:
+def cavity(left: Callable[[Array], Array], variance: Array) -> tuple[Array, Array]:
     """Variance (t,) that all other readings leave of each acceleration, where some tell much and some little, and the
     variance (t,) of even readings that tell as much [(m/s2)2].
 
-    left        variance that even readings of a variance leave of each acceleration, their own included
+    left        variances (e,) that even readings of variances (e,) leave of each acceleration, their own included
     variance    (t,) of the readings as they are
 
     The mean of their precisions would make too much of the precise ones: two of them side by side tell little more than
@@ -72,21 +74,27 @@ def cavity(left: Callable[[float], float], variance: Array) -> tuple[Array, Arra
     weighs the same on the mean, 1 / (others + e) = mean of 1 / (others + variance).
     Source: the coherent potential approximation (Soven, Physical Review 156, 1967), with ``variance`` as disorder.
     """
-    lag = np.minimum(np.arange(len(variance)), len(variance) - np.arange(len(variance)))
-    kernel = np.exp(-0.5 * (lag / _NEIGHBOURS) ** 2)
-    about = np.fft.rfft(kernel / kernel.sum())
+    about = _about(len(variance))
 
     def mean(row: Array) -> Array:
         return np.maximum(np.fft.irfft(np.fft.rfft(row) * about, len(row)), row.min())
 
     trials = np.geomspace(variance.min(), variance.max() * 1.001, _TRIALS)
-    log_left = np.log([left(trial) for trial in trials.tolist()])
+    log_left = np.log(left(trials))
     even = 1 / mean(1 / variance)
     for _ in range(_EVENING_ROUNDS):
         whole = np.exp(-np.interp(np.log(even), np.log(trials), log_left))
         others = 1 / np.maximum(whole - 1 / even, _LEAST_OTHERS / even)
         even = np.maximum(1 / mean(1 / (others + variance)) - others, variance.min())
     return others, even
+
+
+@lru_cache(maxsize=4)
+def _about(count: int) -> ComplexArray:
+    """The rfft of how much each neighbour of a sample counts, on a grid of so many."""
+    lag = np.minimum(np.arange(count), count - np.arange(count))
+    kernel = np.exp(-0.5 * (lag / _NEIGHBOURS) ** 2)
+    return np.asarray(np.fft.rfft(kernel / kernel.sum()))
 
 
 def without_own(readings: Readings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:

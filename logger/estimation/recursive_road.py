@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.estimation.hyperparameters import COMMON_ROAD, Belief, learnt, noise_factor, noise_slope, with_noise
-from logger.estimation.iri_posterior import acceleration_variance_left, reading_noise_psd, vehicle_error_variance
+from logger.estimation.iri_posterior import reading_noise_psd, variance_left, vehicle_error_variance
 from logger.estimation.local_variance import LocalRoughness, mean_resolved
 from logger.estimation.noise_belief import NoiseBelief, NoiseLearner
 from logger.estimation.noise_evidence import interval_evidence, residual_evidence
@@ -151,8 +151,9 @@ class FollowedRoad:
     def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
                ) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
-        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
+        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved: rounds and
+        steps are shared among them."""
+        rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
@@ -228,13 +229,9 @@ class FollowedRoad:
 
     def _cavity(self, block: Block, variance: Array) -> tuple[Array, Array]:
         """``cavity`` of a block whose readings have variances (t,)."""
-        speed_mps, spectrum = block.mean_speed_mps, self._belief.spectrum
-
-        def left(even: float) -> float:
-            noise_psd = reading_noise_psd(even, RATE_HZ, speed_mps)
-            return acceleration_variance_left(block.car, speed_mps, spectrum, noise_psd)
-
-        return cavity(left, variance)
+        speed_mps = block.mean_speed_mps
+        left = variance_left(block.car, speed_mps, self._belief.spectrum)
+        return cavity(lambda even: left(even * reading_noise_psd(1.0, RATE_HZ, speed_mps)), variance)
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools) -> None:
         """What readings in the middle of the block, which have settled, say of the noise: each of them once."""

@@ -7,11 +7,11 @@ from scipy.signal import sosfilt
 from logger.estimation.car_response import WAVE_NUMBERS_CPM, CarResponse, golden_car_slope
 from logger.estimation.iri_posterior import (
     SlopeErrors,
-    acceleration_variance_left,
     raised,
     reading_noise_psd,
     resolved_share,
     unseen_share,
+    variance_left,
     window_iri,
 )
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -70,7 +70,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     assert knowledge.correlation[::5] == pytest.approx(by_lag, abs=0.03)
 
     noise_psd = reading_noise_psd(deviation**2, RATE_HZ, speed_mps)
-    left = acceleration_variance_left(CAR, speed_mps, spectrum, noise_psd)
+    left = variance_left(CAR, speed_mps, spectrum)(np.array([noise_psd]))[0]
     assert left == pytest.approx((accel - fitted).var(), rel=0.05)
 
     errors = SlopeErrors(CAR, RATE_HZ, SPACING_M, POINTS + 1)
