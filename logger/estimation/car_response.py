@@ -52,8 +52,8 @@ class CarResponse:
 
     def power_apart(self, speed_mps: float) -> Array:
         """Sum over the axles of each one's own squared gain, at ``WAVE_NUMBERS_CPM`` [1/s4], where ``power`` is the
-        square of their sum: where both axles' shares cancel, what a wrong model leaves is as large as they are. What was
-        computed last is kept."""
+        square of their sum: where both axles' shares cancel, what a wrong model leaves is as large as they are. The
+        last one is kept."""
         if self._apart is not None and self._apart[0] == speed_mps:
             return self._apart[1]
         gain = np.abs(self.by_axle(WAVE_NUMBERS_CPM * speed_mps)) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
