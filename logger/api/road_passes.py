@@ -37,6 +37,7 @@ T = TypeVar("T")
 WINDOWS_M = (10.0, 100.0)
 """What profilers report, and what roads are judged by."""
 _FIX_S, _SMOOTH_FIXES = 1.0, 21
+_BETWEEN_UNITS = 5.0  # gravity is 1 g or 9.8 m/s2
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +78,11 @@ class DrivenWindows:
     iri_m_per_km: Array
     iri_std_m_per_km: Array
     exact_m_per_km: Array
+
+
+def unit_by_gravity(accel: Array) -> str:
+    """The unit of accelerations (n, 3) that hold gravity: ``g`` or ``m/s2``, by the middle of their lengths."""
+    return "g" if float(np.median(np.linalg.norm(accel, axis=1))) < _BETWEEN_UNITS else "m/s2"
 
 
 def driven_windows(recording: Recording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,

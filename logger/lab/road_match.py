@@ -97,6 +97,12 @@ def bounce_band_hz(body_hz: Array) -> tuple[float, float]:
     return 0.4 * float(body_hz.min()), 3.0 * float(body_hz.max())
 
 
+def below_bounce_band_hz(body_hz: Array) -> tuple[float, float]:
+    """The frequencies below the bounce of a body, by its vibrations (b,) [Hz]: it moves with the road there, whether
+    its suspension is free or sticks; around the bounce one that sticks may move it the other way, and far more."""
+    return bounce_band_hz(body_hz)[0], float(body_hz.min())
+
+
 def road_match(run: Run, prediction: Array, band_hz: tuple[float, float]) -> RoadMatch:
     """How well a run goes with a prediction (n,) between two frequencies [Hz]: all of it, or where its distances are
     off by more and more along the way, its parts, each at a lag of its own."""

@@ -11,6 +11,7 @@ from logger.chart_data import Array
 from logger.records import WindowRecord
 from logger.report.placed_rows import column, placed, trace_of
 from logger.report.summary import counts
+from logger.roads.laid_traces import lay
 from logger.roads.places_to_visit import Place, places_to_visit
 from logger.roads.repeated_drives import (
     Changes,
@@ -25,7 +26,6 @@ from logger.roads.repeated_drives import (
     trends,
     way_and_cell,
 )
-from logger.roads.road_matching import lay
 from logger.roads.road_network import RoadNetwork, directions, east_and_north, on_sphere
 from logger.store.log.log_reader import split_drives
 from logger.units import US_PER_S

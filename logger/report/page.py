@@ -30,6 +30,7 @@ from logger.report.document import (
 )
 from logger.report.html import EMPTY, Html, concatenated, html
 from logger.report.maps import Way
+from logger.report.places_passed import places_passed
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
@@ -93,14 +94,14 @@ def page(files: Sequence[LoggedFile], base: Sequence[Way] = (), base_name: str =
         heading(*title) if title else _head(summary, files),
         _tiles(summary),
         *first,
-        track_views(records, summary, _sources(base_name, host)),
+        track_views(records, summary, _sources(base_name, host), [date_words(summarise(one)) for one in drives]),
         _shares_section(summary),
         _places_section(records, summary.roughest),
         _drives_section(drives) if len(drives) > 1 else EMPTY,
         _notes_section(summary, files),
         _settings_section(files),
         windows_table(records),
-        data_block("data", track_data(drives, base) | {
+        data_block("data", track_data(drives, base, places_passed(drives)) | {
             "places": _numbers(records, summary.roughest), "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),

@@ -53,14 +53,14 @@ def _visits(found: LaidDrives) -> Iterator[str]:
         yield "No place lies above a limit with enough confidence: nothing to visit."
         return
     yield f"Places to visit: {len(found.visits)}"
-    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w':>5}  "
+    yield (f"{'#':>3} {'coordinates':>21} {'towards':7} {'length':>7}  {'what':13} {'IRI m/km':>12} {'a_w m/s2':>8}  "
            f"{'perception':25} {'sure':>4} drives")
     for number, one in enumerate(found.visits[:MOST_VISITS], start=1):
         values = visit_values(found, one)
         iri = f"{values['iri_m_per_km']:.2f} ± {values['iri_std_m_per_km']:.2f}"
         a_w = values["a_w_mps2"]
         yield (f"{number:3} {values['lat_deg']:10.5f},{values['lon_deg']:10.5f} {compass(values['heading_deg']):7} "
-               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>5}  "
+               f"{one.length_m:5.0f} m  {one.kind:13} {iri:>12} {'-' if a_w is None else f'{a_w:.2f}':>8}  "
                f"{comfort_words(values['comfort'] or '') if a_w is not None else '-':25} {one.confidence:4.0%} "
                f"{one.drives:6}")
     if len(found.visits) > MOST_VISITS:

@@ -19,7 +19,7 @@ metre on at a spacing of 0.25 m), and waves longer than two thirds of a segment,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -81,6 +81,7 @@ class Roughness:
 
     classes                    every class that lies within two standard errors of the degree of roughness
     lowest_cpm, highest_cpm    between which wave numbers the line was laid [cycle/m]
+    bands                      through which it was laid
     """
 
     gd_n0_cm3: float
@@ -91,6 +92,7 @@ class Roughness:
     classes: tuple[str, ...]
     lowest_cpm: float
     highest_cpm: float
+    bands: Bands = field(repr=False, compare=False)
 
 
 def acceleration_psd(wave_number_cpm: npt.ArrayLike, displacement_psd_m3: npt.ArrayLike) -> Array:
@@ -216,4 +218,5 @@ def straight_line(of: Spectrum, edges_cpm: Array) -> Roughness:
         classes=tuple(letters[letters.index(ends[0]):letters.index(ends[1]) + 1]),
         lowest_cpm=float(bands.edges_cpm[0]),
         highest_cpm=float(bands.edges_cpm[-1]),
+        bands=bands,
     )

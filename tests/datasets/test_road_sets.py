@@ -109,6 +109,7 @@ def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: p
     for name, off in (("85e7 beside 1ccf", np.hypot(0.1, 0.1)), ("e9ef beside 1ccf", np.hypot(0.1, 0.2))):
         expected = 1 - off**2 / np.var(np.log(iri))
         assert named[name, "nearest cells"]["R2 of log IRI"] == pytest.approx(expected, abs=0.05)
+        assert named[name, "laid over, each 200 m moved by up to 4 m"]["R2"] > named[name, "laid over"]["R2"] - 0.01
     assert all(row[3] > other[3] for row, other in zip(hundred["rows"], ten["rows"], strict=True))
 
 
@@ -125,6 +126,18 @@ def test_a_minute_of_comma2k19_becomes_rows_and_a_map(tmp_path: Path, capsys: py
     ours = np.array([row["IRI [m/km]"] for row in known])
     assert np.median(np.abs(ours - exact)) < 0.4
     assert found["figures"][0]["x"] == "east [m]"
+
+
+def test_the_size_of_gravity_tells_the_unit_of_a_car(lira_cd: Path, tmp_path: Path) -> None:
+    import h5py
+
+    cars = tmp_path / "platoon_CPH1_HH.hdf5"
+    shutil.copy(lira_cd / "AutoPi_CAN" / cars.name, cars)
+    (in_g,), _ = recordings(cars)
+    with h5py.File(cars, "a") as file:
+        file["GM/16006/pass_1/acc.xyz"][:, 1:] *= made.GRAVITY_MPS2
+    (in_mps2,), _ = recordings(cars)
+    assert (in_g.unit, in_mps2.unit) == ("g", "m/s2")
 
 
 # --- what is not there, or something else ---
