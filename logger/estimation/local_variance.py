@@ -10,6 +10,7 @@ Gaussian road keeps it near 1. It is followed by place, from block to block.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -86,9 +87,14 @@ class LocalRoughness:
 
     def _smoothed(self, row: Array) -> Array:
         """Sum over the neighbours, weighted with a Gaussian of ``_REACH_M``, periodic as the grid is."""
-        lag = np.minimum(np.arange(len(row)), len(row) - np.arange(len(row)))
-        kernel = np.fft.rfft(np.exp(-0.5 * (lag / self._reach) ** 2))
-        return np.maximum(np.fft.irfft(np.fft.rfft(row) * kernel, len(row)), 0.0)
+        return np.maximum(np.fft.irfft(np.fft.rfft(row) * _neighbours(len(row), self._reach), len(row)), 0.0)
+
+
+@lru_cache(maxsize=32)
+def _neighbours(count: int, reach: float) -> npt.NDArray[np.complex128]:
+    """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
+    lag = np.minimum(np.arange(count), count - np.arange(count))
+    return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))
 
 
 def mean_resolved(gain: Array, variance: Array) -> Array:

@@ -152,8 +152,9 @@ class FollowedRoad:
     def solved(self, block: Block, samples: Samples, read: Bools, beyond_variance: float = 0.0, turns: int = 1
                ) -> SolvedBlock:
         """The block's road, while the belief follows; ``read`` (t,) says which samples count, ``beyond_variance`` how
-        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved."""
-        rounds, steps = (_COARSE_ROUNDS, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
+        uncertain that is which was taken off the readings [(m/s2)2], ``turns`` how often the block is solved, which
+        share rounds and steps."""
+        rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         if not self._begun:
             rounds, steps = _FIRST_ROUNDS, _FIRST_STEPS
         before = self._belief.spectrum if self._begun else None
