@@ -169,7 +169,8 @@ def test_a_recording_alone_gives_the_same_rows_again(name: str, settings: Any, t
     assert known or settings.__dict__.get("range_g", 2) > 2  # steps of a larger range hide this road
     figures = [record.a_w_mps2 for record in live.records[10:-10]]
     assert all(1.0 < figure < 2.5 for figure in figures if figure is not None)
-    assert len([figure for figure in figures if figure is not None]) > 10
+    seen = [figure for figure in figures if figure is not None]
+    assert len(seen) > (10 if settings.__dict__.get("range_g", 2) < 16 else 5)  # steps of 4.9 m/s2 hide most of this ride
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -149,7 +149,7 @@ def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader
     NoiseLearning(tmp_path, pipeline, config, None).save()
     learnt = read_learnt(tmp_path, config)
     assert learnt is not None
-    assert abs(learnt.belief.noise_rms_mps2 - DRIVEN_MPS2) < 2 * learnt.belief.std_mps2
+    assert abs(learnt.belief.log_mean - log(DRIVEN_MPS2)) < 2 * learnt.belief.log_std  # the belief is log-normal
 
 
 def test_a_recording_replays_with_what_its_drive_began_with(recorded: tuple[DumpHeader, list[Event]]) -> None:
