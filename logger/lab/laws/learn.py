@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -172,13 +172,17 @@ def is_left_over(model: Baseline) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Chooser:
-    """The choice of a law, after the search among the known effects."""
+    """The choice of a law, after the search among the known effects.
+
+    kept    laws that were fitted, and beside which models
+    """
 
     search: Search
     selection: Selection
     families: Mapping[str, Family]
     known: Mapping[str, Effect]
     effort: Effort
+    kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
 
     def alone(self) -> Law | None:
         """A law that explains all that is missing by itself, better than the known effects do; None where none does, or
@@ -219,7 +223,15 @@ class _Chooser:
         return law, model
 
     def _fitted_beside(self, base: Baseline) -> list[LawFit]:
-        """Laws fitted beside a model."""
+        """Laws fitted beside a model, once."""
+        for known, fits in self.kept:
+            if known is base:
+                return fits
+        fits = self._fitted_anew(base)
+        self.kept.append((base, fits))
+        return fits
+
+    def _fitted_anew(self, base: Baseline) -> list[LawFit]:
         search, effort = self.search, self.effort
         look = Look(base.posterior, base.state)
         drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(look)]

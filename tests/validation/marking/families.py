@@ -29,7 +29,7 @@ NAMES: dict[str, frozenset[str]] = {
     CORRECTION: frozenset({"record_factor", "clipping"}),
     REPEATS: frozenset({"hum", "wheel_turns"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
-    CHANGE: frozenset({"changing_gain", "fading_damping"}),
+    CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
 }
 """What ``ridelog learn`` calls the families of each meaning."""
 
